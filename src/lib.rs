@@ -1,0 +1,4 @@
+//! `twofold`: reference software for the breakdown of determinism at a two-fold singularity.
+
+pub mod model;
+pub mod num;

@@ -1,0 +1,183 @@
+//! Dual numbers: forward-mode differentiation.
+//!
+//! `Dual<S, N>` is a value with its N partial derivatives, `a + sum_i b_i e_i` with `e_i e_j = 0`
+//! (Griewank & Walther 2008, ch. 3). Nested duals give second derivatives; that is how second Lie derivatives
+//! at a fold come from the equations themselves.
+
+use std::cmp::Ordering;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+use super::Scalar;
+
+/// A value and its partial derivatives with respect to `N` variables.
+#[derive(Clone, Copy, Debug)]
+pub struct Dual<S, const N: usize> {
+    /// The value.
+    pub value: S,
+    /// The partial derivatives.
+    pub partials: [S; N],
+}
+
+impl<S: Scalar, const N: usize> Dual<S, N> {
+    /// A constant: all derivatives zero.
+    pub fn constant(value: S) -> Self {
+        Self { value, partials: [S::zero(); N] }
+    }
+
+    /// The `index`-th independent variable.
+    pub fn variable(value: S, index: usize) -> Self {
+        let mut partials = [S::zero(); N];
+        partials[index] = S::one();
+        Self { value, partials }
+    }
+
+    /// f(self), given the value and the derivative of f at `self.value`.
+    #[inline]
+    fn chain(self, value: S, slope: S) -> Self {
+        Self { value, partials: self.partials.map(|p| p * slope) }
+    }
+}
+
+impl<S: PartialEq, const N: usize> PartialEq for Dual<S, N> {
+    fn eq(&self, other: &Self) -> bool {
+        self.value == other.value
+    }
+}
+
+impl<S: PartialOrd, const N: usize> PartialOrd for Dual<S, N> {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        self.value.partial_cmp(&other.value)
+    }
+}
+
+impl<S: Scalar, const N: usize> Add for Dual<S, N> {
+    type Output = Self;
+    #[inline]
+    fn add(mut self, other: Self) -> Self {
+        self += other;
+        self
+    }
+}
+
+impl<S: Scalar, const N: usize> AddAssign for Dual<S, N> {
+    #[inline]
+    fn add_assign(&mut self, other: Self) {
+        self.value += other.value;
+        for (a, b) in self.partials.iter_mut().zip(other.partials) {
+            *a += b;
+        }
+    }
+}
+
+impl<S: Scalar, const N: usize> Sub for Dual<S, N> {
+    type Output = Self;
+    #[inline]
+    fn sub(mut self, other: Self) -> Self {
+        self -= other;
+        self
+    }
+}
+
+impl<S: Scalar, const N: usize> SubAssign for Dual<S, N> {
+    #[inline]
+    fn sub_assign(&mut self, other: Self) {
+        self.value -= other.value;
+        for (a, b) in self.partials.iter_mut().zip(other.partials) {
+            *a -= b;
+        }
+    }
+}
+
+impl<S: Scalar, const N: usize> Mul for Dual<S, N> {
+    type Output = Self;
+    #[inline]
+    fn mul(self, other: Self) -> Self {
+        let mut partials = [S::zero(); N];
+        for (i, p) in partials.iter_mut().enumerate() {
+            *p = self.partials[i] * other.value + self.value * other.partials[i];
+        }
+        Self { value: self.value * other.value, partials }
+    }
+}
+
+impl<S: Scalar, const N: usize> Div for Dual<S, N> {
+    type Output = Self;
+    #[inline]
+    fn div(self, other: Self) -> Self {
+        let value = self.value / other.value;
+        let mut partials = [S::zero(); N];
+        for (i, p) in partials.iter_mut().enumerate() {
+            *p = (self.partials[i] - value * other.partials[i]) / other.value;
+        }
+        Self { value, partials }
+    }
+}
+
+impl<S: Scalar, const N: usize> Neg for Dual<S, N> {
+    type Output = Self;
+    #[inline]
+    fn neg(self) -> Self {
+        Self { value: -self.value, partials: self.partials.map(|p| -p) }
+    }
+}
+
+impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
+    fn from_f64(value: f64) -> Self {
+        Self::constant(S::from_f64(value))
+    }
+    fn to_f64(self) -> f64 {
+        self.value.to_f64()
+    }
+    fn tanh(self) -> Self {
+        let t = self.value.tanh();
+        self.chain(t, S::one() - t * t)
+    }
+    fn exp(self) -> Self {
+        let e = self.value.exp();
+        self.chain(e, e)
+    }
+    fn sin(self) -> Self {
+        self.chain(self.value.sin(), self.value.cos())
+    }
+    fn cos(self) -> Self {
+        self.chain(self.value.cos(), -self.value.sin())
+    }
+    fn sqrt(self) -> Self {
+        let r = self.value.sqrt();
+        self.chain(r, S::from_f64(0.5) / r)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn sample<S: Scalar>(x: S, y: S) -> S {
+        (x * y).sin() + (x / (y * y + S::one())).tanh() - (y - x).exp() * (x * x + S::one()).sqrt() + y.cos()
+    }
+
+    proptest! {
+        #[test]
+        fn partials_match_central_differences(x in -2.0..2.0_f64, y in -2.0..2.0_f64) {
+            let d = sample(Dual::<f64, 2>::variable(x, 0), Dual::variable(y, 1));
+            let h = 1e-6;
+            let dx = (sample(x + h, y) - sample(x - h, y)) / (2.0 * h);
+            let dy = (sample(x, y + h) - sample(x, y - h)) / (2.0 * h);
+            prop_assert!((d.partials[0] - dx).abs() < 1e-6 * (1.0 + dx.abs()), "{} {}", d.partials[0], dx);
+            prop_assert!((d.partials[1] - dy).abs() < 1e-6 * (1.0 + dy.abs()));
+        }
+    }
+
+    #[test]
+    fn nesting_gives_second_derivatives() {
+        // d^2/dx^2 tanh x = -2 tanh x (1 - tanh^2 x)
+        let x: Dual<Dual<f64, 1>, 1> = Dual { value: Dual::variable(0.3, 0), partials: [Dual::constant(1.0)] };
+        let t = elementary_tanh(0.3);
+        assert!((x.tanh().partials[0].partials[0] + 2.0 * t * (1.0 - t * t)).abs() < 1e-15);
+    }
+
+    fn elementary_tanh(x: f64) -> f64 {
+        super::super::elementary::tanh(x)
+    }
+}

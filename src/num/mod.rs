@@ -1,0 +1,14 @@
+//! Arithmetic that results depend on.
+//!
+//! This is the only room that names a math library. Everything that ends in a published number goes through
+//! [`elementary`] (functions with the same bits on every machine), [`Scalar`] (what an equation may do with a
+//! number, so that one definition serves plain evaluation, differentiation and extended precision), and
+//! [`random`] (a named generator and our own map from bits to numbers).
+
+pub mod dual;
+pub mod elementary;
+pub mod random;
+pub mod scalar;
+
+pub use dual::Dual;
+pub use scalar::Scalar;

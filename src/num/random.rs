@@ -1,0 +1,107 @@
+//! Random numbers that are the same on every machine and in every release.
+//!
+//! The generator is ChaCha8, named in the spec; its output stream is fixed by its definition, unlike `rand`'s
+//! `StdRng`, which is documented as free to change. The maps from bits to numbers are our own, because library
+//! distributions may change between releases or reach the platform's math functions.
+
+use rand::Rng;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::elementary::{cos, ln, sin, sqrt};
+
+/// A stream of random numbers: ChaCha8 with a 64-bit seed and a 64-bit stream number.
+///
+/// One stream per run: runs computed side by side never share or reorder numbers.
+#[derive(Clone, Debug)]
+pub struct RandomStream {
+    generator: ChaCha8Rng,
+}
+
+impl RandomStream {
+    /// The stream `stream` of the generator seeded with `seed`.
+    pub fn new(seed: u64, stream: u64) -> Self {
+        let mut key = [0_u8; 32];
+        key[..8].copy_from_slice(&seed.to_le_bytes());
+        let mut generator = ChaCha8Rng::from_seed(key);
+        generator.set_stream(stream);
+        Self { generator }
+    }
+
+    /// Uniform on [0, 1): the upper 53 bits of a 64-bit word, divided by 2^53.
+    pub fn uniform(&mut self) -> f64 {
+        const TWO_TO_MINUS_53: f64 = 1.0 / 9_007_199_254_740_992.0;
+        (self.generator.next_u64() >> 11) as f64 * TWO_TO_MINUS_53
+    }
+
+    /// Uniform on [low, high).
+    pub fn uniform_in(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.uniform()
+    }
+
+    /// Standard normal, by the trigonometric method of Box & Muller (1958); the second value of a pair is dropped so
+    /// that the count of words per number is fixed.
+    pub fn normal(&mut self) -> f64 {
+        let u = 1.0 - self.uniform();
+        let v = self.uniform();
+        sqrt(-2.0 * ln(u)) * cos(std::f64::consts::TAU * v)
+    }
+
+    /// A unit vector with uniform direction on the sphere in three dimensions (Archimedes: the height is uniform).
+    pub fn direction(&mut self) -> [f64; 3] {
+        let height = self.uniform_in(-1.0, 1.0);
+        let angle = std::f64::consts::TAU * self.uniform();
+        let radius = sqrt(1.0 - height * height);
+        [radius * cos(angle), radius * sin(angle), height]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stream_is_frozen() {
+        let mut r = RandomStream::new(2013, 0);
+        let first: Vec<u64> = (0..3).map(|_| r.uniform().to_bits()).collect();
+        let mut again = RandomStream::new(2013, 0);
+        assert_eq!(first, (0..3).map(|_| again.uniform().to_bits()).collect::<Vec<_>>());
+        let mut other = RandomStream::new(2013, 1);
+        assert_ne!(first[0], other.uniform().to_bits());
+    }
+
+    #[test]
+    fn directions_are_unit_and_balanced() {
+        let mut r = RandomStream::new(1, 0);
+        let n = 20_000;
+        let mut mean = [0.0; 3];
+        let mut second = [0.0; 3];
+        for _ in 0..n {
+            let d = r.direction();
+            assert!((d.iter().map(|c| c * c).sum::<f64>() - 1.0).abs() < 1e-14);
+            for i in 0..3 {
+                mean[i] += d[i] / n as f64;
+                second[i] += d[i] * d[i] / n as f64;
+            }
+        }
+        // Standard errors: sqrt(1/3/n) = 0.004 and sqrt(4/45/n) = 0.002; five of them.
+        for i in 0..3 {
+            assert!(mean[i].abs() < 0.02, "{mean:?}");
+            assert!((second[i] - 1.0 / 3.0).abs() < 0.011, "{second:?}");
+        }
+    }
+
+    #[test]
+    fn normal_moments() {
+        let mut r = RandomStream::new(7, 3);
+        let n = 40_000;
+        let (mut m1, mut m2, mut m4) = (0.0, 0.0, 0.0);
+        for _ in 0..n {
+            let x = r.normal();
+            m1 += x / n as f64;
+            m2 += x * x / n as f64;
+            m4 += x * x * x * x / n as f64;
+        }
+        assert!(m1.abs() < 0.025 && (m2 - 1.0).abs() < 0.04 && (m4 - 3.0).abs() < 0.25, "{m1} {m2} {m4}");
+    }
+}
