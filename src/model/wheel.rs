@@ -126,9 +126,7 @@ impl Wheel {
     /// The power dE/dt = -c_w v^2 - c_h O^2 - F s (h + p O), for sign(h) replaced by `s`.
     pub fn power(&self, x: &SVector<f64, 3>, s: f64) -> f64 {
         let o = x[2] - self.omega0;
-        -self.c_w * x[1] * x[1]
-            - self.c_h * o * o
-            - self.side_force * s * (self.switching(x) + self.lever(x) * o)
+        -self.c_w * x[1] * x[1] - self.c_h * o * o - self.side_force * s * (self.switching(x) + self.lever(x) * o)
     }
 
     fn sin_cos(&self) -> (f64, f64) {
