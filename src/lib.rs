@@ -1,4 +1,5 @@
 //! `twofold`: reference software for the breakdown of determinism at a two-fold singularity.
 
+pub mod integrate;
 pub mod model;
 pub mod num;

@@ -1,0 +1,231 @@
+//! Dormand-Prince 5(4): the explicit Runge-Kutta pair RK5(4)7M of Dormand & Prince (1980), with the dense output and
+//! step control of Hairer, Norsett & Wanner, Solving ODEs I (2nd ed. 1993), secs II.4-II.6.
+
+use nalgebra::SVector;
+
+use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
+use crate::model::VectorField;
+use crate::num::elementary::{pow, sqrt};
+
+/// Dormand & Prince (1980), table 2.
+mod tableau {
+    pub const A21: f64 = 1.0 / 5.0;
+    pub const A31: f64 = 3.0 / 40.0;
+    pub const A32: f64 = 9.0 / 40.0;
+    pub const A41: f64 = 44.0 / 45.0;
+    pub const A42: f64 = -56.0 / 15.0;
+    pub const A43: f64 = 32.0 / 9.0;
+    pub const A51: f64 = 19372.0 / 6561.0;
+    pub const A52: f64 = -25360.0 / 2187.0;
+    pub const A53: f64 = 64448.0 / 6561.0;
+    pub const A54: f64 = -212.0 / 729.0;
+    pub const A61: f64 = 9017.0 / 3168.0;
+    pub const A62: f64 = -355.0 / 33.0;
+    pub const A63: f64 = 46732.0 / 5247.0;
+    pub const A64: f64 = 49.0 / 176.0;
+    pub const A65: f64 = -5103.0 / 18656.0;
+    // The seventh stage is the fifth-order solution itself: its derivative is the next step's first ("fsal").
+    pub const A71: f64 = 35.0 / 384.0;
+    pub const A73: f64 = 500.0 / 1113.0;
+    pub const A74: f64 = 125.0 / 192.0;
+    pub const A75: f64 = -2187.0 / 6784.0;
+    pub const A76: f64 = 11.0 / 84.0;
+    // Fifth- minus fourth-order weights: the error estimate.
+    pub const E1: f64 = 71.0 / 57600.0;
+    pub const E3: f64 = -71.0 / 16695.0;
+    pub const E4: f64 = 71.0 / 1920.0;
+    pub const E5: f64 = -17253.0 / 339200.0;
+    pub const E6: f64 = 22.0 / 525.0;
+    pub const E7: f64 = -1.0 / 40.0;
+    // Dense output of fourth order, Hairer et al. (1993), eq. (II.6.12) in the arrangement of their DOPRI5.
+    pub const D1: f64 = -12715105075.0 / 11282082432.0;
+    pub const D3: f64 = 87487479700.0 / 32700410799.0;
+    pub const D4: f64 = -10690763975.0 / 1880347072.0;
+    pub const D5: f64 = 701980252875.0 / 199316789632.0;
+    pub const D6: f64 = -1453857185.0 / 822651844.0;
+    pub const D7: f64 = 69997945.0 / 29380423.0;
+}
+use tableau::*;
+
+/// Step control, Hairer et al. (1993), sec. IV.2 (PI control after Gustafsson 1991): h_new = h safety err^-alpha err_old^beta.
+mod control {
+    pub const SAFETY: f64 = 0.9;
+    pub const BETA: f64 = 0.04;
+    pub const ALPHA: f64 = 0.2 - BETA * 0.75;
+    /// h may shrink at most by this factor ...
+    pub const SHRINK: f64 = 0.2;
+    /// ... and grow at most by this.
+    pub const GROW: f64 = 10.0;
+}
+
+/// The Dormand-Prince stepper.
+#[derive(Clone, Debug)]
+pub struct Dopri5<const N: usize> {
+    tolerance: Tolerance,
+    statistics: Statistics,
+    t: f64,
+    x: SVector<f64, N>,
+    /// f(x): the last stage of the previous step.
+    fsal: SVector<f64, N>,
+    t_end: f64,
+    max_step: f64,
+    /// Step to try next.
+    h: f64,
+    /// Error of the last accepted step, for the PI controller.
+    last_error: f64,
+    dense: Dense<N>,
+}
+
+/// The interpolant of one step, Hairer et al. (1993), sec. II.6.
+#[derive(Clone, Debug)]
+struct Dense<const N: usize> {
+    r: [SVector<f64, N>; 5],
+}
+
+impl<const N: usize> Interpolant<N> for Dense<N> {
+    fn at(&self, theta: f64) -> SVector<f64, N> {
+        let one_minus = 1.0 - theta;
+        let [r1, r2, r3, r4, r5] = &self.r;
+        r1 + (r2 + (r3 + (r4 + r5 * one_minus) * theta) * one_minus) * theta
+    }
+    fn degree(&self) -> usize {
+        4
+    }
+}
+
+impl<const N: usize> Dopri5<N> {
+    /// A stepper with the given tolerances.
+    pub fn new(tolerance: Tolerance) -> Self {
+        let zero = SVector::zeros();
+        Self {
+            tolerance,
+            statistics: Statistics { highest_order: 5, ..Statistics::default() },
+            t: 0.0,
+            x: zero,
+            fsal: zero,
+            t_end: 0.0,
+            max_step: f64::INFINITY,
+            h: 0.0,
+            last_error: 1e-4,
+            dense: Dense { r: [zero; 5] },
+        }
+    }
+
+    /// Root mean square of e_i / (atol + rtol |x_i|).
+    fn norm(&self, e: &SVector<f64, N>, x: impl Fn(usize) -> f64) -> f64 {
+        let mut sum = 0.0;
+        for i in 0..N {
+            let q = e[i] / (self.tolerance.atol + self.tolerance.rtol * x(i));
+            sum += q * q;
+        }
+        sqrt(sum / N as f64)
+    }
+
+    /// A first step size: Hairer et al. (1993), sec. II.4, "Starting step size".
+    fn first_step<F: VectorField<N>>(&mut self, field: &F) -> f64 {
+        let x = self.x;
+        let d0 = self.norm(&x, |i| x[i].abs());
+        let d1 = self.norm(&self.fsal, |i| x[i].abs());
+        let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 };
+        let h0 = h0.min(self.max_step).min(self.t_end - self.t);
+        let f1 = field.eval(&(x + self.fsal * h0));
+        self.statistics.evaluations += 1;
+        let d2 = self.norm(&(f1 - self.fsal), |i| x[i].abs()) / h0;
+        let d = d1.max(d2);
+        let h1 = if d <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { pow(0.01 / d, 0.2) };
+        if h1.is_finite() { (100.0 * h0).min(h1) } else { h0 }
+    }
+}
+
+impl<const N: usize> Stepper<N> for Dopri5<N> {
+    fn restart<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
+        self.t = t;
+        self.x = x;
+        self.t_end = t_end;
+        self.max_step = max_step;
+        self.last_error = 1e-4;
+        self.fsal = field.eval(&x);
+        self.statistics.evaluations += 1;
+        self.statistics.restarts += 1;
+        if !finite(&x) || !finite(&self.fsal) {
+            return Err(Failure::NotFinite { t, state: Failure::state(&x) });
+        }
+        self.h = self.first_step(field).min(max_step);
+        Ok(())
+    }
+
+    fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
+        let (t0, x0, k1) = (self.t, self.x, self.fsal);
+        let mut rejected_before = false;
+        loop {
+            let remaining = self.t_end - t0;
+            // Reach the end exactly; do not leave a remainder too small to step over.
+            let last = self.h * 1.000_000_1 >= remaining;
+            let h = if last { remaining } else { self.h };
+            if h.abs() <= t0.abs() * f64::EPSILON || h < f64::MIN_POSITIVE {
+                return Err(Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) });
+            }
+            let k2 = field.eval(&(x0 + k1 * (h * A21)));
+            let k3 = field.eval(&(x0 + (k1 * A31 + k2 * A32) * h));
+            let k4 = field.eval(&(x0 + (k1 * A41 + k2 * A42 + k3 * A43) * h));
+            let k5 = field.eval(&(x0 + (k1 * A51 + k2 * A52 + k3 * A53 + k4 * A54) * h));
+            let k6 = field.eval(&(x0 + (k1 * A61 + k2 * A62 + k3 * A63 + k4 * A64 + k5 * A65) * h));
+            let x1 = x0 + (k1 * A71 + k3 * A73 + k4 * A74 + k5 * A75 + k6 * A76) * h;
+            let k7 = field.eval(&x1);
+            self.statistics.evaluations += 6;
+
+            let e = (k1 * E1 + k3 * E3 + k4 * E4 + k5 * E5 + k6 * E6 + k7 * E7) * h;
+            let error = self.norm(&e, |i| x0[i].abs().max(x1[i].abs()));
+            if !error.is_finite() || !finite(&x1) || !finite(&k7) {
+                // A trial point may leave the domain although the orbit does not: retry much shorter, then give up.
+                self.statistics.rejected += 1;
+                self.h = h * 0.1;
+                rejected_before = true;
+                if self.h <= t0.abs() * f64::EPSILON || self.h < 1e-300 {
+                    return Err(Failure::NotFinite { t: t0, state: Failure::state(&x0) });
+                }
+                continue;
+            }
+            let shrink = pow(error, control::ALPHA);
+            if error <= 1.0 {
+                let factor = (shrink / pow(self.last_error, control::BETA) / control::SAFETY)
+                    .clamp(1.0 / control::GROW, 1.0 / control::SHRINK);
+                let mut next = h / factor;
+                if rejected_before {
+                    next = next.min(h);
+                }
+                // A step shortened only to reach the end says nothing about the size to go on with.
+                self.h = next.min(self.max_step);
+                self.last_error = error.max(1e-4);
+                let difference = x1 - x0;
+                let bspl = k1 * h - difference;
+                self.dense.r = [
+                    x0,
+                    difference,
+                    bspl,
+                    difference - k7 * h - bspl,
+                    (k1 * D1 + k3 * D3 + k4 * D4 + k5 * D5 + k6 * D6 + k7 * D7) * h,
+                ];
+                self.t = if last { self.t_end } else { t0 + h };
+                self.x = x1;
+                self.fsal = k7;
+                self.statistics.steps += 1;
+                return Ok(Step { t0, t1: self.t, x0, x1, interpolant: &self.dense });
+            }
+            self.statistics.rejected += 1;
+            rejected_before = true;
+            self.h = h / (shrink / control::SAFETY).min(1.0 / control::SHRINK);
+        }
+    }
+
+    fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+}

@@ -1,0 +1,16 @@
+//! Time stepping: from an equation and a start to a sequence of accepted steps.
+//!
+//! A method is a [`Stepper`]: it makes one accepted [`Step`] at a time, and every step carries its interpolant (dense
+//! output). The one driver loop, [`drive`], runs a stepper over a [`Schedule`] of restarts and kicks and hands each
+//! step to an [`Observer`]. What is made of the steps (a path, a section) is not decided here.
+
+pub mod dopri5;
+pub mod driver;
+pub mod roots;
+pub mod schedule;
+pub mod step;
+
+pub use dopri5::Dopri5;
+pub use driver::{Ignore, Observer, Summary, Watch, drive};
+pub use schedule::{Kick, KickLaw, Kicker, Schedule, StepCap};
+pub use step::{Failure, Flow, Interpolant, Statistics, Step, Stepper, Tolerance};

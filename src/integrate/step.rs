@@ -1,0 +1,181 @@
+//! The nouns every method shares: an accepted step with its interpolant, tolerances, statistics, failures.
+
+use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
+
+use crate::model::VectorField;
+
+/// Continuous extension of a method over one step (dense output).
+pub trait Interpolant<const N: usize> {
+    /// The state at the fraction `theta` of the step, in [0, 1].
+    fn at(&self, theta: f64) -> SVector<f64, N>;
+    /// The degree of the interpolant as a polynomial in `theta`.
+    fn degree(&self) -> usize;
+}
+
+/// One accepted step from (t0, x0) to (t1, x1).
+#[derive(Clone, Copy)]
+pub struct Step<'a, const N: usize> {
+    /// Time at the start.
+    pub t0: f64,
+    /// Time at the end.
+    pub t1: f64,
+    /// State at the start.
+    pub x0: SVector<f64, N>,
+    /// State at the end.
+    pub x1: SVector<f64, N>,
+    /// The continuous extension between them.
+    pub interpolant: &'a dyn Interpolant<N>,
+}
+
+impl<const N: usize> Step<'_, N> {
+    /// The state at the fraction `theta` of the step; exactly `x0` at 0 and `x1` at 1.
+    pub fn at(&self, theta: f64) -> SVector<f64, N> {
+        if theta <= 0.0 {
+            self.x0
+        } else if theta >= 1.0 {
+            self.x1
+        } else {
+            self.interpolant.at(theta)
+        }
+    }
+
+    /// The time at the fraction `theta` of the step.
+    pub fn time(&self, theta: f64) -> f64 {
+        if theta >= 1.0 { self.t1 } else { self.t0 + theta * (self.t1 - self.t0) }
+    }
+
+    /// The length of the step in time.
+    pub fn length(&self) -> f64 {
+        self.t1 - self.t0
+    }
+}
+
+/// Local error control: a component's error is measured against `atol + rtol |x|`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tolerance {
+    /// Relative tolerance.
+    pub rtol: f64,
+    /// Absolute tolerance.
+    pub atol: f64,
+}
+
+/// A one-step-at-a-time method.
+pub trait Stepper<const N: usize> {
+    /// Starts afresh at (t, x) towards `t_end` with steps no longer than `max_step`. Everything learnt before (step size,
+    /// order, saved derivatives, factorised Jacobians) is forgotten; only [`Statistics`] go on counting.
+    fn restart<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure>;
+
+    /// Makes one accepted step. Never passes `t_end`; the step that reaches it has `t1 == t_end` exactly. Must not be
+    /// called again after that without [`Stepper::restart`].
+    fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure>;
+
+    /// What the method has done since it was made.
+    fn statistics(&self) -> &Statistics;
+}
+
+/// Work done by a method. Counts that a method does not have stay zero.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Statistics {
+    /// Accepted steps.
+    pub steps: u64,
+    /// Steps rejected by the error test.
+    pub rejected: u64,
+    /// Evaluations of the right-hand side, without those made for Jacobians.
+    pub evaluations: u64,
+    /// Jacobian evaluations.
+    pub jacobians: u64,
+    /// LU factorisations.
+    pub factorisations: u64,
+    /// Corrector iterations that failed to converge.
+    pub convergence_failures: u64,
+    /// Changes between the non-stiff and the stiff family.
+    pub method_switches: u64,
+    /// Accepted steps made by the stiff family.
+    pub stiff_steps: u64,
+    /// Starts and restarts.
+    pub restarts: u64,
+    /// The highest order used.
+    pub highest_order: u64,
+}
+
+/// Whether an observer wants more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flow {
+    /// Go on.
+    Continue,
+    /// Stop after this step.
+    Stop,
+}
+
+/// Why an integration could not go on. Each names the time and the state; the caller adds the run's name.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Failure {
+    /// The state or the right-hand side is infinite or not a number.
+    #[error(
+        "the right-hand side or the state is no longer finite at t = {t}, state {state:?}: the orbit escapes; check the parameters and the start"
+    )]
+    NotFinite {
+        /// Time of the last good state.
+        t: f64,
+        /// The last good state.
+        state: Vec<f64>,
+    },
+    /// The step became too small to advance time.
+    #[error(
+        "step size underflow ({h:e}) at t = {t}, state {state:?}: the tolerances ask for more than f64 can give here; loosen them or use a stiff method"
+    )]
+    StepUnderflow {
+        /// Time reached.
+        t: f64,
+        /// The step that was asked for.
+        h: f64,
+        /// State reached.
+        state: Vec<f64>,
+    },
+    /// The budget of steps is used up.
+    #[error(
+        "{limit} steps were not enough: stopped at t = {t}, state {state:?}. If this is near (0, alpha/beta, alpha/beta), the run has landed on the stiff far attractor: use an implicit method; otherwise raise the step limit"
+    )]
+    TooManySteps {
+        /// Time reached.
+        t: f64,
+        /// The limit.
+        limit: u64,
+        /// State reached.
+        state: Vec<f64>,
+    },
+    /// An implicit method's nonlinear equations could not be solved even with tiny steps.
+    #[error(
+        "the implicit equations did not converge at t = {t}, step {h:e}, state {state:?}: the right-hand side is too rough for this method; try another"
+    )]
+    NotConverged {
+        /// Time reached.
+        t: f64,
+        /// The step that was tried last.
+        h: f64,
+        /// State reached.
+        state: Vec<f64>,
+    },
+}
+
+impl Failure {
+    /// The state as the errors carry it.
+    pub fn state<const N: usize>(x: &SVector<f64, N>) -> Vec<f64> {
+        x.iter().copied().collect()
+    }
+}
+
+/// Whether every component is finite.
+pub(crate) fn finite<const N: usize>(x: &SVector<f64, N>) -> bool {
+    x.iter().all(|v| v.is_finite())
+}
