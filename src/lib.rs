@@ -5,3 +5,4 @@ pub mod integrate;
 pub mod model;
 pub mod num;
 pub mod observe;
+pub mod record;

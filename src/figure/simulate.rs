@@ -31,6 +31,21 @@ pub enum Data {
     Section(Vec<Crossing>),
 }
 
+impl Data {
+    /// Number of recorded points.
+    pub fn len(&self) -> usize {
+        match self {
+            Data::Path(samples) => samples.len(),
+            Data::Section(crossings) => crossings.len(),
+        }
+    }
+
+    /// Whether nothing was recorded.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
 /// Why a run gave no recording.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RunError {

@@ -129,6 +129,12 @@ impl Wheel {
         -self.c_w * x[1] * x[1] - self.c_h * o * o - self.side_force * s * (self.switching(x) + self.lever(x) * o)
     }
 
+    /// The wheel's speed at which wheel and disc stick, h = 0: v = O (d - r cot gamma).
+    pub fn sticking_speed(&self, r: f64, omega: f64) -> f64 {
+        let (sin, cos) = self.sin_cos();
+        (omega - self.omega0) * (self.d - r * cos / sin)
+    }
+
     fn sin_cos(&self) -> (f64, f64) {
         (Scalar::sin(self.gamma), Scalar::cos(self.gamma))
     }
@@ -175,6 +181,14 @@ mod tests {
             for (g, f) in got.iter().zip(want) {
                 assert!((g - f).abs() <= 5e-8 * f.abs(), "{got:?} {want:?}");
             }
+        }
+    }
+
+    #[test]
+    fn sticking_speed_lies_on_the_surface() {
+        let w = Wheel::default();
+        for (r, omega) in [(0.3, -2.0), (0.7, 3.0)] {
+            assert!(w.switching(&vector![r, w.sticking_speed(r, omega), omega]).abs() < 1e-15);
         }
     }
 

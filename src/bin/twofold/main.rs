@@ -1,0 +1,54 @@
+//! `twofold`: compute any run, check and bless the published figures.
+
+mod bless;
+#[allow(dead_code, missing_docs)] // each figure's `main` is for its own binary
+#[path = "../../../figures/catalogue.rs"]
+mod catalogue;
+mod check;
+mod run;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Reference software for the breakdown of determinism at a two-fold singularity (Jeffrey 2013).
+#[derive(Debug, Parser)]
+#[command(version, about, long_about = None, propagate_version = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Run(Box<run::Arguments>),
+    Check(check::Arguments),
+    Bless(bless::Arguments),
+}
+
+/// How a command that did not fail ended.
+enum Outcome {
+    /// All is well: exit code 0.
+    Fine,
+    /// A check failed: exit code 1.
+    Differs,
+}
+
+/// A failure of usage, input or place: exit code 2. Its text says what was wrong, where, and what to do.
+type Problem = Box<dyn std::error::Error>;
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse().command {
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
+        Command::Bless(arguments) => bless::run(&arguments),
+    };
+    match result {
+        Ok(Outcome::Fine) => ExitCode::SUCCESS,
+        Ok(Outcome::Differs) => ExitCode::from(1),
+        Err(problem) => {
+            eprintln!("error: {problem}");
+            ExitCode::from(2)
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! From pictures to bytes: independent runs side by side, collected in order.
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::progress::Progress;
+use super::simulate::{Recording, RunError, simulate};
+use super::spec::RunSpec;
+use super::{Picture, Reading, drawing, encode};
+use crate::integrate::Statistics;
+use crate::record::hash::canonical_json;
+use crate::record::{Hash, PanelEntry, PictureEntry};
+use crate::render::{RenderError, Rendered, render};
+
+/// A computed picture: its files' bytes and what is known about them.
+#[derive(Clone, Debug)]
+pub struct Computed {
+    /// PNG, SVG and PDF.
+    pub rendered: Rendered,
+    /// CSV per panel: (label, bytes).
+    pub tables: Vec<(String, Vec<u8>)>,
+    /// What is known about the picture, as it is written beside it.
+    pub record: PictureRecord,
+}
+
+/// What is known about a picture.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PictureRecord {
+    /// Hashes of every layer.
+    pub hashes: PictureEntry,
+    /// The parameter reading.
+    pub reading: Option<Reading>,
+    /// The caption.
+    pub caption: String,
+    /// How it differs from the published picture; empty for the real thing.
+    pub alterations: Vec<String>,
+    /// Its panels.
+    pub panels: Vec<PanelRecord>,
+}
+
+/// What is known about a panel.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PanelRecord {
+    /// Label.
+    pub label: String,
+    /// Title.
+    pub title: String,
+    /// The run.
+    pub run: RunSpec,
+    /// Recorded points.
+    pub points: usize,
+    /// Final time.
+    pub t: f64,
+    /// Final state.
+    pub state: [f64; 3],
+    /// Work done.
+    pub statistics: Statistics,
+    /// The largest number of steps between restarts; NDSolve's default limit is 10,000.
+    pub most_steps_in_segment: u64,
+}
+
+/// A picture that could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum PipelineError {
+    /// A run failed.
+    #[error("{picture} ({panel}): {source}")]
+    Run {
+        /// The picture.
+        picture: String,
+        /// The panel.
+        panel: String,
+        /// Why.
+        source: RunError,
+    },
+    /// The drawing failed.
+    #[error("{picture}: {source}")]
+    Render {
+        /// The picture.
+        picture: String,
+        /// Why.
+        source: RenderError,
+    },
+}
+
+/// Computes and draws one picture. The result does not depend on the number of threads.
+pub fn compute(picture: &Picture, progress: &Progress) -> Result<Computed, PipelineError> {
+    let recordings: Vec<Recording> = picture
+        .panels
+        .par_iter()
+        .map(|panel| {
+            let watch = progress.run(format!("{} ({})", picture.name, panel.label), panel.run.t_end);
+            let result = simulate(&panel.run, &watch).map_err(|source| PipelineError::Run {
+                picture: picture.name.clone(),
+                panel: panel.label.clone(),
+                source,
+            });
+            match &result {
+                Ok(r) => watch.done(&format!("{} steps, {} points", r.statistics.steps, r.data.len())),
+                Err(_) => watch.done("failed"),
+            }
+            result
+        })
+        .collect::<Vec<_>>()
+        .into_iter()
+        .collect::<Result<_, _>>()?;
+
+    let entries: Vec<PanelEntry> = picture
+        .panels
+        .iter()
+        .zip(&recordings)
+        .map(|(panel, recording)| PanelEntry {
+            label: panel.label.clone(),
+            spec: Hash::of_json(&panel.run),
+            data: Hash::of(&encode::bits(&recording.data)),
+        })
+        .collect();
+    let spec = Hash::of(&canonical_json(&picture.panels.iter().map(|p| (&p.label, &p.run)).collect::<Vec<_>>()));
+    let data = Hash::of(entries.iter().map(|e| e.data.as_str()).collect::<Vec<_>>().join("\n").as_bytes());
+
+    let sheet = drawing::sheet(picture, &recordings, &spec, &data);
+    let rendered =
+        render(&sheet).map_err(|source| PipelineError::Render { picture: picture.name.clone(), source })?;
+    let hashes = PictureEntry {
+        name: picture.name.clone(),
+        spec,
+        data,
+        pixels: Hash::of(&rendered.pixels.hashed_bytes()),
+        png: Hash::of(&rendered.png),
+        svg: Hash::of(&rendered.svg),
+        pdf: Hash::of(&rendered.pdf),
+        panels: entries,
+    };
+    let panels = picture
+        .panels
+        .iter()
+        .zip(&recordings)
+        .map(|(panel, r)| PanelRecord {
+            label: panel.label.clone(),
+            title: panel.title.clone(),
+            run: panel.run,
+            points: r.data.len(),
+            t: r.t,
+            state: r.x,
+            statistics: r.statistics.clone(),
+            most_steps_in_segment: r.most_steps_in_segment,
+        })
+        .collect();
+    let tables = picture
+        .panels
+        .iter()
+        .zip(&recordings)
+        .map(|(panel, r)| (panel.label.clone(), encode::csv(&panel.run, &r.data)))
+        .collect();
+    let record = PictureRecord {
+        hashes,
+        reading: picture.reading,
+        caption: picture.caption.clone(),
+        alterations: picture.alterations.clone(),
+        panels,
+    };
+    Ok(Computed { rendered, tables, record })
+}

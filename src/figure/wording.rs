@@ -1,0 +1,170 @@
+//! Words and numbers for people: small print, in the renderer's rich-text markup.
+
+use super::Reading;
+use super::spec::{MethodSpec, RunSpec, SwitchSpec, SystemSpec};
+use crate::integrate::StepCap;
+use crate::model::{Relaxation, Transition};
+
+/// A number as a printer would set it: 0.13, 10^{-5}, 1.05×10^{-8}, 200 000.
+pub fn number(value: f64) -> String {
+    let magnitude = value.abs();
+    if value == 0.0 {
+        return "0".into();
+    }
+    if (1e4..1e16).contains(&magnitude) && value == value.trunc() {
+        let digits = format!("{magnitude:.0}");
+        let mut grouped = String::new();
+        for (i, digit) in digits.chars().enumerate() {
+            if i > 0 && (digits.len() - i).is_multiple_of(3) {
+                grouped.push('\u{2009}');
+            }
+            grouped.push(digit);
+        }
+        return if value < 0.0 { format!("−{grouped}") } else { grouped };
+    }
+    if (1e-2..1e4).contains(&magnitude) {
+        return format!("{value}").replace('-', "−");
+    }
+    let text = format!("{value:.2e}");
+    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    let mantissa = mantissa.trim_end_matches('0').trim_end_matches('.');
+    let power = format!("10^{{{exponent}}}");
+    match mantissa {
+        "1" => power,
+        "-1" => format!("−{power}"),
+        _ => format!("{}×{power}", mantissa.replace('-', "−")),
+    }
+}
+
+/// "reconstructed reading: *α* = 0.1, *β* = 10^{-5}".
+pub fn reading(reading: Reading) -> String {
+    let c = reading.caricature();
+    format!("{} reading: *α* = {}, *β* = {}", reading.word(), number(c.alpha), number(c.beta))
+}
+
+/// The system and its parameters.
+pub fn system(system: &SystemSpec) -> String {
+    match system {
+        SystemSpec::Caricature(c) => format!(
+            "*α* = {}, *β* = {}, *v*_{{+}} = {}, *v*_{{−}} = {}",
+            number(c.alpha),
+            number(c.beta),
+            number(c.v_plus),
+            number(c.v_minus)
+        ),
+        SystemSpec::Wheel(w) => format!(
+            "wheel (reconstruction): *m* = {}, *J* = {}, *d* = {}, *γ* = π/4, *k*_{{w}} = {}, *c*_{{w}} = {}, *c*_{{h}} = {}, \
+             *ω*_{{0}} = {}, *F* = {}, *q* = {}, *V*_{{c}} = {}",
+            number(w.m),
+            number(w.j),
+            number(w.d),
+            number(w.k_w),
+            number(w.c_w),
+            number(w.c_h),
+            number(w.omega0),
+            number(w.side_force),
+            number(w.trail),
+            number(w.v_c)
+        ),
+    }
+}
+
+/// How the switch is modelled.
+pub fn switch(switch: &SwitchSpec) -> String {
+    match switch {
+        SwitchSpec::Smoothed { eps, transition: Transition::Tanh } => format!("tanh smoothing, *ε* = {}", number(*eps)),
+        SwitchSpec::Smoothed { eps, transition: Transition::PerturbedTanh { sigma } } => {
+            format!("perturbed tanh smoothing, *ε* = {}, *σ* = {}", number(*eps), number(*sigma))
+        }
+        SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. } => format!(
+            "hysteresis ({}), *ε* = {}, *ε*′ = {}",
+            match relaxation {
+                Relaxation::Literal => "literal",
+                Relaxation::Single => "single division",
+            },
+            number(*eps),
+            number(*eps_prime)
+        ),
+    }
+}
+
+/// The method and its settings.
+pub fn method(method: &MethodSpec) -> String {
+    let tolerance = method.tolerance;
+    let tolerances = if tolerance.rtol == tolerance.atol {
+        format!("rtol = atol = {}", number(tolerance.rtol))
+    } else {
+        format!("rtol = {}, atol = {}", number(tolerance.rtol), number(tolerance.atol))
+    };
+    let cap = match method.step_cap {
+        StepCap::None => String::new(),
+        StepCap::Absolute(h) => format!(", steps up to {}", number(h)),
+        StepCap::FractionOfSegment(f) => format!(", steps up to {} of the interval", number(f)),
+    };
+    format!("{}, {tolerances}{cap}", method.name.name())
+}
+
+/// Restarts and kicks; empty if there are none.
+pub fn schedule(run: &RunSpec) -> String {
+    let mut parts = Vec::new();
+    if let Some(every) = run.schedule.restart_every {
+        parts.push(format!("restarted every {}", number(every)));
+    }
+    if let Some(kick) = run.schedule.kick {
+        parts.push(format!("kicked by {} every {} (ChaCha8 seed {})", number(kick.size), number(kick.every), kick.seed));
+    }
+    parts.join(", ")
+}
+
+/// What all runs of a picture have in common, one line per subject, for its foot.
+pub fn small_print(reading: Option<Reading>, runs: &[&RunSpec]) -> Vec<String> {
+    let common = |say: &dyn Fn(&RunSpec) -> String| {
+        let mut said: Vec<String> = Vec::new();
+        for run in runs {
+            let text = say(run);
+            if !text.is_empty() && !said.contains(&text) {
+                said.push(text);
+            }
+        }
+        said.join("; ")
+    };
+    let mut first = Vec::new();
+    if let Some(reading) = reading {
+        first.push(format!("{} reading", reading.word()));
+    }
+    first.push(common(&|r| system(&r.system)));
+    first.push(common(&|r| format!("*t* = 0 … {}", number(r.t_end))));
+    let lines = [
+        first.join(", "),
+        common(&|r| switch(&r.switch)),
+        [common(&|r| method(&r.method)), common(&schedule)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("; "),
+    ];
+    lines.into_iter().filter(|l| !l.is_empty()).collect()
+}
+
+/// Rich text without its markup, for readers without typesetting.
+pub fn plain(rich: &str) -> String {
+    rich.replace(['*', '{', '}'], "")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers() {
+        for (value, text) in [
+            (0.13, "0.13"),
+            (1e-5, "10^{-5}"),
+            (1.0536712e-8, "1.05×10^{-8}"),
+            (2e5, "200\u{2009}000"),
+            (-1.2, "−1.2"),
+            (1e-3, "10^{-3}"),
+            (150.0, "150"),
+            (0.0, "0"),
+            (-2.5e-4, "−2.5×10^{-4}"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+}

@@ -1,0 +1,11 @@
+//! Everything that touches the file system: data files, hashes, manifests.
+//!
+//! Functions that make bytes live elsewhere and are pure; here they are named, hashed, and put in place by one rename.
+
+pub mod files;
+pub mod hash;
+pub mod manifest;
+
+pub use files::{FileError, write};
+pub use hash::Hash;
+pub use manifest::{Layer, Manifest, PanelEntry, PictureEntry};
