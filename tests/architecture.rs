@@ -27,11 +27,8 @@ fn room(name: &str) -> Vec<(String, String)> {
         .map(|f| {
             let text = fs::read_to_string(&f).unwrap();
             let code = text.split("#[cfg(test)]").next().unwrap();
-            let code: String = code
-                .lines()
-                .filter(|l| !l.trim_start().starts_with("//"))
-                .map(|l| format!("{l}\n"))
-                .collect();
+            let code: String =
+                code.lines().filter(|l| !l.trim_start().starts_with("//")).map(|l| format!("{l}\n")).collect();
             (f.strip_prefix(&src).unwrap().display().to_string(), code)
         })
         .collect()

@@ -14,10 +14,11 @@ pub fn figure() -> Figure {
             name: "fig2".into(),
             reading: None,
             title: "The wheel assembly returns to its singularity",
-            caption: "Trajectory of the wheel assembly with sign(h) replaced by tanh(h/ε), t = 0 … 60. The surface h = 0, \
+            caption:
+                "Trajectory of the wheel assembly with sign(h) replaced by tanh(h/ε), t = 0 … 60. The surface h = 0, \
                       where wheel and disc stick, is shaded by region; the dot is the two-fold singularity. Our own \
                       reconstruction: the paper refers to another article for the coefficients."
-                .into(),
+                    .into(),
             view: View::Space { camera: Camera { axes: [0, 2, 1], azimuth: -115.0, elevation: 18.0 } },
             panels: vec![Panel::new(
                 "i",

@@ -38,6 +38,16 @@ impl FileError {
 
 /// Writes `bytes` to `path`, making its folder; all or nothing.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    // A device or a pipe (/dev/stdout) is written to, not replaced; a link's target is replaced, not the link.
+    let real = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+    if fs::metadata(&real).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
+        return fs::OpenOptions::new()
+            .write(true)
+            .open(&real)
+            .and_then(|mut f| f.write_all(bytes))
+            .map_err(FileError::new("write", path));
+    }
+    let path = real.as_path();
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     fs::create_dir_all(folder).map_err(FileError::new("create the folder", folder))?;
     let mut builder = tempfile::Builder::new();

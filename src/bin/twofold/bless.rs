@@ -46,8 +46,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
     for figure in &figures {
         let folder = arguments.expected.join(figure.id);
         let path = folder.join("expected.json");
-        let before =
-            record::files::read_text(&path).ok().and_then(|text| Manifest::parse(&text, &path.display().to_string()).ok());
+        let before = record::files::read_text(&path)
+            .ok()
+            .and_then(|text| Manifest::parse(&text, &path.display().to_string()).ok());
         let mut manifest = Manifest {
             version: VERSION,
             figure: figure.id.to_owned(),

@@ -75,7 +75,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
             print(&line.unwrap_or_else(|difference| difference))?;
         }
         for missing in manifest.pictures.iter().filter(|e| !figure.pictures.iter().any(|p| p.name == e.name)) {
-            print(&format!("{}: NOT MADE: the manifest lists it, but {} has no such picture", missing.name, figure.id))?;
+            print(&format!(
+                "{}: NOT MADE: the manifest lists it, but {} has no such picture",
+                missing.name, figure.id
+            ))?;
             failures += 1;
         }
     }

@@ -261,14 +261,11 @@ fn spec(a: &Arguments) -> Result<RunSpec, Misuse> {
 /// Reads "y=0".
 fn section(text: &str, system: &SystemSpec) -> Result<Observation, Misuse> {
     let names = system.coordinates();
-    let misuse = |problem| Misuse::Section {
-        text: text.to_owned(),
-        problem,
-        known: names.join(", "),
-        example: names[1],
-    };
+    let misuse =
+        |problem| Misuse::Section { text: text.to_owned(), problem, known: names.join(", "), example: names[1] };
     let (name, value) = text.split_once('=').ok_or_else(|| misuse("there is no \"=\""))?;
-    let coordinate = names.iter().position(|n| *n == name.trim()).ok_or_else(|| misuse("there is no such coordinate"))?;
+    let coordinate =
+        names.iter().position(|n| *n == name.trim()).ok_or_else(|| misuse("there is no such coordinate"))?;
     let value = value.trim().parse().map_err(|_| misuse("what follows \"=\" is not a number"))?;
     Ok(Observation::Section { coordinate, value })
 }
