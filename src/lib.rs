@@ -3,3 +3,4 @@
 pub mod integrate;
 pub mod model;
 pub mod num;
+pub mod observe;

@@ -1,0 +1,6 @@
+//! What is made of steps: the character of an attractor, its exponents and its multipliers.
+
+pub mod attractor;
+pub mod floquet;
+pub mod lyapunov;
+pub mod tangent;
