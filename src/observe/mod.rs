@@ -1,9 +1,13 @@
-//! What is made of steps: paths, Poincare sections, verdicts about attractors.
+//! What is made of steps: paths, Poincare sections, and the character of an attractor with its exponents and multipliers.
 //!
 //! Everything here looks at accepted steps and their interpolants from outside; no solver knows that it is observed.
 
+pub mod attractor;
+pub mod floquet;
+pub mod lyapunov;
 pub mod path;
 pub mod section;
+pub mod tangent;
 
 pub use path::{PathRecorder, Sample};
 pub use section::{Crossing, Direction, SectionRecorder};
