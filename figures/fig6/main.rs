@@ -1,6 +1,7 @@
 //! Fig. 6: single trajectories, smoothed, hysteretic, and with noise.
 
 use twofold::figure::spec::*;
+use twofold::figure::verdict::Claim;
 use twofold::figure::{Camera, Figure, Panel, View, cli};
 use twofold::integrate::{Kick, KickLaw, Schedule};
 use twofold::model::Relaxation;
@@ -35,9 +36,9 @@ pub fn figure() -> Figure {
             };
             let noise = |stream| Some(Kick { every: 0.3, size: eps, law: KickLaw::Sphere, seed: 2013, stream });
             vec![
-                panel("i", "smoothed", SwitchSpec::tanh(eps), None),
+                panel("i", "smoothed", SwitchSpec::tanh(eps), None).claimed(Claim::LessOrganisedThanNext),
                 panel("ii", "hysteretic", SwitchSpec::hysteretic(eps, Relaxation::Literal), None),
-                panel("iii", "noise, first run", SwitchSpec::tanh(eps), noise(1)),
+                panel("iii", "noise, first run", SwitchSpec::tanh(eps), noise(1)).claimed(Claim::DiffersFromNext),
                 panel("iv", "noise, second run", SwitchSpec::tanh(eps), noise(2)),
             ]
         },

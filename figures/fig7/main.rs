@@ -1,6 +1,7 @@
 //! Fig. 7: Poincare sections of the smoothed system, restarted after every interval.
 
 use twofold::figure::spec::*;
+use twofold::figure::verdict::Claim;
 use twofold::figure::{Figure, Panel, View, cli};
 use twofold::integrate::Schedule;
 
@@ -31,7 +32,11 @@ pub fn figure() -> Figure {
                     },
                 )
             };
-            vec![panel("i", 20.0), panel("ii", 40.0), panel("iii", 100.0)]
+            vec![
+                panel("i", 20.0).claimed(Claim::PeriodOne),
+                panel("ii", 40.0).claimed(Claim::PeriodThree),
+                panel("iii", 100.0).claimed(Claim::Chaotic),
+            ]
         },
     )
 }

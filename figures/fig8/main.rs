@@ -1,6 +1,7 @@
 //! Fig. 8: fig. 7(iii) with a perturbed transition function.
 
 use twofold::figure::spec::*;
+use twofold::figure::verdict::Claim;
 use twofold::figure::{Figure, Panel, View, cli};
 use twofold::integrate::Schedule;
 use twofold::model::Transition;
@@ -32,7 +33,11 @@ pub fn figure() -> Figure {
                     },
                 )
             };
-            vec![panel("i", 0.01), panel("ii", 0.1), panel("iii", 0.13)]
+            vec![
+                panel("i", 0.01).claimed(Claim::Chaotic),
+                panel("ii", 0.1).claimed(Claim::Periodic),
+                panel("iii", 0.13).claimed(Claim::Periodic),
+            ]
         },
     )
 }

@@ -4,6 +4,7 @@
 //! opposite order. The caption is followed.
 
 use twofold::figure::spec::*;
+use twofold::figure::verdict::Claim;
 use twofold::figure::{Figure, Panel, View, cli};
 use twofold::integrate::{Kick, KickLaw, Schedule};
 use twofold::model::Relaxation;
@@ -38,9 +39,10 @@ pub fn figure() -> Figure {
             };
             let noise = |stream| Some(Kick { every: 0.3, size: eps, law: KickLaw::Sphere, seed: 2013, stream });
             vec![
-                panel("i", "hysteresis", SwitchSpec::hysteretic(eps, Relaxation::Literal), None),
-                panel("ii", "noise, first run", SwitchSpec::tanh(eps), noise(1)),
-                panel("iii", "noise, second run", SwitchSpec::tanh(eps), noise(2)),
+                panel("i", "hysteresis", SwitchSpec::hysteretic(eps, Relaxation::Literal), None)
+                    .claimed(Claim::Chaotic),
+                panel("ii", "noise, first run", SwitchSpec::tanh(eps), noise(1)).claimed(Claim::PartlyWashedOut),
+                panel("iii", "noise, second run", SwitchSpec::tanh(eps), noise(2)).claimed(Claim::PartlyWashedOut),
             ]
         },
     )

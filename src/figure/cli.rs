@@ -135,7 +135,8 @@ pub fn make(figure: &Figure, folder: &Path, progress: &Progress) -> Result<Vec<P
         .pictures
         .par_iter()
         .map(|picture| {
-            let computed = compute(picture, progress)?;
+            let mut computed = compute(picture, progress)?;
+            computed.judge(picture)?;
             write_picture(folder, &computed)?;
             let name = &computed.record.hashes.name;
             progress.line(&format!("wrote {}", folder.join(format!("{name}.png")).display()));

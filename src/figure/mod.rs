@@ -13,12 +13,14 @@ pub mod progress;
 pub mod simulate;
 pub mod spec;
 pub mod surface;
+pub mod verdict;
 pub mod wording;
 
 use serde::{Deserialize, Serialize};
 
 use crate::model::Caricature;
 use spec::{Method, RunSpec};
+use verdict::Claim;
 
 /// A figure of the paper.
 #[derive(Clone, Debug)]
@@ -59,6 +61,8 @@ pub struct Panel {
     pub title: String,
     /// The run.
     pub run: RunSpec,
+    /// What the paper says of it.
+    pub claim: Option<Claim>,
 }
 
 /// How the panels of a picture are drawn.
@@ -147,7 +151,12 @@ impl Figure {
 impl Panel {
     /// A panel.
     pub fn new(label: &str, title: impl Into<String>, run: RunSpec) -> Self {
-        Panel { label: label.to_owned(), title: title.into(), run }
+        Panel { label: label.to_owned(), title: title.into(), run, claim: None }
+    }
+
+    /// The panel with what the paper says of it.
+    pub fn claimed(self, claim: Claim) -> Self {
+        Panel { claim: Some(claim), ..self }
     }
 }
 

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::progress::Progress;
 use super::simulate::{Recording, RunError, simulate};
 use super::spec::RunSpec;
+use super::verdict::{PanelVerdict, judge};
 use super::{Picture, Reading, drawing, encode};
 use crate::integrate::Statistics;
 use crate::record::hash::canonical_json;
@@ -21,6 +22,8 @@ pub struct Computed {
     pub tables: Vec<(String, Vec<u8>)>,
     /// What is known about the picture, as it is written beside it.
     pub record: PictureRecord,
+    /// The recorded runs, panel by panel.
+    pub recordings: Vec<Recording>,
 }
 
 /// What is known about a picture.
@@ -36,6 +39,8 @@ pub struct PictureRecord {
     pub alterations: Vec<String>,
     /// Its panels.
     pub panels: Vec<PanelRecord>,
+    /// Verdicts on the paper's claims; empty until they are asked for.
+    pub verdicts: Vec<PanelVerdict>,
 }
 
 /// What is known about a panel.
@@ -157,6 +162,19 @@ pub fn compute(picture: &Picture, progress: &Progress) -> Result<Computed, Pipel
         caption: picture.caption.clone(),
         alterations: picture.alterations.clone(),
         panels,
+        verdicts: Vec::new(),
     };
-    Ok(Computed { rendered, tables, record })
+    Ok(Computed { rendered, tables, record, recordings })
+}
+
+impl Computed {
+    /// Adds the verdicts on the paper's claims to the record.
+    pub fn judge(&mut self, picture: &Picture) -> Result<(), PipelineError> {
+        self.record.verdicts = judge(picture, &self.recordings).map_err(|source| PipelineError::Run {
+            picture: picture.name.clone(),
+            panel: "verdict".into(),
+            source,
+        })?;
+        Ok(())
+    }
 }

@@ -8,6 +8,7 @@ pub mod lyapunov;
 pub mod path;
 pub mod section;
 pub mod tangent;
+pub mod tangle;
 
 pub use path::{PathRecorder, Sample};
 pub use section::{Crossing, Direction, SectionRecorder};

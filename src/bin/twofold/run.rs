@@ -26,25 +26,25 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value = "printed")]
     reading: Reading,
     /// Strength of the caricature's drift (overrides the reading's).
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_hyphen_values = true)]
     alpha: Option<f64>,
     /// Strength of the caricature's attraction (overrides the reading's).
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_hyphen_values = true)]
     beta: Option<f64>,
     /// The caricature's v+ [default: -1.2].
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_hyphen_values = true)]
     v_plus: Option<f64>,
     /// The caricature's v- [default: -1.4].
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_hyphen_values = true)]
     v_minus: Option<f64>,
     /// Stiffness parameter.
-    #[arg(long, default_value_t = 1e-3, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 1e-3, allow_hyphen_values = true)]
     eps: f64,
     /// Size of the transition function's perturbation (fig. 8).
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_hyphen_values = true)]
     sigma: Option<f64>,
     /// Relaxation time of the hysteretic switch [default: 10 eps].
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_hyphen_values = true)]
     eps_prime: Option<f64>,
     /// Reading of eq. (10).
     #[arg(long, value_enum, default_value = "literal")]
@@ -53,31 +53,31 @@ pub struct Arguments {
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_hyphen_values = true)]
     start: Option<Vec<f64>>,
     /// Final time.
-    #[arg(long, default_value_t = 150.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 150.0, allow_hyphen_values = true)]
     t_end: f64,
     /// Integration method.
     #[arg(long, value_enum, default_value = "dopri5")]
     method: Method,
     /// Relative tolerance [default: 10^-7.97727, NDSolve's].
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_hyphen_values = true)]
     rtol: Option<f64>,
     /// Absolute tolerance [default: 10^-7.97727, NDSolve's].
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_hyphen_values = true)]
     atol: Option<f64>,
     /// Longest step [default: a tenth of the time between restarts or kicks, NDSolve's].
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_hyphen_values = true)]
     max_step: Option<f64>,
     /// Most steps before the run is given up.
     #[arg(long, default_value_t = DEFAULT_MAX_STEPS)]
     max_steps: u64,
     /// Start the method afresh after each such interval.
-    #[arg(long, value_name = "INTERVAL", allow_negative_numbers = true)]
+    #[arg(long, value_name = "INTERVAL", allow_hyphen_values = true)]
     restart: Option<f64>,
     /// Perturb the state after each such interval.
-    #[arg(long, value_name = "INTERVAL", allow_negative_numbers = true)]
+    #[arg(long, value_name = "INTERVAL", allow_hyphen_values = true)]
     kick_every: Option<f64>,
     /// Size of a kick [default: eps].
-    #[arg(long, requires = "kick_every", allow_negative_numbers = true)]
+    #[arg(long, requires = "kick_every", allow_hyphen_values = true)]
     kick_size: Option<f64>,
     /// Law of a kick.
     #[arg(long, value_enum, requires = "kick_every")]
@@ -92,7 +92,7 @@ pub struct Arguments {
     #[arg(long, value_name = "COORDINATE=VALUE")]
     section: Option<String>,
     /// Largest distance between the path's polyline and the dense output.
-    #[arg(long, default_value_t = 1e-3, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 1e-3, allow_hyphen_values = true)]
     chord: f64,
     /// Take the whole run from a file made with --print-spec; other flags of the run are then refused.
     #[arg(long, value_name = "FILE", conflicts_with_all = [
