@@ -20,7 +20,11 @@ struct Ours {
     switches: Vec<Switch>,
 }
 
-fn ours<F: VectorField<N>, const N: usize>(problem: &Problem<F, N>, known: &ReferenceProblem, run: &ReferenceRun) -> Ours {
+fn ours<F: VectorField<N>, const N: usize>(
+    problem: &Problem<F, N>,
+    known: &ReferenceProblem,
+    run: &ReferenceRun,
+) -> Ours {
     let mut lsoda = Lsoda::new(Tolerance { rtol: run.rtol, atol: run.atol });
     let cap = known.max_step.unwrap_or(f64::INFINITY);
     let (x, statistics) =
@@ -63,4 +67,15 @@ fn table() {
         }
     }
     for_each(&mut Print);
+}
+
+#[test]
+#[ignore = "prints the work-precision rows"]
+fn work_precision() {
+    for r in data::rows() {
+        println!(
+            "{:26} {:14} {:.0e} {:.2e} {} {} {}",
+            r.problem, r.method, r.tolerance, r.error, r.evaluations, r.jacobians, r.steps
+        );
+    }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::SVector;
 use serde::Deserialize;
-use twofold::integrate::{Dopri5, Failure, Lsoda, Statistics, Stepper, Tolerance};
+use twofold::integrate::{Dopri5, Failure, Lsoda, Radau5, Statistics, Stepper, Tolerance};
 use twofold::model::VectorField;
 
 use super::problems::{Problem, Visit, for_each};
@@ -63,10 +63,7 @@ pub struct ReferenceRun {
 impl ReferenceProblem {
     /// max_i |x_i - r_i| / (|r_i| + atol/rtol): the error in units of rtol's weights.
     pub fn error(&self, x: &[f64]) -> f64 {
-        x.iter()
-            .zip(&self.reference)
-            .map(|(x, r)| (x - r).abs() / (r.abs() + self.atol_over_rtol))
-            .fold(0.0, f64::max)
+        x.iter().zip(&self.reference).map(|(x, r)| (x - r).abs() / (r.abs() + self.atol_over_rtol)).fold(0.0, f64::max)
     }
 
     /// The same for its uncertainty.
@@ -134,7 +131,8 @@ pub fn rows() -> Vec<Row> {
     impl Visit for Collect {
         fn visit<F: VectorField<N>, const N: usize>(&mut self, problem: &Problem<F, N>) {
             let Self { reference, rows } = self;
-            let known = reference.problems.iter().find(|p| p.name == problem.name).expect("every problem has a reference");
+            let known =
+                reference.problems.iter().find(|p| p.name == problem.name).expect("every problem has a reference");
             let row = |method, tolerance, error, evaluations, jacobians, steps| Row {
                 problem: problem.name.to_owned(),
                 method,
@@ -149,13 +147,14 @@ pub fn rows() -> Vec<Row> {
                 rows.push(row("odepack-lsoda", run.rtol, error, run.evaluations, run.jacobians, run.steps));
             }
             let max_step = known.max_step.unwrap_or(f64::INFINITY);
-            for method in ["lsoda", "dopri5"] {
+            for method in ["lsoda", "radau5", "dopri5"] {
                 for run in &known.runs {
                     let tolerance = Tolerance { rtol: run.rtol, atol: run.atol };
                     let (field, start, end) = (&problem.field, problem.start, known.t_end);
                     let result = match method {
                         "lsoda" => integrate(&mut Lsoda::new(tolerance), field, start, end, max_step, MOST_STEPS),
-                        
+
+                        "radau5" => integrate(&mut Radau5::new(tolerance), field, start, end, max_step, MOST_STEPS),
                         _ => integrate(&mut Dopri5::new(tolerance), field, start, end, max_step, MOST_STEPS),
                     };
                     let Ok((x, s)) = result else { continue };

@@ -93,10 +93,8 @@ impl VectorField<3> for Lorenz {
 }
 
 /// alpha of the two readings of the caricature's parameters.
-const READINGS: [(&str, &str, f64); 2] = [
-    ("smoothed-printed", "hysteretic-printed", 1e-3),
-    ("smoothed-reconstructed", "hysteretic-reconstructed", 1e-1),
-];
+const READINGS: [(&str, &str, f64); 2] =
+    [("smoothed-printed", "hysteretic-printed", 1e-3), ("smoothed-reconstructed", "hysteretic-reconstructed", 1e-1)];
 
 /// The smoothed caricature, eq. (8), with beta = 1e-5 and eps = 1e-3.
 pub fn smoothed(alpha: f64) -> Smoothed<Caricature> {

@@ -21,8 +21,6 @@
 mod coefficients;
 mod nordsieck;
 mod selection;
-#[cfg(test)]
-mod tests;
 
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
@@ -666,3 +664,6 @@ impl<const N: usize> Lsoda<N> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
