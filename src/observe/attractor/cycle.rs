@@ -39,22 +39,26 @@ impl<'a> Turns<'a> {
     /// The longest period up to the limit whose phases stay apart over the last window; 1 if none does.
     pub fn find(points: &'a [Point], times: &'a [f64], extent: f64, th: &Thresholds) -> Self {
         let n = points.len();
-        let mut best = (1, centres(points, 1, n.min(20 * th.points_per_phase)));
+        // Long enough that a ring is walked around, but of a short run the end only: its transient must not move the centre.
+        let shortest = n.min((20 * th.points_per_phase).min((n / 4).max(th.points_per_phase)));
+        let mut best = (1, centres(points, 1, shortest));
         for period in (2..=th.longest_period).rev() {
-            let window = n.min((period * th.points_per_phase).max(20 * th.points_per_phase));
-            if window < period * th.points_per_phase {
-                continue;
-            }
-            let found = centres(points, period, window);
-            let widest = found.1.iter().fold(0.0_f64, |a, b| a.max(*b));
-            let mut gap = f64::INFINITY;
-            for i in 0..period {
-                for j in 0..i {
-                    gap = gap.min(distance(&found.0[i], &found.0[j]));
+            let mut window = shortest.max(period * th.points_per_phase);
+            while window <= shortest.max(n / 2) {
+                let found = centres(points, period, window);
+                let widest = found.1.iter().fold(0.0_f64, |a, b| a.max(*b));
+                if smallest_gap(&found.0) <= (th.separation * widest).max(2.0 * th.dot * extent) {
+                    break;
                 }
+                if widest <= th.dot * extent || !drifts(points, period, window, widest, th) {
+                    best = (period, found);
+                    break;
+                }
+                // Phases that go somewhere may be on their way around a slow island, or along a ring next to a resonance:
+                // look longer.
+                window *= 2;
             }
-            if gap > th.separation * widest && gap > 2.0 * th.dot * extent {
-                best = (period, found);
+            if best.0 > 1 {
                 break;
             }
         }
@@ -93,6 +97,17 @@ impl<'a> Turns<'a> {
             from = from.min(s).min(near.max(from.min(s).saturating_sub(length)));
         }
         (blocks > 0 || settled.is_some()).then_some(Captured { from, blocks, settled })
+    }
+
+    /// The end of a kicked run, as far back as it stays within the linear neighbourhood of the cycle; `None` when it is not there for
+    /// a whole window.
+    pub fn cloud(&self, extent: f64, th: &Thresholds) -> Option<Captured> {
+        let from = self.distances.iter().rposition(|d| *d > th.linear_range * extent).map_or(0, |i| i + 1);
+        (from + self.period * th.points_per_phase <= self.points.len()).then_some(Captured {
+            from,
+            blocks: 0,
+            settled: None,
+        })
     }
 
     /// The straight-line fit to ln(distance) over the captured part, as far as it stays above the floor of what the
@@ -257,6 +272,31 @@ fn centres(points: &[Point], period: usize, window: usize) -> (Vec<Point>, Vec<f
         centres.push(centre);
     }
     (centres, spreads)
+}
+
+/// Smallest distance between two of the points; infinite for one.
+fn smallest_gap(points: &[Point]) -> f64 {
+    let mut gap = f64::INFINITY;
+    for (i, p) in points.iter().enumerate() {
+        for q in &points[..i] {
+            gap = gap.min(distance(p, q));
+        }
+    }
+    gap
+}
+
+/// Whether some phase moves on during the last `window` points: the means of its halves differ by a good part of its
+/// spread. On a ring whose rotation is nearly rational every phase creeps along the ring and looks like a small cluster; around a cycle
+/// it stays.
+fn drifts(points: &[Point], period: usize, window: usize, spread: f64, th: &Thresholds) -> bool {
+    let n = points.len();
+    (0..period).any(|phase| {
+        let own: Vec<Point> = (n - window..n).rev().skip(phase).step_by(period).map(|i| points[i]).collect();
+        let (late, early) = own.split_at(own.len() / 2);
+        let mean =
+            |s: &[Point]| -> Point { std::array::from_fn(|k| s.iter().map(|q| q[k]).sum::<f64>() / s.len() as f64) };
+        distance(&mean(late), &mean(early)) > th.drift * spread
+    })
 }
 
 /// The centre of consecutive images of one phase: the fixed point of the affine map p -> A p + b that fits them best, which

@@ -72,8 +72,10 @@ pub fn classify(section: &[SectionPoint], question: &Question<'_>, thresholds: &
     };
     let (points, times) = one(upward);
     let (other, _) = one(!upward);
+    let split = Split { points, times, other, upward };
+    let (points, times) = (&split.points, &split.times);
     let extent = extent(section);
-    let return_time = cycle::return_time(&times);
+    let return_time = cycle::return_time(times);
 
     let mut evidence = Evidence {
         verdict: Verdict::TooFew { points: points.len() },
@@ -98,39 +100,47 @@ pub fn classify(section: &[SectionPoint], question: &Question<'_>, thresholds: &
     } else if points.len() < th.fewest_points || !extent.is_finite() || extent <= 0.0 || return_time.is_nan() {
         Verdict::TooFew { points: points.len() }
     } else if question.kicked {
-        noisy(section, question, th, &points, &mut evidence)
+        noisy(section, question, th, &split, &mut evidence)
     } else {
-        deterministic(&points, &times, &other, upward, question, th, &mut evidence)
+        deterministic(&split, question, th, &mut evidence)
     };
     evidence.name = evidence.verdict.name().to_owned();
     evidence.summary = evidence.verdict.to_string();
     evidence
 }
 
+/// One direction's points and times, the other direction's points, and which direction the first is.
+struct Split {
+    points: Vec<[f64; 2]>,
+    times: Vec<f64>,
+    other: Vec<[f64; 2]>,
+    upward: bool,
+}
+
 fn noisy(
     section: &[SectionPoint],
     question: &Question<'_>,
     th: &Thresholds,
-    points: &[[f64; 2]],
+    split: &Split,
     evidence: &mut Evidence,
 ) -> Verdict {
+    let Split { points, times, .. } = split;
     evidence.divergence = divergence(points, evidence.return_time);
     let shown = |s: &[SectionPoint]| -> Vec<SectionPoint> {
         s.iter().filter(|p| p.t >= question.shown_from).copied().collect()
     };
     evidence.overlap = question.reference.and_then(|r| overlap(&shown(section), &shown(r), th));
-    Verdict::Noisy { share_of_structure: evidence.overlap.map(|o| o.share) }
+    let turns = Turns::find(points, times, evidence.extent, th);
+    let around = turns.cloud(evidence.extent, th).map(|c| {
+        evidence.mixed = times[c.from] > question.shown_from;
+        // Noise sets the distance, not an approach.
+        Cycle { approach: None, ..describe(&turns, &c, split, th) }
+    });
+    Verdict::Noisy { share_of_structure: evidence.overlap.map(|o| o.share.clamp(0.0, 1.0)), around }
 }
 
-fn deterministic(
-    points: &[[f64; 2]],
-    times: &[f64],
-    other: &[[f64; 2]],
-    upward: bool,
-    question: &Question<'_>,
-    th: &Thresholds,
-    evidence: &mut Evidence,
-) -> Verdict {
+fn deterministic(split: &Split, question: &Question<'_>, th: &Thresholds, evidence: &mut Evidence) -> Verdict {
+    let Split { points, times, .. } = split;
     let extent = evidence.extent;
     let turns = Turns::find(points, times, extent, th);
     let captured = turns.captured(extent, th);
@@ -143,13 +153,13 @@ fn deterministic(
     if let Some(c) = captured {
         if c.settled.is_some() {
             evidence.mixed = times[c.from] > question.shown_from;
-            return Verdict::Periodic(describe(&turns, &c, times, other, upward, th));
+            return Verdict::Periodic(describe(&turns, &c, split, th));
         }
         let k = tail(c.from, turns.period);
         if c.blocks >= th.fewest_blocks && k.is_none_or(|k| k < th.zero_one) {
             evidence.zero_one = k;
             evidence.mixed = times[c.from] > question.shown_from;
-            let cycle = describe(&turns, &c, times, other, upward, th);
+            let cycle = describe(&turns, &c, split, th);
             let approaches = cycle.approach.is_some_and(|r| {
                 r.per_time.abs() > th.significance * r.standard_error
                     && r.per_time.abs() * (r.to - r.from) > th.visible_change
@@ -160,7 +170,7 @@ fn deterministic(
     evidence.zero_one = tail(0, 1);
     evidence.divergence = divergence(points, evidence.return_time);
     if evidence.divergence.is_some_and(|d| d.skill < th.skill) {
-        return Verdict::Noisy { share_of_structure: None };
+        return Verdict::Noisy { share_of_structure: None, around: None };
     }
     let votes = [
         evidence.zero_one.map(|k| k > th.zero_one),
@@ -171,28 +181,22 @@ fn deterministic(
     let no = votes.iter().filter(|v| **v == Some(false)).count();
     // A tie goes to chaos: regular motion that is not a ring around its mean is the rarer case.
     if yes >= no {
-        Verdict::Chaotic { lyapunov: question.lyapunov, bands: turns.period }
+        Verdict::Chaotic { lyapunov: question.lyapunov, bands: occupancy::bands(&points[points.len() / 2..], th) }
     } else {
         let whole = Captured { from: 0, blocks: 0, settled: None };
-        Verdict::QuasiPeriodic(describe(&turns, &whole, times, other, upward, th))
+        Verdict::QuasiPeriodic(describe(&turns, &whole, split, th))
     }
 }
 
-fn describe(
-    turns: &Turns<'_>,
-    captured: &Captured,
-    times: &[f64],
-    other: &[[f64; 2]],
-    upward: bool,
-    th: &Thresholds,
-) -> Cycle {
+fn describe(turns: &Turns<'_>, captured: &Captured, split: &Split, th: &Thresholds) -> Cycle {
+    let Split { times, other, upward, .. } = split;
     let dots = |centres: &[[f64; 2]], spreads: &[f64], upward: bool| -> Vec<CyclePoint> {
         // Phases count backwards; the list goes with the motion.
         centres.iter().zip(spreads).rev().map(|(u, s)| CyclePoint { u: *u, upward, spread: *s }).collect()
     };
-    let mut list = dots(&turns.centres, &turns.spreads, upward);
+    let mut list = dots(&turns.centres, &turns.spreads, *upward);
     let (centres, spreads) = cycle::other_dots(other, turns.period, th.points_per_phase);
-    list.extend(dots(&centres, &spreads, !upward));
+    list.extend(dots(&centres, &spreads, !*upward));
     Cycle {
         period: turns.period,
         points: list,

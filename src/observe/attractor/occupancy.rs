@@ -16,8 +16,8 @@ use crate::num::random::RandomStream;
 ///   kept, the fine structure gone.
 ///
 /// `share` = (overlap - blurred)/(same - blurred): 1 when the section is as good a sample of the reference as the reference's
-/// own half, 0 when it has no more of its structure than its outline. It can fall below 0 when the outline
-/// differs as well, and is reported as computed.
+/// own half, 0 when it has no more of its structure than its outline. It falls
+/// below 0 when the outline differs as well, and is reported as computed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Overlap {
     /// Share of the structure left.
@@ -96,6 +96,30 @@ fn overlap_of_points(section: &[[f64; 2]], reference: &[[f64; 2]], thresholds: &
     })
 }
 
+/// The number of separate pieces that consecutive `points` visit in turn: the largest k for which no cell of the grid holds points
+/// of two different phases modulo k.
+pub(super) fn bands(points: &[[f64; 2]], thresholds: &Thresholds) -> usize {
+    if points.is_empty() {
+        return 1;
+    }
+    let grid = Grid::around(points, thresholds.cells);
+    let cells: Vec<usize> = points.iter().map(|p| grid.cell(p)).collect();
+    let apart = |k: usize| {
+        let mut owner = vec![usize::MAX; (grid.cells + 2) * (grid.cells + 2)];
+        cells.iter().enumerate().all(|(i, c)| {
+            let first = owner[*c] == usize::MAX;
+            if first {
+                owner[*c] = i % k;
+            }
+            owner[*c] == i % k
+        })
+    };
+    (2..=thresholds.longest_period)
+        .rev()
+        .find(|&k| points.len() >= k * thresholds.points_per_phase && apart(k))
+        .unwrap_or(1)
+}
+
 /// A grid of square-ish cells around a set, with one more ring of cells that collects everything outside.
 struct Grid {
     low: [f64; 2],
@@ -117,23 +141,27 @@ impl Grid {
     }
 
     fn count(&self, points: &[[f64; 2]]) -> Vec<u32> {
-        let side = self.cells + 2;
-        let mut counts = vec![0; side * side];
+        let mut counts = vec![0; (self.cells + 2) * (self.cells + 2)];
         for q in points {
-            let [a, b]: [usize; 2] = std::array::from_fn(|k| {
-                // The upper edge of the box belongs to its last cell.
-                let c = ((q[k] - self.low[k]) / self.width[k]).floor();
-                if c < 0.0 {
-                    0
-                } else if c > self.cells as f64 {
-                    side - 1
-                } else {
-                    (c as usize).min(self.cells - 1) + 1
-                }
-            });
-            counts[a * side + b] += 1;
+            counts[self.cell(q)] += 1;
         }
         counts
+    }
+
+    fn cell(&self, q: &[f64; 2]) -> usize {
+        let side = self.cells + 2;
+        let [a, b]: [usize; 2] = std::array::from_fn(|k| {
+            // The upper edge of the box belongs to its last cell.
+            let c = ((q[k] - self.low[k]) / self.width[k]).floor();
+            if c < 0.0 {
+                0
+            } else if c > self.cells as f64 {
+                side - 1
+            } else {
+                (c as usize).min(self.cells - 1) + 1
+            }
+        });
+        a * side + b
     }
 }
 

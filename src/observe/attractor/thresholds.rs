@@ -24,6 +24,9 @@ pub struct Thresholds {
     /// Phases count as distinct when their centres are further apart than this many radii of the widest of them:
     /// 2 would let circles touch; a third radius is the gap that makes them separate dots to the eye.
     pub separation: f64,
+    /// Distance between the means of a phase's earlier and later half, in spreads, above which it drifts: uniform drift gives 1, a
+    /// ring or spiral that is walked around nearly 0.
+    pub drift: f64,
     /// Spread, as a fraction of the extent, below which a phase is one dot: 1/500, less than a marker's radius in a panel
     /// 1000 pixels wide, and far above what a solver at 1e-8 leaves on an attracting orbit (1e-6 to 3e-4 measured).
     pub dot: f64,
@@ -73,6 +76,7 @@ impl Default for Thresholds {
             longest_period: 36,
             points_per_phase: 30,
             separation: 3.0,
+            drift: 0.5,
             dot: 2e-3,
             linear_range: 0.1,
             block: 200,

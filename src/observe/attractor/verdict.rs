@@ -71,9 +71,11 @@ pub enum Verdict {
     },
     /// Random.
     Noisy {
-        /// How much of the reference's fine structure is left, in [0, 1] up to sampling error: see
-        /// [`Overlap`](super::Overlap). Absent without a reference.
+        /// How much of the reference's fine structure is left, in [0, 1]: see [`Overlap`](super::Overlap), which holds the
+        /// value before it was cut to that range. Absent without a reference.
         share_of_structure: Option<f64>,
+        /// The closed orbit around which the noise holds the run in small clouds, if it does.
+        around: Option<Cycle>,
     },
     /// The orbit stopped crossing the section.
     Escaped {
@@ -105,6 +107,7 @@ impl Verdict {
     pub fn cycle(&self) -> Option<&Cycle> {
         match self {
             Self::Periodic(c) | Self::Spiralling(c) | Self::QuasiPeriodic(c) => Some(c),
+            Self::Noisy { around, .. } => around.as_ref(),
             _ => None,
         }
     }
@@ -143,8 +146,16 @@ impl std::fmt::Display for Verdict {
                 write!(f, "chaotic, largest exponent {:.4} +- {:.4}", l.value, l.standard_error)
             }
             Self::Chaotic { lyapunov: None, .. } => write!(f, "chaotic"),
-            Self::Noisy { share_of_structure: Some(s) } => write!(f, "noisy, {:.0} % of the structure left", 100.0 * s),
-            Self::Noisy { share_of_structure: None } => write!(f, "noisy"),
+            Self::Noisy { share_of_structure, around } => {
+                write!(f, "noisy")?;
+                if let Some(c) = around {
+                    write!(f, ", in clouds of radius {:.1e} around period {}", c.radius, c.period)?;
+                }
+                match share_of_structure {
+                    Some(s) => write!(f, ", {:.0} % of the structure left", 100.0 * s),
+                    None => Ok(()),
+                }
+            }
             Self::Escaped { last_crossing } => write!(f, "left the section at t = {last_crossing:.0}"),
             Self::TooFew { points } => write!(f, "too few crossings ({points})"),
         }
