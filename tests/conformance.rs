@@ -160,3 +160,5 @@ macro_rules! conforms {
 }
 
 conforms!(dopri5, Dopri5);
+conforms!(lsoda, Lsoda);
+conforms!(radau5, Radau5);

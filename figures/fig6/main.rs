@@ -28,7 +28,7 @@ pub fn figure() -> Figure {
                         switch,
                         start: [0.2, 0.0, -1.0],
                         t_end: 150.0,
-                        method: MethodSpec::ndsolve_defaults(Method::Dopri5),
+                        method: MethodSpec::ndsolve_defaults(Method::Lsoda),
                         schedule: Schedule { restart_every: None, kick },
                         observe: Observation::Path { chord: 1e-3 },
                     },

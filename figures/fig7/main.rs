@@ -26,7 +26,7 @@ pub fn figure() -> Figure {
                         switch: SwitchSpec::tanh(1e-3),
                         start: [0.2, 0.0, -1.0],
                         t_end: 2e5,
-                        method: MethodSpec::ndsolve_defaults(Method::Dopri5),
+                        method: MethodSpec::ndsolve_defaults(Method::Lsoda),
                         schedule: Schedule { restart_every: Some(interval), kick: None },
                         observe: Observation::Section { coordinate: 1, value: 0.0 },
                     },

@@ -27,7 +27,7 @@ pub fn figure() -> Figure {
                         switch: SwitchSpec::Smoothed { eps: 1e-3, transition: Transition::PerturbedTanh { sigma } },
                         start: [0.2, 0.0, -1.0],
                         t_end: 2e5,
-                        method: MethodSpec::ndsolve_defaults(Method::Dopri5),
+                        method: MethodSpec::ndsolve_defaults(Method::Lsoda),
                         schedule: Schedule { restart_every: Some(100.0), kick: None },
                         observe: Observation::Section { coordinate: 1, value: 0.0 },
                     },

@@ -189,7 +189,9 @@ fn print_specs(figure: &Figure) -> Result<(), CliError> {
     let specs: Vec<_> = figure
         .pictures
         .iter()
-        .flat_map(|picture| picture.panels.iter().map(move |panel| (format!("{}-{}", picture.name, panel.label), panel.run)))
+        .flat_map(|picture| {
+            picture.panels.iter().map(move |panel| (format!("{}-{}", picture.name, panel.label), panel.run))
+        })
         .collect();
     let text = match specs.as_slice() {
         [(_, only)] => serde_json::to_string_pretty(only),

@@ -65,7 +65,9 @@ fn section_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording],
         let points = |late: bool| {
             crossings(&recording.data).iter().filter(|c| (c.t > half) == late).map(|c| axes.map(|i| c.x[i])).collect()
         };
-        let chart = PlanePanel::new(axis(0), axis(1)).dots(points(false), DotStyle::early()).dots(points(true), DotStyle::late());
+        let chart = PlanePanel::new(axis(0), axis(1))
+            .dots(points(false), DotStyle::early())
+            .dots(points(true), DotStyle::late());
         sheet = sheet.panel(label(panel), panel.title.as_str(), chart);
     }
     let half = wording::number(0.5 * picture.panels[0].run.t_end);

@@ -123,8 +123,7 @@ pub fn compute(picture: &Picture, progress: &Progress) -> Result<Computed, Pipel
     let data = Hash::of(entries.iter().map(|e| e.data.as_str()).collect::<Vec<_>>().join("\n").as_bytes());
 
     let sheet = drawing::sheet(picture, &recordings, &spec, &data);
-    let rendered =
-        render(&sheet).map_err(|source| PipelineError::Render { picture: picture.name.clone(), source })?;
+    let rendered = render(&sheet).map_err(|source| PipelineError::Render { picture: picture.name.clone(), source })?;
     let hashes = PictureEntry {
         name: picture.name.clone(),
         spec,

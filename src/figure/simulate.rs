@@ -3,7 +3,7 @@
 use nalgebra::{SVector, vector};
 
 use super::spec::{Method, Observation, RunSpec, SpecError, SwitchSpec, SystemSpec};
-use crate::integrate::{Dopri5, Failure, Observer, Statistics, Stepper, Watch, drive};
+use crate::integrate::{Dopri5, Failure, Lsoda, Observer, Radau5, Statistics, Stepper, Watch, drive};
 use crate::model::{Hysteretic, PiecewiseSmooth, Smoothed, VectorField};
 use crate::observe::{Crossing, PathRecorder, Sample, SectionRecorder};
 
@@ -105,7 +105,9 @@ fn integrate<F: VectorField<N>, O: Observer<N>, const N: usize>(
     watch: &dyn Watch,
 ) -> Result<End, RunError> {
     match spec.method.name {
+        Method::Lsoda => step(spec, field, x0, Lsoda::new(spec.method.tolerance), observer, watch),
         Method::Dopri5 => step(spec, field, x0, Dopri5::new(spec.method.tolerance), observer, watch),
+        Method::Radau5 => step(spec, field, x0, Radau5::new(spec.method.tolerance), observer, watch),
     }
 }
 

@@ -89,15 +89,21 @@ impl SwitchSpec {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
+    /// LSODA: Adams and BDF with automatic switching, the default NDSolve of the paper's day.
+    Lsoda,
     /// Dormand-Prince 5(4).
     Dopri5,
+    /// Radau IIA of order 5.
+    Radau5,
 }
 
 impl Method {
     /// The name on the command line and in small print.
     pub fn name(self) -> &'static str {
         match self {
+            Method::Lsoda => "lsoda",
             Method::Dopri5 => "dopri5",
+            Method::Radau5 => "radau5",
         }
     }
 }

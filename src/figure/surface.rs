@@ -44,7 +44,8 @@ fn caricature(system: &Caricature, ranges: &[(f64, f64); 3], cells: usize) -> Ve
 
 /// h = 0 over (r, omega): v = O (d - r cot gamma), as long as that is inside the box.
 fn wheel(system: &Wheel, ranges: &[(f64, f64); 3], cells: usize) -> Vec<Patch> {
-    let mut patches = grid(system, ranges[0], ranges[2], cells, |r, omega| vector![r, system.sticking_speed(r, omega), omega]);
+    let mut patches =
+        grid(system, ranges[0], ranges[2], cells, |r, omega| vector![r, system.sticking_speed(r, omega), omega]);
     let (low, high) = ranges[1];
     patches.retain(|p| p.corners.iter().all(|c| (low..=high).contains(&c[1])));
     patches

@@ -139,11 +139,13 @@ impl Claim {
                 _ if e.mixed => Agreement::Partly,
                 _ => Agreement::Differs,
             },
-            (Claim::PartlyWashedOut, Grounds::Section(e)) => decide(
-                e.overlap.is_some_and(|o| (STRUCTURE_MARGIN..=1.0 - STRUCTURE_MARGIN).contains(&o.share)),
-            ),
+            (Claim::PartlyWashedOut, Grounds::Section(e)) => {
+                decide(e.overlap.is_some_and(|o| (STRUCTURE_MARGIN..=1.0 - STRUCTURE_MARGIN).contains(&o.share)))
+            }
             (Claim::LessOrganisedThanNext, Grounds::Paths { freshness, .. }) => decide(freshness[0] > freshness[1]),
-            (Claim::DiffersFromNext, Grounds::Paths { shared, .. }) => decide(shared.overlap <= 1.0 - MARKED_DIFFERENCE),
+            (Claim::DiffersFromNext, Grounds::Paths { shared, .. }) => {
+                decide(shared.overlap <= 1.0 - MARKED_DIFFERENCE)
+            }
             _ => Agreement::Differs,
         }
     }

@@ -111,7 +111,12 @@ pub fn schedule(run: &RunSpec) -> String {
         parts.push(format!("restarted every {}", number(every)));
     }
     if let Some(kick) = run.schedule.kick {
-        parts.push(format!("kicked by {} every {} (ChaCha8 seed {})", number(kick.size), number(kick.every), kick.seed));
+        parts.push(format!(
+            "kicked by {} every {} (ChaCha8 seed {})",
+            number(kick.size),
+            number(kick.every),
+            kick.seed
+        ));
     }
     parts.join(", ")
 }
@@ -137,7 +142,11 @@ pub fn small_print(reading: Option<Reading>, runs: &[&RunSpec]) -> Vec<String> {
     let lines = [
         first.join(", "),
         common(&|r| switch(&r.switch)),
-        [common(&|r| method(&r.method)), common(&schedule)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("; "),
+        [common(&|r| method(&r.method)), common(&schedule)]
+            .into_iter()
+            .filter(|s| !s.is_empty())
+            .collect::<Vec<_>>()
+            .join("; "),
     ];
     lines.into_iter().filter(|l| !l.is_empty()).collect()
 }

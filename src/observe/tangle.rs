@@ -33,7 +33,8 @@ pub fn common_box<'a>(paths: impl IntoIterator<Item = &'a [Sample]>) -> [(f64, f
 impl Tangle {
     /// The cells of `range`, [`CELLS`] along each side, that the polyline through `path` visits.
     pub fn new(path: &[Sample], range: &[(f64, f64); 3]) -> Self {
-        let width: [f64; 3] = std::array::from_fn(|i| ((range[i].1 - range[i].0) / CELLS as f64).max(f64::MIN_POSITIVE));
+        let width: [f64; 3] =
+            std::array::from_fn(|i| ((range[i].1 - range[i].0) / CELLS as f64).max(f64::MIN_POSITIVE));
         let cell = |x: [f64; 3]| -> [u16; 3] {
             std::array::from_fn(|i| (((x[i] - range[i].0) / width[i]) as usize).min(CELLS - 1) as u16)
         };

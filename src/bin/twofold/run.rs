@@ -56,7 +56,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 150.0, allow_hyphen_values = true)]
     t_end: f64,
     /// Integration method.
-    #[arg(long, value_enum, default_value = "dopri5")]
+    #[arg(long, value_enum, default_value = "lsoda")]
     method: Method,
     /// Relative tolerance [default: 10^-7.97727, NDSolve's].
     #[arg(long, allow_hyphen_values = true)]
