@@ -2,3 +2,4 @@
 
 pub mod model;
 pub mod num;
+pub mod render;
