@@ -1,0 +1,103 @@
+//! Pixels as a PNG file with its printed size and its provenance, and back.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io::Cursor;
+
+use png::{BitDepth, ColorType, DeflateCompression, Encoder, Filter, Info, PixelDimensions, Unit};
+
+use super::RenderError;
+use super::provenance::Sealed;
+use super::raster::Pixels;
+use super::scene::DPI;
+
+/// Prefix of the keywords under which provenance is kept.
+pub const KEYWORD_PREFIX: &str = "twofold:";
+
+/// Writes pixels. Pictures of at most 256 colours are stored with a palette, others as RGB.
+pub fn write(pixels: &Pixels, title: &str, description: &str, sealed: &Sealed) -> Result<Vec<u8>, RenderError> {
+    let mut info = Info::with_size(pixels.width, pixels.height);
+    // 300 dpi is 11811 pixels per metre.
+    let per_metre = (f64::from(DPI) / 0.0254).round() as u32;
+    info.pixel_dims = Some(PixelDimensions { xppu: per_metre, yppu: per_metre, unit: Unit::Meter });
+    info.bit_depth = BitDepth::Eight;
+    let data = match indexed(pixels) {
+        Some((palette, indices)) => {
+            info.color_type = ColorType::Indexed;
+            info.palette = Some(Cow::Owned(palette));
+            indices
+        }
+        None => {
+            info.color_type = ColorType::Rgb;
+            pixels.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
+        }
+    };
+    let filter = if info.color_type == ColorType::Rgb { Filter::Up } else { Filter::NoFilter };
+    let mut file = Vec::new();
+    let mut encoder = Encoder::with_info(&mut file, info)?;
+    encoder.set_filter(filter);
+    encoder.set_deflate_compression(DeflateCompression::Level(LEVEL));
+    encoder.add_itxt_chunk("Title".to_owned(), title.to_owned())?;
+    encoder.add_itxt_chunk("Description".to_owned(), description.to_owned())?;
+    for (key, value) in &sealed.entries {
+        encoder.add_itxt_chunk(format!("{KEYWORD_PREFIX}{key}"), value.clone())?;
+    }
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&data)?;
+    writer.finish()?;
+    Ok(file)
+}
+
+/// Effort of compression: higher levels cost more time than all the drawing.
+const LEVEL: u8 = 3;
+
+fn indexed(pixels: &Pixels) -> Option<(Vec<u8>, Vec<u8>)> {
+    let mut colours: BTreeMap<[u8; 3], u8> = BTreeMap::new();
+    let mut last = None;
+    for p in pixels.rgba.chunks_exact(4) {
+        let c = [p[0], p[1], p[2]];
+        if last != Some(c) {
+            last = Some(c);
+            if colours.insert(c, 0).is_none() && colours.len() > 256 {
+                return None;
+            }
+        }
+    }
+    for (i, index) in colours.values_mut().enumerate() {
+        *index = i as u8;
+    }
+    let palette = colours.keys().flatten().copied().collect();
+    let mut last = ([0; 3], colours.get(&[0; 3]).copied().unwrap_or(0));
+    let indices = pixels
+        .rgba
+        .chunks_exact(4)
+        .map(|p| {
+            let c = [p[0], p[1], p[2]];
+            if last.0 != c {
+                last = (c, colours[&c]);
+            }
+            last.1
+        })
+        .collect();
+    Some((palette, indices))
+}
+
+/// Pixels of any PNG file of eight bits or fewer per channel, as opaque RGBA where the file has no transparency.
+pub fn decode_png(bytes: &[u8]) -> Result<Pixels, RenderError> {
+    let mut decoder = png::Decoder::new(Cursor::new(bytes));
+    decoder.set_transformations(png::Transformations::normalize_to_color8());
+    let mut reader = decoder.read_info()?;
+    let size = reader.output_buffer_size().ok_or(RenderError::TooLarge)?;
+    let mut buffer = vec![0; size];
+    let frame = reader.next_frame(&mut buffer)?;
+    let data = &buffer[..frame.buffer_size()];
+    let rgba = match frame.color_type {
+        ColorType::Rgba => data.to_vec(),
+        ColorType::Rgb => data.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 255]).collect(),
+        ColorType::Grayscale => data.iter().flat_map(|g| [*g, *g, *g, 255]).collect(),
+        ColorType::GrayscaleAlpha => data.chunks_exact(2).flat_map(|p| [p[0], p[0], p[0], p[1]]).collect(),
+        // `normalize_to_color8` expands palettes.
+        ColorType::Indexed => return Err(RenderError::Drawing("a palette was not expanded".to_owned())),
+    };
+    Ok(Pixels { width: frame.width, height: frame.height, rgba })
+}
