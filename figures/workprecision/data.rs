@@ -58,6 +58,25 @@ pub struct ReferenceRun {
     pub bdf_orders: Vec<u64>,
     /// Switches of family: time, to which.
     pub switches: Vec<(f64, String)>,
+    /// The same run from starts 1e-12 away: how much of all this rounding decides.
+    pub shifted: Vec<ShiftedRun>,
+}
+
+/// ODEPACK's run from a start 1e-12 away.
+#[derive(Debug, Deserialize)]
+pub struct ShiftedRun {
+    /// Accepted steps.
+    pub steps: u64,
+    /// Evaluations of f.
+    pub evaluations: u64,
+    /// Evaluations of its Jacobian.
+    pub jacobians: u64,
+    /// Steps by BDF.
+    pub stiff_steps: u64,
+    /// Switches of family: time, to which.
+    pub switches: Vec<(f64, String)>,
+    /// Error against the reference solution.
+    pub error: f64,
 }
 
 impl ReferenceProblem {

@@ -467,6 +467,7 @@ impl<const N: usize> Stepper<N> for Radau5<N> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::num::Scalar;
 
     /// The numbers that Hairer & Wanner (1996), sec. IV.8, print.
     #[test]
@@ -489,5 +490,156 @@ mod tests {
         for (c, z) in t.c.iter().zip(z) {
             assert!(((dense.at(*c) - z)[0] - 2.0).abs() < 1e-14);
         }
+    }
+
+    /// x' = -x^2, x = 1/(1 + t).
+    struct Hyperbola;
+    impl VectorField<1> for Hyperbola {
+        fn eval<S: Scalar>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
+            SVector::from([-x[0].squared()])
+        }
+    }
+
+    /// The circle, on which energy is conserved and every derivative is known.
+    struct Circle;
+    impl VectorField<2> for Circle {
+        fn eval<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+            SVector::from([-x[1], x[0]])
+        }
+    }
+
+    /// Prothero & Robinson (1974): x' = -lambda (x - cos t) - sin t, with t as a state.
+    struct ProtheroRobinson(f64);
+    impl VectorField<2> for ProtheroRobinson {
+        fn eval<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+            SVector::from([(x[1].cos() - x[0]).scale(self.0) - x[1].sin(), S::one()])
+        }
+    }
+
+    /// `n` equal steps over [0, t_end], the stages solved to a hundredth of `resolution`, no step control.
+    fn equal_steps<F: VectorField<N>, const N: usize>(
+        field: &F,
+        x: SVector<f64, N>,
+        t_end: f64,
+        n: u32,
+        resolution: f64,
+        mut see: impl FnMut(&Step<'_, N>),
+    ) {
+        let mut radau = Radau5::new(Tolerance { rtol: 1e-13, atol: 1e-13 });
+        radau.restart(field, 0.0, x, t_end, f64::INFINITY).unwrap();
+        let h = t_end / f64::from(n);
+        let weights = SVector::repeat(resolution.recip());
+        for k in 0..n {
+            radau.jacobian = jacobian(field, &radau.x);
+            radau.matrices = None;
+            radau.dense = None;
+            radau.eta = 1.0;
+            let solved = radau.solve(field, h, &weights).expect("converges");
+            let p = radau.tableau.polynomial.map(|row| combine(&solved.z, &row));
+            let dense = Collocation { x0: radau.x, p, h };
+            let (t0, t1) = (f64::from(k) * h, f64::from(k + 1) * h);
+            let (x0, x1) = (radau.x, radau.x + solved.z[2]);
+            see(&Step { t0, t1, x0, x1, interpolant: &dense });
+            radau.x = x1;
+        }
+    }
+
+    #[test]
+    fn converges_at_order_five_and_three_between() {
+        let errors = |n| {
+            let (mut at_steps, mut between) = (0.0_f64, 0.0_f64);
+            equal_steps(&Hyperbola, SVector::from([1.0]), 2.0, n, 1e-12, |step| {
+                let error = |theta: f64| (step.at(theta)[0] - 1.0 / (1.0 + step.time(theta))).abs();
+                at_steps = at_steps.max(error(1.0));
+                between = between.max(error(0.3));
+            });
+            (at_steps, between)
+        };
+        let (a, b) = (errors(16), errors(32));
+        let order = (a.0 / b.0).log2();
+        assert!((order - 5.0).abs() < 0.3, "{order}");
+        // The polynomial of degree 3 leaves h^4 locally.
+        let dense = (a.1 / b.1).log2();
+        assert!(dense > 3.5, "{dense}");
+    }
+
+    /// Stiff order: on Prothero & Robinson's problem with h lambda -> infinity, the stage order 3 rules (sec. IV.15).
+    #[test]
+    fn keeps_its_stiff_order() {
+        let error = |n| {
+            let mut worst = 0.0_f64;
+            equal_steps(&ProtheroRobinson(1e3), SVector::from([1.0, 0.0]), 2.0, n, 1e-9, |step| {
+                worst = worst.max((step.x1[0] - step.t1.cos()).abs());
+            });
+            worst
+        };
+        let order = (error(40) / error(80)).log2();
+        assert!(order > 2.7 && error(80) > 1e-10, "{order} {}", error(80));
+    }
+
+    fn run<F: VectorField<N>, const N: usize>(
+        radau: &mut Radau5<N>,
+        field: &F,
+        x: SVector<f64, N>,
+        t_end: f64,
+        cap: f64,
+    ) -> SVector<f64, N> {
+        radau.restart(field, 0.0, x, t_end, cap).unwrap();
+        loop {
+            let step = radau.step(field).unwrap();
+            assert!(step.length() <= cap * (1.0 + 1e-12));
+            if step.t1 == t_end {
+                return step.x1;
+            }
+            assert!(step.t1 < t_end);
+        }
+    }
+
+    #[test]
+    fn error_follows_tolerance() {
+        for k in 4..=11 {
+            let tolerance = 10_f64.powi(-k);
+            let mut radau = Radau5::new(Tolerance { rtol: tolerance, atol: tolerance });
+            let x = run(&mut radau, &Circle, SVector::from([1.0, 0.0]), 20.0, f64::INFINITY);
+            let error = (x - SVector::from([20_f64.cos(), 20_f64.sin()])).amax();
+            assert!(error < 10.0 * tolerance, "{tolerance}: {error}");
+        }
+    }
+
+    #[test]
+    fn stiff_decay_is_cheap() {
+        let mut radau = Radau5::new(Tolerance { rtol: 1e-6, atol: 1e-6 });
+        let x = run(&mut radau, &ProtheroRobinson(1e8), SVector::from([2.0, 0.0]), 10.0, f64::INFINITY);
+        assert!((x[0] - 10_f64.cos()).abs() < 1e-6);
+        assert!(radau.statistics.steps < 200, "{:?}", radau.statistics);
+    }
+
+    #[test]
+    fn keeps_the_cap_and_forgets() {
+        let mut used = Radau5::new(Tolerance { rtol: 1e-5, atol: 1e-5 });
+        let start = SVector::from([1.0, 0.0]);
+        run(&mut used, &Circle, start, 3.0, 0.05);
+        let again = run(&mut used, &Circle, start, 3.0, 0.05);
+        let fresh = run(&mut Radau5::new(Tolerance { rtol: 1e-5, atol: 1e-5 }), &Circle, start, 3.0, 0.05);
+        assert_eq!(again.map(f64::to_bits), fresh.map(f64::to_bits));
+    }
+
+    #[test]
+    fn a_pole_is_a_named_failure() {
+        struct Explosion;
+        impl VectorField<1> for Explosion {
+            fn eval<S: Scalar>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
+                SVector::from([x[0].squared()])
+            }
+        }
+        let mut radau = Radau5::new(Tolerance { rtol: 1e-8, atol: 1e-8 });
+        radau.restart(&Explosion, 0.0, SVector::from([1.0]), 2.0, f64::INFINITY).unwrap();
+        let failure = (0..100_000).find_map(|_| radau.step(&Explosion).err()).expect("the solution ends at t = 1");
+        let (Failure::StepUnderflow { t, .. } | Failure::NotFinite { t, .. } | Failure::NotConverged { t, .. }) =
+            failure
+        else {
+            panic!("{failure}")
+        };
+        assert!((t - 1.0).abs() < 1e-6, "{failure}");
     }
 }
