@@ -16,6 +16,7 @@
 //! Why not the exponent alone? Because the reconstructed system spirals at rates of 1e-5 to 1e-4 per unit time: over 10^5 the
 //! exponent of such a run cannot be told from zero, while its points say plainly what it does.
 
+mod claim;
 mod cycle;
 mod divergence;
 mod fit;
@@ -24,6 +25,7 @@ mod thresholds;
 mod verdict;
 mod zero_one;
 
+pub use claim::{Claim, Score};
 pub use divergence::{Divergence, divergence};
 pub use occupancy::{Overlap, overlap};
 pub use thresholds::Thresholds;
