@@ -5,7 +5,7 @@ use twofold::integrate::{Dopri5, Flow, Ignore, Observer, Schedule, Step, StepCap
 use twofold::model::{Caricature, Smoothed, Transition, VectorField};
 use twofold::num::Scalar;
 use twofold::num::random::RandomStream;
-use twofold::observe::attractor::{Evidence, Question, SectionPoint, Thresholds, Verdict, classify};
+use twofold::observe::attractor::{Claim, Evidence, Question, SectionPoint, Thresholds, Verdict, classify};
 use twofold::observe::floquet::{self, Plane, closed_orbit};
 use twofold::observe::lyapunov::{self, largest};
 
@@ -364,6 +364,34 @@ fn evidence_survives_json() {
         let text = serde_json::to_string(&e).unwrap();
         assert_eq!(serde_json::from_str::<Evidence>(&text).unwrap(), e);
     }
+}
+
+#[test]
+fn claims_are_scored_by_one_rule() {
+    let agrees = |claim: Claim, e: &Evidence| claim.score(e).agrees;
+    let three = judge(&logistic(3.83, 1000));
+    // Settled before the shown part begins, or not.
+    let late = |shown_from| {
+        classify(&logistic(3.83, 1000), &Question { shown_from, ..Question::default() }, &Thresholds::default())
+    };
+    assert!(late(500.0).dots_only && !late(0.0).dots_only);
+    assert!(agrees(Claim::Period(3), &late(500.0)));
+    assert!(!agrees(Claim::Period(1), &late(500.0)) && !agrees(Claim::Chaos, &late(500.0)));
+    assert!(!agrees(Claim::PartlyWashedOut, &three));
+    let chaos = judge(&logistic(3.9, 1000));
+    assert!(agrees(Claim::Chaos, &chaos) && !agrees(Claim::Period(1), &chaos));
+    // Period one in the end, but chaos in the shown part.
+    let points = sequence(henon(1500).into_iter().chain(std::iter::repeat_n([0.4, 0.1], 1500)));
+    let mixed = classify(&points, &Question { shown_from: 1000.0, ..Question::default() }, &Thresholds::default());
+    assert!(mixed.mixed && !agrees(Claim::Period(1), &mixed) && !agrees(Claim::Chaos, &mixed), "{mixed:?}");
+    let shown = classify(&points, &Question { shown_from: 2000.0, ..Question::default() }, &Thresholds::default());
+    assert!(agrees(Claim::Period(1), &shown), "{shown:?}");
+    // A spiral counts as its period, with the reservation written down.
+    let spiral =
+        judge(&section(&Torus { omega: 0.3636, gamma: 1e-4 }, vector![2.3, 0.0, 0.0], 12_000.0, 1, 0.0, [0, 2]));
+    let spiral = Evidence { mixed: false, ..spiral };
+    let score = Claim::Period(1).score(&spiral);
+    assert!(score.agrees && score.because.contains("approaching"), "{score:?}");
 }
 
 fn caricature(alpha: f64, beta: f64) -> Smoothed<Caricature> {

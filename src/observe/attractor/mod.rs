@@ -16,6 +16,7 @@
 //! Why not the exponent alone? Because the reconstructed system spirals at rates of 1e-5 to 1e-4 per unit time: over 10^5 the
 //! exponent of such a run cannot be told from zero, while its points say plainly what it does.
 
+mod claim;
 mod cycle;
 mod divergence;
 mod fit;
@@ -24,6 +25,7 @@ mod thresholds;
 mod verdict;
 mod zero_one;
 
+pub use claim::{Claim, Score};
 pub use divergence::{Divergence, divergence};
 pub use occupancy::{Overlap, overlap};
 pub use thresholds::Thresholds;
@@ -86,6 +88,7 @@ pub fn classify(section: &[SectionPoint], question: &Question<'_>, thresholds: &
         return_time,
         shown_from: question.shown_from,
         mixed: false,
+        dots_only: false,
         zero_one: None,
         divergence: None,
         lyapunov: question.lyapunov,
@@ -104,6 +107,10 @@ pub fn classify(section: &[SectionPoint], question: &Question<'_>, thresholds: &
     } else {
         deterministic(&split, question, th, &mut evidence)
     };
+    if let Some(cycle) = evidence.verdict.cycle() {
+        evidence.mixed = cycle.captured_at > question.shown_from;
+        evidence.dots_only = cycle.settled_at.is_some_and(|t| t <= question.shown_from);
+    }
     evidence.name = evidence.verdict.name().to_owned();
     evidence.summary = evidence.verdict.to_string();
     evidence
@@ -132,7 +139,6 @@ fn noisy(
     evidence.overlap = question.reference.and_then(|r| overlap(&shown(section), &shown(r), th));
     let turns = Turns::find(points, times, evidence.extent, th);
     let around = turns.cloud(evidence.extent, th).map(|c| {
-        evidence.mixed = times[c.from] > question.shown_from;
         // Noise sets the distance, not an approach.
         Cycle { approach: None, ..describe(&turns, &c, split, th) }
     });
@@ -152,13 +158,11 @@ fn deterministic(split: &Split, question: &Question<'_>, th: &Thresholds, eviden
     };
     if let Some(c) = captured {
         if c.settled.is_some() {
-            evidence.mixed = times[c.from] > question.shown_from;
             return Verdict::Periodic(describe(&turns, &c, split, th));
         }
         let k = tail(c.from, turns.period);
         if c.blocks >= th.fewest_blocks && k.is_none_or(|k| k < th.zero_one) {
             evidence.zero_one = k;
-            evidence.mixed = times[c.from] > question.shown_from;
             let cycle = describe(&turns, &c, split, th);
             let approaches = cycle.approach.is_some_and(|r| {
                 r.per_time.abs() > th.significance * r.standard_error

@@ -66,6 +66,10 @@ pub struct Thresholds {
     pub cells: usize,
     /// Cells that are merged to one to blur a reference: what remains is the outline, an eighth of the picture fine.
     pub blur: usize,
+    /// Share of structure below which it counts as gone: five times the scatter between runs of one system (0.01 measured).
+    pub washed_out: f64,
+    /// Share of structure above which it counts as untouched, for the same reason.
+    pub untouched: f64,
 }
 
 impl Default for Thresholds {
@@ -92,6 +96,8 @@ impl Default for Thresholds {
             skill: 0.5,
             cells: 64,
             blur: 8,
+            washed_out: 0.05,
+            untouched: 0.95,
         }
     }
 }

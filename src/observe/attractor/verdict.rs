@@ -127,7 +127,7 @@ impl std::fmt::Display for Verdict {
             Self::Spiralling(c) => {
                 write!(
                     f,
-                    "spiralling onto period {} since t = {:.0}, radius {:.2}",
+                    "spiralling onto period {} since t = {:.0}, radius {:.3}",
                     c.period, c.captured_at, c.radius
                 )?;
                 match c.approach {
@@ -138,7 +138,7 @@ impl std::fmt::Display for Verdict {
             Self::QuasiPeriodic(c) => {
                 write!(
                     f,
-                    "quasi-periodic around period {} since t = {:.0}, radius {:.2}",
+                    "quasi-periodic around period {} since t = {:.0}, radius {:.3}",
                     c.period, c.captured_at, c.radius
                 )
             }
@@ -181,6 +181,8 @@ pub struct Evidence {
     pub shown_from: f64,
     /// The run changed its character after that: a picture of the shown part holds both.
     pub mixed: bool,
+    /// Everything shown is in dots: the run had settled on its periodic orbit by then.
+    pub dots_only: bool,
     /// K of the 0-1 test: near 0 regular, near 1 irregular. Of the captured part if there is one, else of the end.
     pub zero_one: Option<f64>,
     /// Divergence of nearest neighbours, per return and per unit time: the largest exponent estimated from the points
