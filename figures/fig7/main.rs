@@ -1,7 +1,7 @@
 //! Fig. 7: Poincare sections of the smoothed system, restarted after every interval.
 
 use twofold::figure::spec::*;
-use twofold::figure::verdict::Claim;
+use twofold::figure::verdict::{Claim, SectionClaim};
 use twofold::figure::{Figure, Panel, View, cli};
 use twofold::integrate::Schedule;
 
@@ -33,9 +33,9 @@ pub fn figure() -> Figure {
                 )
             };
             vec![
-                panel("i", 20.0).claimed(Claim::PeriodOne),
-                panel("ii", 40.0).claimed(Claim::PeriodThree),
-                panel("iii", 100.0).claimed(Claim::Chaotic),
+                panel("i", 20.0).claimed(Claim::Section(SectionClaim::Period(1))),
+                panel("ii", 40.0).claimed(Claim::Section(SectionClaim::Period(3))),
+                panel("iii", 100.0).claimed(Claim::Section(SectionClaim::Chaos)),
             ]
         },
     )

@@ -1,7 +1,7 @@
 //! Fig. 8: fig. 7(iii) with a perturbed transition function.
 
 use twofold::figure::spec::*;
-use twofold::figure::verdict::Claim;
+use twofold::figure::verdict::{Claim, SectionClaim};
 use twofold::figure::{Figure, Panel, View, cli};
 use twofold::integrate::Schedule;
 use twofold::model::Transition;
@@ -34,9 +34,9 @@ pub fn figure() -> Figure {
                 )
             };
             vec![
-                panel("i", 0.01).claimed(Claim::Chaotic),
-                panel("ii", 0.1).claimed(Claim::Periodic),
-                panel("iii", 0.13).claimed(Claim::Periodic),
+                panel("i", 0.01).claimed(Claim::Section(SectionClaim::Chaos)),
+                panel("ii", 0.1).claimed(Claim::Section(SectionClaim::Periodic)),
+                panel("iii", 0.13).claimed(Claim::Section(SectionClaim::Periodic)),
             ]
         },
     )

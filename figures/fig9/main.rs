@@ -4,7 +4,7 @@
 //! opposite order. The caption is followed.
 
 use twofold::figure::spec::*;
-use twofold::figure::verdict::Claim;
+use twofold::figure::verdict::{Claim, SectionClaim};
 use twofold::figure::{Figure, Panel, View, cli};
 use twofold::integrate::{Kick, KickLaw, Schedule};
 use twofold::model::Relaxation;
@@ -40,9 +40,11 @@ pub fn figure() -> Figure {
             let noise = |stream| Some(Kick { every: 0.3, size: eps, law: KickLaw::Sphere, seed: 2013, stream });
             vec![
                 panel("i", "hysteresis", SwitchSpec::hysteretic(eps, Relaxation::Literal), None)
-                    .claimed(Claim::Chaotic),
-                panel("ii", "noise, first run", SwitchSpec::tanh(eps), noise(1)).claimed(Claim::PartlyWashedOut),
-                panel("iii", "noise, second run", SwitchSpec::tanh(eps), noise(2)).claimed(Claim::PartlyWashedOut),
+                    .claimed(Claim::Section(SectionClaim::Chaos)),
+                panel("ii", "noise, first run", SwitchSpec::tanh(eps), noise(1))
+                    .claimed(Claim::Section(SectionClaim::PartlyWashedOut)),
+                panel("iii", "noise, second run", SwitchSpec::tanh(eps), noise(2))
+                    .claimed(Claim::Section(SectionClaim::PartlyWashedOut)),
             ]
         },
     )

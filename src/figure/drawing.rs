@@ -51,8 +51,9 @@ fn methods(picture: &Picture) -> String {
     names.join(", ")
 }
 
-fn label(panel: &Panel) -> String {
-    format!("({})", panel.label)
+/// "(ii)"; nothing where there is only one panel.
+fn label(picture: &Picture, panel: &Panel) -> String {
+    if picture.panels.len() > 1 { format!("({})", panel.label) } else { String::new() }
 }
 
 /// Sections: the same axes in every panel, so that sizes can be compared.
@@ -68,7 +69,7 @@ fn section_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording],
         let chart = PlanePanel::new(axis(0), axis(1))
             .dots(points(false), DotStyle::early())
             .dots(points(true), DotStyle::late());
-        sheet = sheet.panel(label(panel), panel.title.as_str(), chart);
+        sheet = sheet.panel(label(picture, panel), panel.title.as_str(), chart);
     }
     let half = wording::number(0.5 * picture.panels[0].run.t_end);
     sheet
@@ -104,7 +105,7 @@ fn space_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording], c
         if let Some(point) = surface::singularity(&panel.run.system) {
             chart = chart.markers(vec![turn(point)], SINGULARITY);
         }
-        sheet = sheet.panel(label(panel), panel.title.as_str(), chart);
+        sheet = sheet.panel(label(picture, panel), panel.title.as_str(), chart);
     }
     region_legend(sheet)
 }

@@ -11,7 +11,7 @@ use super::{Picture, Reading, drawing, encode};
 use crate::integrate::Statistics;
 use crate::record::hash::canonical_json;
 use crate::record::{Hash, PanelEntry, PictureEntry};
-use crate::render::{RenderError, Rendered, render};
+use crate::render::{Pixels, RenderError, Rendered, render};
 
 /// A computed picture: its files' bytes and what is known about them.
 #[derive(Clone, Debug)]
@@ -87,6 +87,15 @@ pub enum PipelineError {
     },
 }
 
+/// The hash of a decoded picture: width and height (little-endian), then RGBA row by row.
+pub fn pixel_hash(pixels: &Pixels) -> Hash {
+    let mut bytes = Vec::with_capacity(8 + pixels.rgba.len());
+    bytes.extend_from_slice(&pixels.width.to_le_bytes());
+    bytes.extend_from_slice(&pixels.height.to_le_bytes());
+    bytes.extend_from_slice(&pixels.rgba);
+    Hash::of(&bytes)
+}
+
 /// Computes and draws one picture. The result does not depend on the number of threads.
 pub fn compute(picture: &Picture, progress: &Progress) -> Result<Computed, PipelineError> {
     let recordings: Vec<Recording> = picture
@@ -128,7 +137,7 @@ pub fn compute(picture: &Picture, progress: &Progress) -> Result<Computed, Pipel
         name: picture.name.clone(),
         spec,
         data,
-        pixels: Hash::of(&rendered.pixels.hashed_bytes()),
+        pixels: pixel_hash(&rendered.pixels),
         png: Hash::of(&rendered.png),
         svg: Hash::of(&rendered.svg),
         pdf: Hash::of(&rendered.pdf),

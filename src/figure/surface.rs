@@ -51,8 +51,8 @@ fn wheel(system: &Wheel, ranges: &[(f64, f64); 3], cells: usize) -> Vec<Patch> {
     patches
 }
 
-/// Cells over two coordinates, coloured by the region at their centre. Cells are cut where a region's edge meets the grid
-/// line through the singularity, by putting grid lines through zero where zero is inside.
+/// Cells over two coordinates, coloured by region. A cell that an edge between regions runs through is divided until its
+/// parts are too small to be seen, so that edges look as smooth as they are.
 fn grid<P: PiecewiseSmooth<3>>(
     system: &P,
     u: (f64, f64),
@@ -64,15 +64,40 @@ fn grid<P: PiecewiseSmooth<3>>(
     let mut patches = Vec::with_capacity(us.len() * vs.len());
     for a in us.windows(2) {
         for b in vs.windows(2) {
-            let corners = [(a[0], b[0]), (a[1], b[0]), (a[1], b[1]), (a[0], b[1])];
-            let centre = point(0.5 * (a[0] + a[1]), 0.5 * (b[0] + b[1]));
-            patches.push(Patch {
-                corners: corners.iter().map(|(s, t)| point(*s, *t).into()).collect(),
-                colour: colour(region(system, &centre)),
-            });
+            divide(system, &point, (a[0], a[1]), (b[0], b[1]), HALVINGS, &mut patches);
         }
     }
     patches
+}
+
+/// Halvings of a cell at an edge: 60 cells and four halvings are a thousand across the picture.
+const HALVINGS: u32 = 4;
+
+fn divide<P: PiecewiseSmooth<3>>(
+    system: &P,
+    point: &impl Fn(f64, f64) -> SVector<f64, 3>,
+    u: (f64, f64),
+    v: (f64, f64),
+    halvings: u32,
+    patches: &mut Vec<Patch>,
+) {
+    let middle = (0.5 * (u.0 + u.1), 0.5 * (v.0 + v.1));
+    let here = colour(region(system, &point(middle.0, middle.1)));
+    // Looked at just inside the corners: an edge along a side (the caricature's axes) divides nothing.
+    let inside = |s: f64, r: (f64, f64)| r.0 + s * (r.1 - r.0);
+    let uniform = [(0.02, 0.02), (0.98, 0.02), (0.98, 0.98), (0.02, 0.98)]
+        .iter()
+        .all(|(s, t)| colour(region(system, &point(inside(*s, u), inside(*t, v)))) == here);
+    if uniform || halvings == 0 {
+        let corners = [(u.0, v.0), (u.1, v.0), (u.1, v.1), (u.0, v.1)].map(|(s, t)| point(s, t).into()).to_vec();
+        patches.push(Patch { corners, colour: here });
+        return;
+    }
+    for a in [(u.0, middle.0), (middle.0, u.1)] {
+        for b in [(v.0, middle.1), (middle.1, v.1)] {
+            divide(system, point, a, b, halvings - 1, patches);
+        }
+    }
 }
 
 /// Equidistant grid lines, and one through zero.

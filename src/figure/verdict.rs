@@ -1,7 +1,7 @@
 //! The paper's claims, panel by panel, and whether they hold.
 //!
 //! A claim is what the paper says of a panel (its words are quoted). A verdict is what our run shows, with its evidence.
-//! Whether they agree is decided by one rule per kind of claim, stated in [`Claim::agrees`]; no panel is judged by hand.
+//! Whether they agree is decided by one rule per kind of claim, stated in [`SectionClaim::score`] and [`judge`]; no panel is judged by hand.
 
 use nalgebra::{SVector, vector};
 use serde::{Deserialize, Serialize};
@@ -11,6 +11,7 @@ use super::spec::{Observation, RunSpec, SwitchSpec, SystemSpec};
 use super::{Picture, Reading};
 use crate::integrate::Schedule;
 use crate::model::{Hysteretic, PiecewiseSmooth, Smoothed};
+pub use crate::observe::attractor::Claim as SectionClaim;
 use crate::observe::attractor::{Evidence, Question, SectionPoint, Thresholds, Verdict, classify};
 use crate::observe::lyapunov::{self, Exponent};
 use crate::observe::tangle::{Shared, Tangle, common_box};
@@ -20,50 +21,15 @@ use crate::observe::{Crossing, Direction};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Claim {
-    /// A periodic orbit with one point per direction (7(i), named beside "a period three orbit").
-    PeriodOne,
-    /// A period-three orbit (7(ii)).
-    PeriodThree,
-    /// A stable periodic orbit, of whatever period (8(ii), 8(iii)).
-    Periodic,
-    /// Chaos (7(iii), 8(i), 9 hysteresis).
-    Chaotic,
-    /// An intricate structure, "only some of which is washed out by noise" (9, noise).
-    PartlyWashedOut,
-    /// "Less organisation" than in panel (ii) (6(i)).
+    /// About a section (figs 7-9).
+    Section(SectionClaim),
+    /// "Less organisation" than in the next panel (6(i) against 6(ii)).
     LessOrganisedThanNext,
     /// "Changes in structure sensitive to random noise": this panel and the next differ (6(iii), 6(iv)).
     DiffersFromNext,
 }
 
-/// Whether a claim holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Agreement {
-    /// Our run shows what the paper says.
-    Agrees,
-    /// It does for a part of the time that the picture shows.
-    Partly,
-    /// It does not.
-    Differs,
-}
-
-impl Agreement {
-    /// The word in tables.
-    pub fn word(self) -> &'static str {
-        match self {
-            Agreement::Agrees => "agrees",
-            Agreement::Partly => "partly",
-            Agreement::Differs => "differs",
-        }
-    }
-}
-
-/// Below this share the structure counts as washed out altogether, above one minus it as untouched: a twentieth is what the
-/// overlap measure scatters by between two halves of one run.
-pub const STRUCTURE_MARGIN: f64 = 0.05;
-/// Two paths "differ markedly" when a quarter or more of the cells they visit are not common to both: two different starts on
-/// the same attractor share more than that.
+/// Two paths "differ markedly" when a quarter or more of their strides end where the other never comes.
 pub const MARKED_DIFFERENCE: f64 = 0.25;
 
 /// A panel's verdict: claim, evidence, agreement.
@@ -84,7 +50,9 @@ pub struct PanelVerdict {
     /// What was found, in one line.
     pub found: String,
     /// Whether they agree.
-    pub agreement: Agreement,
+    pub agrees: bool,
+    /// Why, or with what reservation.
+    pub because: String,
     /// What the finding rests on.
     pub evidence: Grounds,
 }
@@ -97,7 +65,7 @@ pub enum Grounds {
     Section(Box<Evidence>),
     /// Two paths were compared.
     Paths {
-        /// Freshness of this panel's path and of the next one's.
+        /// Share of strides into new places, of this panel's path and of the next one's.
         freshness: [f64; 2],
         /// What they share.
         shared: Shared,
@@ -106,47 +74,11 @@ pub enum Grounds {
 
 impl Claim {
     /// The claim in words.
-    pub fn text(self) -> &'static str {
+    pub fn text(self) -> String {
         match self {
-            Claim::PeriodOne => "a periodic orbit",
-            Claim::PeriodThree => "a period three orbit",
-            Claim::Periodic => "a stable periodic orbit",
-            Claim::Chaotic => "chaotic over some intricate attractor",
-            Claim::PartlyWashedOut => "intricate structure, only some of it washed out by noise",
-            Claim::LessOrganisedThanNext => "less organised than (ii)",
-            Claim::DiffersFromNext => "changes in structure sensitive to noise: (iii) and (iv) differ",
-        }
-    }
-
-    /// The rules. A section claim is about what the paper's picture shows, the late half.
-    fn agrees(self, grounds: &Grounds) -> Agreement {
-        let decide = |holds| if holds { Agreement::Agrees } else { Agreement::Differs };
-        match (self, grounds) {
-            (Claim::PeriodOne | Claim::PeriodThree | Claim::Periodic, Grounds::Section(e)) => {
-                let period = match &e.verdict {
-                    Verdict::Periodic(c) | Verdict::Spiralling(c) => c.period,
-                    _ => return Agreement::Differs,
-                };
-                let right = match self {
-                    Claim::PeriodOne => period == 1,
-                    Claim::PeriodThree => period == 3,
-                    _ => true,
-                };
-                if right && e.mixed { Agreement::Partly } else { decide(right) }
-            }
-            (Claim::Chaotic, Grounds::Section(e)) => match &e.verdict {
-                Verdict::Chaotic { .. } => Agreement::Agrees,
-                _ if e.mixed => Agreement::Partly,
-                _ => Agreement::Differs,
-            },
-            (Claim::PartlyWashedOut, Grounds::Section(e)) => {
-                decide(e.overlap.is_some_and(|o| (STRUCTURE_MARGIN..=1.0 - STRUCTURE_MARGIN).contains(&o.share)))
-            }
-            (Claim::LessOrganisedThanNext, Grounds::Paths { freshness, .. }) => decide(freshness[0] > freshness[1]),
-            (Claim::DiffersFromNext, Grounds::Paths { shared, .. }) => {
-                decide(shared.overlap <= 1.0 - MARKED_DIFFERENCE)
-            }
-            _ => Agreement::Differs,
+            Claim::Section(claim) => claim.to_string(),
+            Claim::LessOrganisedThanNext => "less organised than (ii)".into(),
+            Claim::DiffersFromNext => "(iii) and (iv) differ".into(),
         }
     }
 }
@@ -157,30 +89,25 @@ pub fn judge(picture: &Picture, recordings: &[Recording]) -> Result<Vec<PanelVer
     for (i, (panel, recording)) in picture.panels.iter().zip(recordings).enumerate() {
         let Some(claim) = panel.claim else { continue };
         let next = recordings.get(i + 1);
-        let (grounds, found) = match (&recording.data, next.map(|r| &r.data)) {
-            (Data::Section(crossings), _) => {
+        let (grounds, found, agrees, because) = match (claim, &recording.data, next.map(|r| &r.data)) {
+            (Claim::Section(claim), Data::Section(crossings), _) => {
                 let evidence = section_evidence(&panel.run, recording, crossings)?;
-                let mut found = evidence.summary.clone();
-                if let Verdict::Chaotic { .. } = evidence.verdict
-                    && let Some(e) = evidence.lyapunov
-                {
-                    found = format!("chaotic, largest exponent {:.3} ± {:.3}", e.value, e.standard_error);
-                }
-                (Grounds::Section(Box::new(evidence)), found)
+                let score = claim.score(&evidence);
+                (Grounds::Section(Box::new(evidence.clone())), evidence.summary, score.agrees, score.because)
             }
-            (Data::Path(path), Some(Data::Path(other))) => {
+            (_, Data::Path(path), Some(Data::Path(other))) => {
                 let range = common_box([&path[..], &other[..]]);
                 let (a, b) = (Tangle::new(path, &range), Tangle::new(other, &range));
                 let (freshness, shared) = ([a.freshness(), b.freshness()], a.compare(&b));
-                let found = match claim {
-                    Claim::LessOrganisedThanNext => format!(
-                        "{:.0} % of its way is through places not visited before, {:.0} % in the next panel",
-                        100.0 * freshness[0],
-                        100.0 * freshness[1]
-                    ),
-                    _ => format!("the two share {:.0} % of the places they visit", 100.0 * shared.overlap),
+                let (found, agrees) = if claim == Claim::LessOrganisedThanNext {
+                    let [here, next] = freshness.map(|f| 100.0 * f);
+                    let found = format!("{here:.0} % of its way leads to new places, {next:.0} % in the next panel");
+                    (found, freshness[0] > freshness[1])
+                } else {
+                    let found = format!("the two share {:.0} % of their places", 100.0 * shared.overlap);
+                    (found, shared.overlap <= 1.0 - MARKED_DIFFERENCE)
                 };
-                (Grounds::Paths { freshness, shared }, found)
+                (Grounds::Paths { freshness, shared }, found.clone(), agrees, found)
             }
             // A single panel of fig. 6 was asked for: there is nothing to compare it with.
             _ => continue,
@@ -191,9 +118,10 @@ pub fn judge(picture: &Picture, recordings: &[Recording]) -> Result<Vec<PanelVer
             panel: panel.label.clone(),
             method: panel.run.method.name.name().to_owned(),
             claim,
-            claim_text: claim.text().to_owned(),
+            claim_text: claim.text(),
             found,
-            agreement: claim.agrees(&grounds),
+            agrees,
+            because,
             evidence: grounds,
         });
     }

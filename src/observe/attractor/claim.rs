@@ -10,6 +10,8 @@ use super::{Evidence, Verdict};
 pub enum Claim {
     /// A periodic orbit with this many points of one direction: 1 for "periodic", 3 for "period three".
     Period(usize),
+    /// A periodic orbit of whatever period.
+    Periodic,
     /// Chaos.
     Chaos,
     /// Noise over an attractor, "only some of which is washed out".
@@ -32,6 +34,7 @@ impl std::fmt::Display for Claim {
         match self {
             Self::Period(1) => write!(f, "periodic"),
             Self::Period(k) => write!(f, "period {k}"),
+            Self::Periodic => write!(f, "periodic"),
             Self::Chaos => write!(f, "chaos"),
             Self::PartlyWashedOut => write!(f, "structure partly washed out by noise"),
         }
@@ -50,14 +53,18 @@ impl Claim {
             (Self::Period(k), Verdict::Periodic(c) | Verdict::Spiralling(c)) if c.period != k => {
                 (false, format!("the run ends on period {}, not {k}", c.period))
             }
-            (Self::Period(_), Verdict::Periodic(c) | Verdict::Spiralling(c)) if evidence.mixed => {
+            (Self::Period(_) | Self::Periodic, Verdict::Periodic(c) | Verdict::Spiralling(c)) if evidence.mixed => {
                 (false, format!("the period is right, but the shown part is irregular until t = {:.0}", c.captured_at))
             }
-            (Self::Period(_), Verdict::Spiralling(c)) if c.approach.is_some_and(|r| r.per_time < 0.0) => {
+            (Self::Period(_) | Self::Periodic, Verdict::Spiralling(c))
+                if c.approach.is_some_and(|r| r.per_time < 0.0) =>
+            {
                 (false, "the run turns around this orbit and moves away from it".to_owned())
             }
-            (Self::Period(_), Verdict::Periodic(_)) if evidence.dots_only => (true, "dots and nothing else".to_owned()),
-            (Self::Period(_), Verdict::Periodic(_) | Verdict::Spiralling(_)) => {
+            (Self::Period(_) | Self::Periodic, Verdict::Periodic(_)) if evidence.dots_only => {
+                (true, "dots and nothing else".to_owned())
+            }
+            (Self::Period(_) | Self::Periodic, Verdict::Periodic(_) | Verdict::Spiralling(_)) => {
                 (true, "still approaching in the shown part: discs, not dots".to_owned())
             }
             (Self::Chaos, Verdict::Chaotic { .. }) => (true, evidence.summary.clone()),
