@@ -14,8 +14,10 @@ mod fig7;
 mod fig8;
 #[path = "fig9/main.rs"]
 mod fig9;
+#[path = "lottery/main.rs"]
+mod lottery;
 
-/// Every figure, in the paper's order.
+/// Every figure, in the paper's order, then our own.
 pub fn all() -> Vec<Figure> {
-    vec![fig2::figure(), fig6::figure(), fig7::figure(), fig8::figure(), fig9::figure()]
+    vec![fig2::figure(), fig6::figure(), fig7::figure(), fig8::figure(), fig9::figure(), lottery::figure()]
 }

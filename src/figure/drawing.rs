@@ -1,6 +1,7 @@
 //! From recordings to a drawing: which points, lines and surfaces, in which colours and ranges.
 
 use super::simulate::{Data, Recording};
+use super::spec::SystemSpec;
 use super::{Camera, Panel, Picture, View, surface, wording};
 use crate::observe::{Crossing, Sample};
 use crate::record::Hash;
@@ -23,6 +24,9 @@ pub fn sheet(picture: &Picture, recordings: &[Recording], spec: &Hash, data: &Ha
         .provenance("Data-SHA256", data.as_str());
     if let Some(reading) = picture.reading {
         sheet = sheet.subtitle(wording::reading(reading));
+    }
+    if picture.panels.iter().any(|p| matches!(p.run.system, SystemSpec::Wheel(_))) {
+        sheet = sheet.subtitle("reconstruction: the paper gives the form of the equations, not their coefficients");
     }
     for line in wording::small_print(picture.reading, &runs) {
         sheet = sheet.footer(line);

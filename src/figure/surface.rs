@@ -47,8 +47,28 @@ fn wheel(system: &Wheel, ranges: &[(f64, f64); 3], cells: usize) -> Vec<Patch> {
     let mut patches =
         grid(system, ranges[0], ranges[2], cells, |r, omega| vector![r, system.sticking_speed(r, omega), omega]);
     let (low, high) = ranges[1];
-    patches.retain(|p| p.corners.iter().all(|c| (low..=high).contains(&c[1])));
+    for patch in &mut patches {
+        patch.corners = clip(&clip(&patch.corners, |c| c[1] - low), |c| high - c[1]);
+    }
+    patches.retain(|p| p.corners.len() > 2);
     patches
+}
+
+/// The part of a polygon where `inside` is not negative (Sutherland & Hodgman 1974).
+fn clip(polygon: &[[f64; 3]], inside: impl Fn(&[f64; 3]) -> f64) -> Vec<[f64; 3]> {
+    let mut kept = Vec::with_capacity(polygon.len() + 1);
+    for (i, a) in polygon.iter().enumerate() {
+        let b = &polygon[(i + 1) % polygon.len()];
+        let (da, db) = (inside(a), inside(b));
+        if da >= 0.0 {
+            kept.push(*a);
+        }
+        if (da < 0.0) != (db < 0.0) {
+            let s = da / (da - db);
+            kept.push(std::array::from_fn(|k| a[k] + s * (b[k] - a[k])));
+        }
+    }
+    kept
 }
 
 /// Cells over two coordinates, coloured by region. A cell that an edge between regions runs through is divided until its

@@ -6,6 +6,7 @@ mod bless;
 mod catalogue;
 mod check;
 mod run;
+mod sweep;
 
 use std::process::ExitCode;
 
@@ -22,6 +23,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Run(Box<run::Arguments>),
+    Sweep(Box<sweep::Arguments>),
     Check(check::Arguments),
     Bless(bless::Arguments),
 }
@@ -40,6 +42,7 @@ type Problem = Box<dyn std::error::Error>;
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Run(arguments) => run::run(&arguments),
+        Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Bless(arguments) => bless::run(&arguments),
     };

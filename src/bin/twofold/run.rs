@@ -16,6 +16,25 @@ use super::{Outcome, Problem};
 /// Compute one run: its path, or with --section its passages through a plane.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
+    #[command(flatten)]
+    flags: RunFlags,
+    /// Print the run's spec as JSON and compute nothing.
+    #[arg(long)]
+    print_spec: bool,
+    /// Output format.
+    #[arg(long, value_enum, default_value = "csv")]
+    format: Format,
+    /// File to write instead of standard output.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// No progress on standard error.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// The flags that describe a run.
+#[derive(Debug, clap::Args)]
+pub struct RunFlags {
     /// Piecewise-smooth system.
     #[arg(long, value_enum, default_value = "caricature")]
     system: System,
@@ -101,18 +120,6 @@ pub struct Arguments {
         "stream", "section", "chord",
     ])]
     spec: Option<PathBuf>,
-    /// Print the run's spec as JSON and compute nothing.
-    #[arg(long)]
-    print_spec: bool,
-    /// Output format.
-    #[arg(long, value_enum, default_value = "csv")]
-    format: Format,
-    /// File to write instead of standard output.
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// No progress on standard error.
-    #[arg(long)]
-    quiet: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum)]
@@ -155,12 +162,7 @@ enum Misuse {
 }
 
 pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
-    let spec = match &arguments.spec {
-        Some(file) => serde_json::from_str(&record::files::read_text(file)?)
-            .map_err(|e| Misuse::Spec { file: file.display().to_string(), reason: e.to_string() })?,
-        None => spec(arguments)?,
-    };
-    spec.validate().map_err(|e| format!("--{e}"))?;
+    let spec = arguments.flags.spec()?;
     if arguments.print_spec {
         let mut text = serde_json::to_vec_pretty(&spec)?;
         text.push(b'\n');
@@ -189,8 +191,21 @@ fn deliver(arguments: &Arguments, bytes: &[u8]) -> Result<Outcome, Problem> {
     Ok(Outcome::Fine)
 }
 
-/// The spec that the flags describe.
-fn spec(a: &Arguments) -> Result<RunSpec, Misuse> {
+impl RunFlags {
+    /// The spec that the flags describe, checked.
+    pub fn spec(&self) -> Result<RunSpec, Problem> {
+        let spec = match &self.spec {
+            Some(file) => serde_json::from_str(&record::files::read_text(file)?)
+                .map_err(|e| Misuse::Spec { file: file.display().to_string(), reason: e.to_string() })?,
+            None => spec(self)?,
+        };
+        spec.validate().map_err(|e| format!("--{e}"))?;
+        Ok(spec)
+    }
+}
+
+/// The spec that the flags describe, unchecked.
+fn spec(a: &RunFlags) -> Result<RunSpec, Misuse> {
     let system = match a.system {
         System::Caricature => {
             let mut c = a.reading.caricature();
