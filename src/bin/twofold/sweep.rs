@@ -54,7 +54,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
     let mut text = String::from("shift,verdict,period,captured_at,rate,summary\n");
     let mut counts: BTreeMap<String, u32> = BTreeMap::new();
     for row in rows {
-        let (shift, evidence) = row.map_err(Problem::from)?;
+        let (shift, evidence) = row.map_err(|e| e.to_string())?;
         let end = match &evidence.verdict {
             // Which orbit a run ends on is the question; whether it has arrived is a detail.
             Verdict::Periodic(c) | Verdict::Spiralling(c) | Verdict::QuasiPeriodic(c) => format!("period {}", c.period),
