@@ -44,6 +44,14 @@ impl<'a> Turns<'a> {
         let mut best = (1, centres(points, 1, shortest));
         for period in (2..=th.longest_period).rev() {
             let mut window = shortest.max(period * th.points_per_phase);
+            if window > shortest.max(n / 2) && n / 2 >= th.fewest_turns * period {
+                // A short section: fewer turns are enough where every phase is a dot.
+                let found = centres(points, period, n / 2);
+                if found.1.iter().all(|s| *s <= th.dot * extent) && smallest_gap(&found.0) > 2.0 * th.dot * extent {
+                    best = (period, found);
+                    break;
+                }
+            }
             while window <= shortest.max(n / 2) {
                 let found = centres(points, period, window);
                 let widest = found.1.iter().fold(0.0_f64, |a, b| a.max(*b));

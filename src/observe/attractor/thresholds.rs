@@ -21,6 +21,9 @@ pub struct Thresholds {
     /// Points of each phase used to look for a period: enough that a phase which only drifts (a ring that is slowly walked
     /// around) is not taken for a phase that stays.
     pub points_per_phase: usize,
+    /// Turns that are enough in a section too short for that, if every phase is a dot: chaos does not stay near an unstable orbit for so
+    /// long within a dot's size.
+    pub fewest_turns: usize,
     /// Phases count as distinct when their centres are further apart than this many radii of the widest of them:
     /// 2 would let circles touch; a third radius is the gap that makes them separate dots to the eye.
     pub separation: f64,
@@ -79,6 +82,7 @@ impl Default for Thresholds {
             silence: 30.0,
             longest_period: 36,
             points_per_phase: 30,
+            fewest_turns: 5,
             separation: 3.0,
             drift: 0.5,
             dot: 2e-3,
