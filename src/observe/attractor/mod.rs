@@ -171,8 +171,8 @@ fn deterministic(split: &Split, question: &Question<'_>, th: &Thresholds, eviden
             if approaches {
                 return Verdict::Spiralling(cycle);
             }
-            // A ring surrounds its centre; points on a line through it are something else.
-            if cycle.rotation.is_some() {
+            // A ring surrounds its centre; points on a line through it, or a few clusters around it, are something else.
+            if turns.largest_gap(c.blocks).is_some_and(|gap| gap < th.ring_gap) {
                 return Verdict::QuasiPeriodic(cycle);
             }
         }

@@ -47,6 +47,8 @@ pub struct Thresholds {
     /// Fewest blocks that must join the last one before a spread-out end is called regular: two consecutive blocks of chaos
     /// next to an island can look like a ring.
     pub fewest_blocks: usize,
+    /// Largest gap in angle, in circles, of a ring that counts as one: a few clusters around a common centre are not a ring.
+    pub ring_gap: f64,
     /// An approach is called one when its rate is this many standard errors from zero ...
     pub significance: f64,
     /// ... and when ln(distance) has changed by at least this much: a tenth is what an eye can see in a spiral.
@@ -91,6 +93,7 @@ impl Default for Thresholds {
             thickness: 0.018,
             continuity: 0.405_465_108_108_164_4,
             fewest_blocks: 3,
+            ring_gap: 0.2,
             significance: 4.0,
             visible_change: 0.1,
             zero_one: 0.5,
