@@ -2,8 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The limits between one verdict and the next. They were fixed on systems with known answers (`tests/attractor*.rs`)
-/// before any figure was judged; every [`Evidence`](super::Evidence) carries the ones it was made with.
+/// The limits between one verdict and the next, one set for every panel. They were chosen on systems with known answers
+/// (`tests/attractor.rs`, which also checks that none of those answers changes when a limit moves by a third), and two of them,
+/// `dot` and `thickness`, with the sizes seen in Dormand-Prince trial runs of the caricature in view. Every
+/// [`Evidence`](super::Evidence) carries the ones it was made with.
 ///
 /// Lengths are fractions of the section's extent (the diagonal of the box around all of its points), because the
 /// paper's claims are about what is seen in a picture whose axes hold that box.
