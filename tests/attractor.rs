@@ -2,7 +2,7 @@
 
 use nalgebra::{SVector, vector};
 use twofold::integrate::{Dopri5, Flow, Ignore, Observer, Schedule, Step, StepCap, Tolerance, drive, roots};
-use twofold::model::{Caricature, Smoothed, Transition, VectorField};
+use twofold::model::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
 use twofold::num::Scalar;
 use twofold::num::random::RandomStream;
 use twofold::observe::attractor::{Claim, Evidence, Question, SectionPoint, Thresholds, Verdict, classify};
@@ -79,7 +79,19 @@ fn section<const N: usize, F: VectorField<N>>(
     value: f64,
     shown: [usize; 2],
 ) -> Vec<SectionPoint> {
-    let tolerance = Tolerance { rtol: 1e-9, atol: 1e-9 };
+    section_to(1e-9, field, x0, t_end, axis, value, shown)
+}
+
+fn section_to<const N: usize, F: VectorField<N>>(
+    tolerance: f64,
+    field: &F,
+    x0: SVector<f64, N>,
+    t_end: f64,
+    axis: usize,
+    value: f64,
+    shown: [usize; 2],
+) -> Vec<SectionPoint> {
+    let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
     let mut seen = Section { axis, value, shown, points: Vec::new() };
     let mut stepper = Dopri5::new(tolerance);
     drive(field, x0, t_end, &mut stepper, &Schedule::default(), StepCap::Absolute(0.5), u64::MAX, &mut seen, &())
@@ -261,6 +273,25 @@ fn logistic_windows() {
 }
 
 #[test]
+fn short_sections() {
+    // The window's orbit from 0.4 is a chaotic transient for 95 iterations.
+    assert_eq!(judge(&logistic(3.83, 80)).name, "too-few");
+    for n in [140, 200, 400] {
+        let e = judge(&logistic(3.83, n));
+        assert!(matches!(&e.verdict, Verdict::Periodic(c) if c.period == 3), "{n}: {e:?}");
+    }
+    // 47 points of a ring leave holes; 160 do not.
+    for (t_end, expected) in [(300.0, "too-few"), (1000.0, "quasi-periodic")] {
+        let torus = Torus { omega: 0.618, gamma: 0.0 };
+        let e = judge(&section(&torus, vector![2.7, 0.0, 0.0], t_end, 1, 0.0, [0, 2]));
+        assert_eq!(e.name, expected, "{t_end}: {e:?}");
+    }
+    // A few dozen points on no curve: no verdict rather than a wrong one.
+    assert_eq!(judge(&logistic(3.9, 60)).name, "too-few");
+    assert_eq!(judge(&logistic(3.9, 400)).name, "chaotic");
+}
+
+#[test]
 fn chaos_that_ends_in_a_spiral_has_its_lifetime() {
     // 3000 turns of the Henon map, then a slow spiral that keeps well inside: the switch is at t = 3000.
     let spiral = (0..3000).map(|i| {
@@ -358,6 +389,35 @@ fn a_verdict_does_not_depend_on_units() {
 }
 
 #[test]
+fn no_known_answer_hangs_on_the_last_digit_of_a_threshold() {
+    let torus = |gamma| section(&Torus { omega: 0.618, gamma }, vector![2.3, 0.0, 0.0], 12_000.0, 1, 0.0, [0, 2]);
+    let known = [
+        (logistic(3.83, 2000), "periodic"),
+        (logistic(3.9, 2000), "chaotic"),
+        (sequence(henon(4000)), "chaotic"),
+        (torus(0.0), "quasi-periodic"),
+        (torus(5e-5), "spiralling"),
+    ];
+    // Fewer points for the 0-1 test, for speed.
+    let quick = Thresholds { zero_one_points: 800, ..Thresholds::default() };
+    let serde_json::Value::Object(defaults) = serde_json::to_value(quick).unwrap() else { panic!() };
+    for (name, value) in &defaults {
+        for factor in [0.75, 1.33] {
+            let mut changed = defaults.clone();
+            changed[name] = match value.as_u64() {
+                Some(n) => ((n as f64 * factor).round() as u64).max(1).into(),
+                None => (value.as_f64().unwrap() * factor).into(),
+            };
+            let thresholds: Thresholds = serde_json::from_value(changed.into()).unwrap();
+            for (points, expected) in &known {
+                let e = classify(points, &Question::default(), &thresholds);
+                assert_eq!(e.name, *expected, "{name} times {factor}: {e:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn evidence_survives_json() {
     for points in [logistic(3.83, 1000), logistic(3.9, 1000)] {
         let e = judge(&points);
@@ -430,6 +490,38 @@ fn closed_orbits_of_the_paper() {
         let strong = find(1e-1, 1e-4, returns, x, 0.0);
         assert!((strong.rate / o.rate - 10.0).abs() < 0.1, "{strong:?} {o:?}");
     }
+}
+
+#[test]
+fn hysteretic_cycle_contracts_by_its_multiplier() {
+    // Four dimensions: the reconstructed reading with a single division settles on two loops within t = 50.
+    let field = Hysteretic {
+        system: Caricature::with_reinjection(1e-1, 1e-5),
+        eps: 1e-3,
+        eps_prime: 1e-2,
+        relaxation: Relaxation::Single,
+    };
+    // Each turn passes the singularity, which amplifies the solver's error some 10^6 times: at 1e-9 the dots are off by 5e-4.
+    let points = section_to(1e-12, &field, vector![0.2, 0.0, -1.0, 1.0], 600.0, 1, 0.0, [0, 2]);
+    let e = judge(&points);
+    assert!(matches!(&e.verdict, Verdict::Periodic(c) if c.period == 2), "{e:?}");
+    let cycle = e.verdict.cycle().unwrap();
+    let u = cycle.points.iter().find(|p| p.upward).unwrap().u;
+    let plane = Plane { axis: 1, value: 0.0, upward: true };
+    // Away from the layer phi is 1 for x > 0 up to relaxation.
+    let guess = vector![u[0], 0.0, u[1], 1.0];
+    let orbit = closed_orbit::<4, 20, _>(&field, plane, 2, guess, &floquet::Settings::default()).unwrap();
+    assert!((orbit.period - cycle.duration).abs() < 1e-5, "{orbit:?} {cycle:?}");
+    let p = &orbit.points[0];
+    assert!((p[0] - u[0]).abs() < 1e-5 && (p[2] - u[1]).abs() < 1e-5, "{orbit:?} {cycle:?}");
+    // The run comes in by the multiplier a turn: its upward points near this dot, from the third turn on.
+    let near: Vec<f64> = points
+        .iter()
+        .filter(|q| q.upward && (q.u[0] - u[0]).abs() + (q.u[1] - u[1]).abs() < 0.1)
+        .map(|q| (q.u[0] - u[0]).hypot(q.u[1] - u[1]))
+        .collect();
+    let [first, last] = [near[3], near[9]];
+    assert!(((last / first).ln() / 6.0 - orbit.multipliers[0][0].ln()).abs() < 0.01, "{near:?} {orbit:?}");
 }
 
 #[test]

@@ -13,7 +13,7 @@ use crate::integrate::{Dopri5, Failure, Stepper, Tolerance, roots};
 use crate::model::VectorField;
 use crate::num::elementary::{ln, sqrt};
 
-/// The plane x[axis] = value, crossed in one direction.
+/// The plane `x[axis] = value`, crossed in one direction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plane {
     /// Index of the coordinate.

@@ -44,6 +44,14 @@ impl<'a> Turns<'a> {
         let mut best = (1, centres(points, 1, shortest));
         for period in (2..=th.longest_period).rev() {
             let mut window = shortest.max(period * th.points_per_phase);
+            if window > shortest.max(n / 2) && n / 2 >= th.fewest_turns * period {
+                // A short section: fewer turns are enough where every phase is a dot.
+                let found = centres(points, period, (n / 4).max(th.fewest_turns * period));
+                if found.1.iter().all(|s| *s <= th.dot * extent) && smallest_gap(&found.0) > 2.0 * th.dot * extent {
+                    best = (period, found);
+                    break;
+                }
+            }
             while window <= shortest.max(n / 2) {
                 let found = centres(points, period, window);
                 let widest = found.1.iter().fold(0.0_f64, |a, b| a.max(*b));
@@ -165,6 +173,22 @@ impl<'a> Turns<'a> {
         }
         // Increments that point everywhere have no mean.
         (sqrt(c * c + s * s) > 0.5 * count).then(|| atan2(s, c) / std::f64::consts::TAU)
+    }
+
+    /// The largest gap in angle between neighbours of one phase over the last `blocks` blocks, in circles, as seen from its centre: small
+    /// on a ring that is filled; `None` when the points lie on a line.
+    pub fn largest_gap(&self, blocks: usize) -> Option<f64> {
+        let n = self.points.len();
+        let from = n.saturating_sub(blocks * self.block * self.period);
+        let mut largest = 0.0_f64;
+        for phase in 0..self.period {
+            let mut angles: Vec<f64> =
+                self.round(phase, from, n)?.iter().map(|p| atan2(p[1], p[0]) / std::f64::consts::TAU).collect();
+            angles.sort_by(f64::total_cmp);
+            let around = 1.0 + angles.first()? - angles.last()?;
+            largest = angles.windows(2).map(|w| w[1] - w[0]).fold(largest.max(around), f64::max);
+        }
+        Some(largest)
     }
 
     /// Mean distance from the centres in the last block.

@@ -168,7 +168,13 @@ fn deterministic(split: &Split, question: &Question<'_>, th: &Thresholds, eviden
                 r.per_time.abs() > th.significance * r.standard_error
                     && r.per_time.abs() * (r.to - r.from) > th.visible_change
             });
-            return if approaches { Verdict::Spiralling(cycle) } else { Verdict::QuasiPeriodic(cycle) };
+            if approaches {
+                return Verdict::Spiralling(cycle);
+            }
+            // A ring surrounds its centre; points on a line through it, or a few clusters around it, are something else.
+            if turns.largest_gap(c.blocks).is_some_and(|gap| gap < th.ring_gap) {
+                return Verdict::QuasiPeriodic(cycle);
+            }
         }
     }
     evidence.zero_one = tail(0, 1);
@@ -183,6 +189,9 @@ fn deterministic(split: &Split, question: &Question<'_>, th: &Thresholds, eviden
     ];
     let yes = votes.iter().filter(|v| **v == Some(true)).count();
     let no = votes.iter().filter(|v| **v == Some(false)).count();
+    if yes + no == 0 {
+        return Verdict::TooFew { points: points.len() };
+    }
     // A tie goes to chaos: regular motion that is not a ring around its mean is the rarer case.
     if yes >= no {
         Verdict::Chaotic { lyapunov: question.lyapunov, bands: occupancy::bands(&points[points.len() / 2..], th) }

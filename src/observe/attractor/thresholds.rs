@@ -2,8 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The limits between one verdict and the next. They were fixed on systems with known answers (`tests/attractor*.rs`)
-/// before any figure was judged; every [`Evidence`](super::Evidence) carries the ones it was made with.
+/// The limits between one verdict and the next, one set for every panel. They were chosen on systems with known answers
+/// (`tests/attractor.rs`, which also checks that none of those answers changes when a limit moves by a third), and two of them,
+/// `dot` and `thickness`, with the sizes seen in Dormand-Prince trial runs of the caricature in view. Every
+/// [`Evidence`](super::Evidence) carries the ones it was made with.
 ///
 /// Lengths are fractions of the section's extent (the diagonal of the box around all of its points), because the
 /// paper's claims are about what is seen in a picture whose axes hold that box.
@@ -21,6 +23,9 @@ pub struct Thresholds {
     /// Points of each phase used to look for a period: enough that a phase which only drifts (a ring that is slowly walked
     /// around) is not taken for a phase that stays.
     pub points_per_phase: usize,
+    /// Turns that are enough in a section too short for that, if every phase is a dot: chaos does not stay near an unstable orbit for so
+    /// long within a dot's size.
+    pub fewest_turns: usize,
     /// Phases count as distinct when their centres are further apart than this many radii of the widest of them:
     /// 2 would let circles touch; a third radius is the gap that makes them separate dots to the eye.
     pub separation: f64,
@@ -44,6 +49,8 @@ pub struct Thresholds {
     /// Fewest blocks that must join the last one before a spread-out end is called regular: two consecutive blocks of chaos
     /// next to an island can look like a ring.
     pub fewest_blocks: usize,
+    /// Largest gap in angle, in circles, of a ring that counts as one: a few clusters around a common centre are not a ring.
+    pub ring_gap: f64,
     /// An approach is called one when its rate is this many standard errors from zero ...
     pub significance: f64,
     /// ... and when ln(distance) has changed by at least this much: a tenth is what an eye can see in a spiral.
@@ -79,6 +86,7 @@ impl Default for Thresholds {
             silence: 30.0,
             longest_period: 36,
             points_per_phase: 30,
+            fewest_turns: 5,
             separation: 3.0,
             drift: 0.5,
             dot: 2e-3,
@@ -87,6 +95,7 @@ impl Default for Thresholds {
             thickness: 0.018,
             continuity: 0.405_465_108_108_164_4,
             fewest_blocks: 3,
+            ring_gap: 0.2,
             significance: 4.0,
             visible_change: 0.1,
             zero_one: 0.5,

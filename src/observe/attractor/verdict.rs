@@ -82,7 +82,7 @@ pub enum Verdict {
         /// Its last crossing.
         last_crossing: f64,
     },
-    /// Not enough points to say anything.
+    /// Not enough points to decide.
     TooFew {
         /// Points of the more frequent direction.
         points: usize,
