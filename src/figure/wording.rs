@@ -88,67 +88,60 @@ pub fn switch(switch: &SwitchSpec) -> String {
     }
 }
 
-/// The method and its settings.
-pub fn method(method: &MethodSpec) -> String {
+/// Error control: tolerances and step cap.
+pub fn control(method: &MethodSpec) -> String {
     let tolerance = method.tolerance;
     let tolerances = if tolerance.rtol == tolerance.atol {
         format!("rtol = atol = {}", number(tolerance.rtol))
     } else {
         format!("rtol = {}, atol = {}", number(tolerance.rtol), number(tolerance.atol))
     };
-    let cap = match method.step_cap {
-        StepCap::None => String::new(),
-        StepCap::Absolute(h) => format!(", steps up to {}", number(h)),
-        StepCap::FractionOfSegment(f) => format!(", steps up to {} of the interval", number(f)),
-    };
-    format!("{}, {tolerances}{cap}", method.name.name())
+    match method.step_cap {
+        StepCap::None => tolerances,
+        StepCap::Absolute(h) => format!("{tolerances}, steps up to {}", number(h)),
+        StepCap::FractionOfSegment(f) => format!("{tolerances}, steps up to {} of the interval", number(f)),
+    }
 }
 
-/// Restarts and kicks; empty if there are none.
-pub fn schedule(run: &RunSpec) -> String {
-    let mut parts = Vec::new();
-    if let Some(every) = run.schedule.restart_every {
-        parts.push(format!("restarted every {}", number(every)));
-    }
-    if let Some(kick) = run.schedule.kick {
-        parts.push(format!(
-            "kicked by {} every {} (ChaCha8 seed {})",
-            number(kick.size),
-            number(kick.every),
-            kick.seed
-        ));
-    }
-    parts.join(", ")
-}
-
-/// What all runs of a picture have in common, one line per subject, for its foot.
+/// What all runs of a picture have in common and how they differ, one line per subject, for its foot.
 pub fn small_print(reading: Option<Reading>, runs: &[&RunSpec]) -> Vec<String> {
-    let common = |say: &dyn Fn(&RunSpec) -> String| {
+    let all = |say: &dyn Fn(&RunSpec) -> Option<String>, join: &str| {
         let mut said: Vec<String> = Vec::new();
-        for run in runs {
-            let text = say(run);
-            if !text.is_empty() && !said.contains(&text) {
+        for text in runs.iter().filter_map(|r| say(r)) {
+            if !said.contains(&text) {
                 said.push(text);
             }
         }
-        said.join("; ")
+        said.join(join)
     };
-    let mut first = Vec::new();
-    if let Some(reading) = reading {
-        first.push(format!("{} reading", reading.word()));
-    }
-    first.push(common(&|r| system(&r.system)));
-    first.push(common(&|r| format!("*t* = 0 … {}", number(r.t_end))));
-    let lines = [
-        first.join(", "),
-        common(&|r| switch(&r.switch)),
-        [common(&|r| method(&r.method)), common(&schedule)]
-            .into_iter()
-            .filter(|s| !s.is_empty())
-            .collect::<Vec<_>>()
-            .join("; "),
+    let mut lines: Vec<Vec<String>> = vec![
+        vec![
+            reading.map_or(String::new(), |r| format!("{} reading", r.word())),
+            all(&|r| Some(system(&r.system)), "; "),
+            all(&|r| Some(format!("*t* = 0 … {}", number(r.t_end))), "; "),
+        ],
+        vec![all(&|r| Some(switch(&r.switch)), "; ")],
+        vec![all(&|r| Some(r.method.name.name().to_owned()), ", "), all(&|r| Some(control(&r.method)), "; ")],
+        Vec::new(),
     ];
-    lines.into_iter().filter(|l| !l.is_empty()).collect()
+    let restarts = all(&|r| r.schedule.restart_every.map(number), ", ");
+    if !restarts.is_empty() {
+        lines[2].push(format!("restarted every {restarts}"));
+    }
+    let kicks = all(
+        &|r| {
+            r.schedule
+                .kick
+                .map(|k| format!("kicks of {} every {} (ChaCha8, seed {})", number(k.size), number(k.every), k.seed))
+        },
+        "; ",
+    );
+    lines[3].push(kicks);
+    lines
+        .into_iter()
+        .map(|line| line.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", "))
+        .filter(|line| !line.is_empty())
+        .collect()
 }
 
 /// Rich text without its markup, for readers without typesetting.
