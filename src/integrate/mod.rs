@@ -6,6 +6,7 @@
 
 pub mod dopri5;
 pub mod driver;
+pub mod filippov;
 pub mod roots;
 pub mod schedule;
 pub mod step;
