@@ -6,6 +6,7 @@
 
 pub mod dopri5;
 pub mod driver;
+pub mod filippov;
 mod linear;
 pub mod lsoda;
 pub mod radau5;

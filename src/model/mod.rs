@@ -10,7 +10,10 @@
 pub mod caricature;
 pub mod filippov;
 pub mod hysteretic;
+pub mod normal_form;
+pub mod relay;
 pub mod smoothed;
+pub mod stick_slip;
 pub mod transition;
 pub mod wheel;
 
@@ -20,7 +23,10 @@ use crate::num::{Dual, Scalar};
 
 pub use caricature::Caricature;
 pub use hysteretic::{Hysteretic, Relaxation};
+pub use normal_form::TwoFoldNormalForm;
+pub use relay::{Feedback, Relay};
 pub use smoothed::Smoothed;
+pub use stick_slip::StickSlip;
 pub use transition::Transition;
 pub use wheel::Wheel;
 

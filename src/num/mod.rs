@@ -7,6 +7,7 @@
 
 pub mod dual;
 pub mod elementary;
+pub mod jet;
 pub mod random;
 pub mod scalar;
 

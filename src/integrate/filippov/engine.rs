@@ -1,0 +1,744 @@
+//! The state machine: one mode after the other, decided at events.
+
+use nalgebra::SVector;
+
+use super::exit::{Chooser, Plan};
+use super::flow::{FreeFlow, InPhysicalTime, SlidingFlow, Straight, Truncated, project};
+use super::two_fold::{AlongCurve, SlidingAtTwoFold, locate};
+use super::{
+    End, EventKind, ExitRule, FilippovError, FilippovObserver, FilippovSummary, Mode, ModeEvent, Settings, Side,
+};
+use crate::integrate::dopri5::Dopri5;
+use crate::integrate::roots::{Start, Zero, brent, first_zero};
+use crate::integrate::step::{Failure, Flow, Interpolant, Statistics, Step, Stepper, finite};
+use crate::model::filippov::{gradient, lie_derivatives};
+use crate::model::{PiecewiseSmooth, VectorField, variables};
+use crate::num::Dual;
+
+/// Runs the Filippov motion of `system` from (0, x0) to `t_end`. `M` is `N + 1` and is inferred.
+///
+/// # Errors
+/// See [`FilippovError`]; each names the time and the state.
+pub fn run<P, O, const N: usize, const M: usize>(
+    system: &P,
+    x0: SVector<f64, N>,
+    t_end: f64,
+    settings: &Settings,
+    rule: ExitRule,
+    observer: &mut O,
+) -> Result<FilippovSummary<N>, FilippovError>
+where
+    P: PiecewiseSmooth<N>,
+    O: FilippovObserver<N>,
+    for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
+{
+    run_from(system, 0.0, x0, Departure::Anywhere, t_end, settings, rule, observer)
+}
+
+/// Where a run starts.
+#[derive(Clone, Debug)]
+pub(super) enum Departure<const N: usize> {
+    /// Wherever the state is.
+    Anywhere,
+    /// At a two-fold.
+    TwoFold(Option<SlidingAtTwoFold<N>>),
+    /// On the surface, in the repelling region.
+    Repelling,
+}
+
+#[allow(clippy::too_many_arguments)]
+pub(super) fn run_from<P, O, const N: usize, const M: usize>(
+    system: &P,
+    t0: f64,
+    x0: SVector<f64, N>,
+    departure: Departure<N>,
+    t_end: f64,
+    settings: &Settings,
+    rule: ExitRule,
+    observer: &mut O,
+) -> Result<FilippovSummary<N>, FilippovError>
+where
+    P: PiecewiseSmooth<N>,
+    O: FilippovObserver<N>,
+    for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
+{
+    const { assert!(M == N + 1, "the sliding flow carries exactly one extra state") };
+    rule.validate().map_err(FilippovError::Invalid)?;
+    let tolerances = [settings.tolerance.rtol, settings.tolerance.atol, settings.max_step];
+    if !tolerances.iter().all(|v| *v > 0.0) {
+        return Err(FilippovError::Invalid("tolerances and the step cap must be above 0".into()));
+    }
+    if !(t_end > t0 && t_end.is_finite()) {
+        return Err(FilippovError::Invalid(format!("the end time must be finite and after the start, not {t_end}")));
+    }
+    if !finite(&x0) {
+        return Err(Failure::NotFinite { t: t0, state: Failure::state(&x0) }.into());
+    }
+    let mut engine = Engine {
+        system,
+        settings,
+        chooser: Chooser::new(rule),
+        observer,
+        t: t0,
+        x: x0,
+        t_end,
+        events: 0,
+        statistics: Statistics { highest_order: 5, ..Statistics::default() },
+        zeno: Zeno::default(),
+        stopped: false,
+    };
+    let mut state = match departure {
+        Departure::Anywhere => engine.start()?,
+        Departure::TwoFold(Some(local)) => State::TwoFold(Box::new(local)),
+        Departure::TwoFold(None) => return Err(engine.non_transversal("the two-fold is degenerate")),
+        Departure::Repelling => engine.enter_repelling(None)?,
+    };
+    loop {
+        if engine.stopped {
+            return Ok(engine.summary(state.mode(), End::Observer));
+        }
+        if engine.t >= engine.t_end {
+            return Ok(engine.summary(state.mode(), End::Time));
+        }
+        if engine.events > settings.max_events {
+            return Err(FilippovError::TooManyEvents {
+                t: engine.t,
+                state: Failure::state(&engine.x),
+                limit: settings.max_events,
+            });
+        }
+        state = match state {
+            State::Free { side, start } => engine.fly(side, start)?,
+            State::Sliding(sliding) => engine.slide::<M>(sliding)?,
+            State::TwoFold(local) => engine.depart(&local)?,
+            State::SetValued(mode) => return Ok(engine.summary(mode, End::SetValued)),
+        };
+    }
+}
+
+/// How a flight begins: what is known of the growth of |h|.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum FlightStart {
+    /// Off the surface.
+    Away,
+    /// On it, with this rate of growth of |h|.
+    Transversal(f64),
+    /// On it at a visible fold, with this second derivative of |h|.
+    Tangent(f64),
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Sliding {
+    repelling: bool,
+    /// The exit rule's plan, in repelling sliding.
+    plan: Option<Plan>,
+    /// Time and arc of this stretch of repelling sliding so far.
+    time: f64,
+    arc: f64,
+}
+
+impl Sliding {
+    const ATTRACTING: Self = Self { repelling: false, plan: None, time: 0.0, arc: 0.0 };
+
+    fn mode(&self) -> Mode {
+        if self.repelling { Mode::SlidingRepelling } else { Mode::SlidingAttracting }
+    }
+}
+
+enum State<const N: usize> {
+    Free { side: Side, start: FlightStart },
+    Sliding(Sliding),
+    TwoFold(Box<SlidingAtTwoFold<N>>),
+    SetValued(Option<Mode>),
+}
+
+impl<const N: usize> State<N> {
+    fn mode(&self) -> Option<Mode> {
+        match self {
+            State::Free { side, .. } => Some((*side).into()),
+            State::Sliding(s) => Some(s.mode()),
+            State::TwoFold(_) => None,
+            State::SetValued(mode) => *mode,
+        }
+    }
+}
+
+/// Watches for accumulating crossings.
+#[derive(Clone, Copy, Debug, Default)]
+struct Zeno {
+    in_a_row: u64,
+    first: f64,
+    last: f64,
+}
+
+impl Zeno {
+    /// A flight took `duration`. Whether flights have been shrinking for so long and so far that they accumulate.
+    fn flight(&mut self, duration: f64, t: f64) -> bool {
+        if self.in_a_row > 0 && duration <= self.last {
+            self.in_a_row += 1;
+        } else {
+            (self.in_a_row, self.first) = (1, duration);
+        }
+        self.last = duration;
+        let resolution = 16.0 * f64::EPSILON * t.abs();
+        self.in_a_row >= 8 && (duration < 1e-8 * self.first || duration <= resolution)
+    }
+}
+
+/// What ended a stretch of sliding within a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum SlidingEnd {
+    /// L+h (`Plus`) or L-h (`Minus`) came to zero.
+    Fold(Side),
+    Planned,
+    Time,
+}
+
+/// First and second Lie derivatives with the sizes below which the first count as zero.
+struct Lie {
+    p: f64,
+    q: f64,
+    /// L+²h and L-²h.
+    pp: f64,
+    mm: f64,
+    /// L-L+h and L+L-h.
+    pm: f64,
+    mp: f64,
+    zero_p: f64,
+    zero_q: f64,
+}
+
+struct Engine<'a, P, O, const N: usize> {
+    system: &'a P,
+    settings: &'a Settings,
+    chooser: Chooser,
+    observer: &'a mut O,
+    t: f64,
+    x: SVector<f64, N>,
+    t_end: f64,
+    events: u64,
+    statistics: Statistics,
+    zeno: Zeno,
+    stopped: bool,
+}
+
+impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P, O, N> {
+    fn summary(self, mode: Option<Mode>, end: End) -> FilippovSummary<N> {
+        FilippovSummary { t: self.t, x: self.x, mode, end, events: self.events, statistics: self.statistics }
+    }
+
+    fn event(&mut self, kind: EventKind, from: Option<Mode>, to: Option<Mode>) {
+        self.events += 1;
+        let event = ModeEvent { t: self.t, state: self.x, kind, from, to };
+        if self.observer.event(&event) == Flow::Stop {
+            self.stopped = true;
+        }
+    }
+
+    fn non_transversal(&self, what: &'static str) -> FilippovError {
+        FilippovError::NonTransversal { t: self.t, state: Failure::state(&self.x), what }
+    }
+
+    fn no_exit(&self, why: &'static str) -> FilippovError {
+        FilippovError::NoSuchExit { t: self.t, state: Failure::state(&self.x), why }
+    }
+
+    fn lie(&self, x: &SVector<f64, N>) -> Lie {
+        let (plus, minus) = (self.system.plus(x), self.system.minus(x));
+        let (p, q) = lie_derivatives::<P, Dual<f64, N>, N>(self.system, &variables(x));
+        let along = |d: &Dual<f64, N>, f: &SVector<f64, N>| (0..N).map(|i| d.partials[i] * f[i]).sum::<f64>();
+        let slope = gradient(self.system, x).norm();
+        Lie {
+            p: p.value,
+            q: q.value,
+            pp: along(&p, &plus),
+            mm: along(&q, &minus),
+            pm: along(&p, &minus),
+            mp: along(&q, &plus),
+            zero_p: 1e-14 * slope * plus.norm(),
+            zero_q: 1e-14 * slope * minus.norm(),
+        }
+    }
+
+    /// Counts a finished piece's work.
+    fn count(&mut self, work: &Statistics) -> Result<(), FilippovError> {
+        self.statistics.steps += work.steps;
+        self.statistics.rejected += work.rejected;
+        self.statistics.evaluations += work.evaluations;
+        self.statistics.restarts += work.restarts;
+        if self.statistics.steps > self.settings.max_steps {
+            return Err(Failure::TooManySteps {
+                t: self.t,
+                limit: self.settings.max_steps,
+                state: Failure::state(&self.x),
+            }
+            .into());
+        }
+        Ok(())
+    }
+
+    /// Hands a step to the observer and moves to its end.
+    fn take(&mut self, mode: Mode, t1: f64, x1: SVector<f64, N>, interpolant: &dyn Interpolant<N>) {
+        if t1 > self.t {
+            let step = Step { t0: self.t, t1, x0: self.x, x1, interpolant };
+            if self.observer.step(mode, &step) == Flow::Stop {
+                self.stopped = true;
+            }
+        }
+        (self.t, self.x) = (t1, x1);
+    }
+
+    /// The mode at the start of a run.
+    fn start(&mut self) -> Result<State<N>, FilippovError> {
+        let h = self.system.switching(&self.x);
+        if h.abs() > self.settings.surface {
+            let side = if h > 0.0 { Side::Plus } else { Side::Minus };
+            return Ok(State::Free { side, start: FlightStart::Away });
+        }
+        self.x = project(self.system, &self.x);
+        let l = self.lie(&self.x);
+        if let Some(local) = self.two_fold_here(&l) {
+            self.x = local.point;
+            self.event(EventKind::TwoFoldReached { leg: 0.0, error: 0.0 }, None, None);
+            return Ok(State::TwoFold(Box::new(local)));
+        }
+        // Growth of |h| along each field on its own side; a fold counts by its second derivative.
+        let growth = |first: f64, zero: f64, second: f64| {
+            if first.abs() > zero {
+                (first > 0.0).then_some(FlightStart::Transversal(first))
+            } else {
+                (second > 0.0).then_some(FlightStart::Tangent(second))
+            }
+        };
+        let state = match (growth(l.p, l.zero_p, l.pp), growth(-l.q, l.zero_q, -l.mm)) {
+            (Some(start), None) => State::Free { side: Side::Plus, start },
+            (None, Some(start)) => State::Free { side: Side::Minus, start },
+            (None, None) => State::Sliding(Sliding::ATTRACTING),
+            (Some(_), Some(_)) => return self.enter_repelling(None),
+        };
+        self.event(EventKind::StartedOnSurface, None, state.mode());
+        Ok(state)
+    }
+
+    /// A two-fold at the present state, if both Lie derivatives are almost zero there.
+    fn two_fold_here(&self, l: &Lie) -> Option<SlidingAtTwoFold<N>> {
+        if l.p.abs() > 1e5 * l.zero_p.max(l.zero_q) || l.q.abs() > 1e5 * l.zero_p.max(l.zero_q) {
+            return None;
+        }
+        let local = SlidingAtTwoFold::near(self.system, &self.x)?;
+        ((local.point - self.x).norm() <= 1e-9 * local.radius.min(1.0)).then_some(local)
+    }
+
+    /// The state is in the repelling region: ask the rule.
+    fn enter_repelling(&mut self, from: Option<Mode>) -> Result<State<N>, FilippovError> {
+        self.event(EventKind::EnteredRepelling, from, Some(Mode::SlidingRepelling));
+        let Some(plan) = self.chooser.plan() else {
+            return Ok(State::SetValued(Some(Mode::SlidingRepelling)));
+        };
+        if plan.time <= 0.0 || plan.arc <= 0.0 {
+            return Ok(self.exit(plan.side, 0.0, 0.0, from));
+        }
+        Ok(State::Sliding(Sliding { repelling: true, plan: Some(plan), time: 0.0, arc: 0.0 }))
+    }
+
+    /// Leaves repelling sliding by the rule.
+    fn exit(&mut self, to: Side, time: f64, arc: f64, from: Option<Mode>) -> State<N> {
+        let rule = self.chooser.rule;
+        self.event(EventKind::Exit { to, time, arc, rule }, from, Some(to.into()));
+        self.launch(to)
+    }
+
+    /// A flight from a point of the surface where the field of `side` points to it.
+    fn launch(&self, side: Side) -> State<N> {
+        let l = self.lie(&self.x);
+        let (first, zero, second) = match side {
+            Side::Plus => (l.p, l.zero_p, l.pp),
+            Side::Minus => (-l.q, l.zero_q, -l.mm),
+        };
+        let start = if first.abs() > zero { FlightStart::Transversal(first) } else { FlightStart::Tangent(second) };
+        State::Free { side, start }
+    }
+
+    /// Free flight until the surface or the end.
+    fn fly(&mut self, side: Side, start: FlightStart) -> Result<State<N>, FilippovError> {
+        let flow = FreeFlow { system: self.system, side };
+        let mut method = Dopri5::<N>::new(self.settings.tolerance);
+        let (t_start, mut start) = (self.t, start);
+        method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step)?;
+        let landed = loop {
+            let step = method.step(&flow)?;
+            let height = |theta: f64| side.sign() * self.system.switching(&step.at(theta));
+            let length = step.length();
+            let at_start = match start {
+                FlightStart::Away => Start::Away,
+                FlightStart::Transversal(rate) => Start::Simple(rate * length),
+                FlightStart::Tangent(second) => Start::Double(0.5 * second * length * length),
+            };
+            start = FlightStart::Away;
+            match first_zero(height, at_start) {
+                None => {
+                    let (t1, x1) = (step.t1, step.x1);
+                    self.take(side.into(), t1, x1, step.interpolant);
+                    if self.stopped || self.t >= self.t_end {
+                        break None;
+                    }
+                }
+                Some(zero) => {
+                    let theta = zero.theta();
+                    let (t1, x1) = (step.time(theta), project(self.system, &step.at(theta)));
+                    self.take(side.into(), t1, x1, &Truncated { inner: step.interpolant, end: theta });
+                    break Some(zero);
+                }
+            }
+            if method.statistics().steps > self.settings.max_steps {
+                break None;
+            }
+        };
+        self.count(method.statistics())?;
+        match landed {
+            _ if self.stopped => Ok(State::Free { side, start: FlightStart::Away }),
+            None => Ok(State::Free { side, start: FlightStart::Away }),
+            Some(zero) => {
+                let duration = self.t - t_start;
+                if self.zeno.flight(duration, self.t) {
+                    let Zeno { in_a_row, first, last } = self.zeno;
+                    // A geometric series with the mean ratio of these flights.
+                    let ratio =
+                        crate::num::elementary::pow((last / first).max(f64::MIN_POSITIVE), 1.0 / (in_a_row - 1) as f64);
+                    return Err(FilippovError::Zeno {
+                        t: self.t,
+                        state: Failure::state(&self.x),
+                        crossings: in_a_row,
+                        last,
+                        accumulates: self.t + last * ratio / (1.0 - ratio).max(f64::EPSILON),
+                    });
+                }
+                self.land(side, matches!(zero, Zero::Touch(_)))
+            }
+        }
+    }
+
+    /// The mode after an arrival on the surface from `side`.
+    fn land(&mut self, side: Side, touch: bool) -> Result<State<N>, FilippovError> {
+        let l = self.lie(&self.x);
+        let from = Some(side.into());
+        if let Some(local) = self.two_fold_here(&l) {
+            let error = (local.point - self.x).norm() / self.system.plus(&self.x).norm();
+            self.x = local.point;
+            self.event(EventKind::TwoFoldReached { leg: 0.0, error }, from, None);
+            return Ok(State::TwoFold(Box::new(local)));
+        }
+        // Growth of |h| on this side along its own field, and on the other side along the other field.
+        let (own, own_zero, own_second, across, across_zero, across_second) = match side {
+            Side::Plus => (l.p, l.zero_p, l.pp, -l.q, l.zero_q, -l.mm),
+            Side::Minus => (-l.q, l.zero_q, -l.mm, l.p, l.zero_p, l.pp),
+        };
+        if own >= -own_zero || (touch && own_second > 0.0) {
+            if own_second <= 0.0 {
+                return Err(self.non_transversal("a tangency from an invisible or degenerate side (a cusp)"));
+            }
+            self.event(EventKind::Grazing { side }, from, from);
+            let start = if own > own_zero { FlightStart::Transversal(own) } else { FlightStart::Tangent(own_second) };
+            return Ok(State::Free { side, start });
+        }
+        let other = side.other();
+        let start = if across > across_zero {
+            Some(FlightStart::Transversal(across))
+        } else if across < -across_zero {
+            None
+        } else if across_second == 0.0 {
+            return Err(self.non_transversal("landing on a fold with zero second Lie derivative (a cusp)"));
+        } else {
+            (across_second > 0.0).then_some(FlightStart::Tangent(across_second))
+        };
+        if let Some(start) = start {
+            self.event(EventKind::Crossing { to: other }, from, Some(other.into()));
+            return Ok(State::Free { side: other, start });
+        }
+        self.zeno = Zeno::default();
+        self.event(EventKind::Landing { from: side }, from, Some(Mode::SlidingAttracting));
+        Ok(State::Sliding(Sliding::ATTRACTING))
+    }
+
+    /// Sliding until a fold, a two-fold, the planned exit or the end.
+    fn slide<const M: usize>(&mut self, mut sliding: Sliding) -> Result<State<N>, FilippovError>
+    where
+        for<'b> SlidingFlow<'b, P, N>: VectorField<M>,
+    {
+        /// Chords of a step by which its length is measured.
+        const CHORDS: usize = 16;
+        /// So many steps without progress in time are taken for arrival at a degenerate point.
+        const IDLE_STEPS: u32 = 32;
+        let mut idle = 0;
+        let system = self.system;
+        let direction = if sliding.repelling { -1.0 } else { 1.0 };
+        let mode = sliding.mode();
+        let flow = SlidingFlow { system, direction };
+        let mut method = Dopri5::<M>::new(self.settings.tolerance);
+        let lift = |x: &SVector<f64, N>| SVector::<f64, M>::from_fn(|i, _| if i < N { x[i] } else { 0.0 });
+        let drop = |z: &SVector<f64, M>| SVector::<f64, N>::from_fn(|i, _| z[i]);
+        // Inside the region both of these are positive.
+        let margins = |x: &SVector<f64, N>| {
+            let (p, q) = lie_derivatives(system, x);
+            [-direction * p, direction * q]
+        };
+        // The clock of the flow starts at zero with each restart, so that short times keep their digits.
+        let mut t_base = self.t;
+        let mut fresh = true;
+        let mut local: Option<SlidingAtTwoFold<N>> = None;
+        let mut tried_at = f64::INFINITY;
+        method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY)?;
+        let next = loop {
+            let step = method.step(&flow)?;
+            let (before, after) = (step.x0[N], step.x1[N]);
+            let mut ends: Option<(f64, SlidingEnd)> = None;
+            let mut propose = |theta: f64, end: SlidingEnd| {
+                if ends.is_none_or(|(best, _)| theta < best) {
+                    ends = Some((theta, end));
+                }
+            };
+            for (i, side) in [Side::Plus, Side::Minus].into_iter().enumerate() {
+                let mut start = Start::Away;
+                if fresh {
+                    let l = self.lie(&self.x);
+                    let (value, zero, rate) = match side {
+                        Side::Plus => (-direction * l.p, l.zero_p, -(l.q * l.pp - l.p * l.pm)),
+                        Side::Minus => (direction * l.q, l.zero_q, l.q * l.mp - l.p * l.mm),
+                    };
+                    // Sliding that begins on a fold: the margin's own zero there is not an exit.
+                    if value <= zero {
+                        if rate <= 0.0 {
+                            propose(0.0, SlidingEnd::Fold(side));
+                            continue;
+                        }
+                        start = Start::Simple(rate * step.length());
+                    }
+                }
+                if let Some(zero) = first_zero(|s| margins(&drop(&step.at(s)))[i], start) {
+                    propose(zero.theta(), SlidingEnd::Fold(side));
+                }
+            }
+            fresh = false;
+            let clock = |s: f64| step.at(s)[N];
+            let mut stop_at = |moment: f64, end: SlidingEnd| {
+                if after >= moment {
+                    let theta = if after == moment {
+                        1.0
+                    } else {
+                        brent(|s| clock(s) - moment, 0.0, 1.0, before - moment, after - moment)
+                    };
+                    propose(theta, end);
+                }
+            };
+            stop_at(self.t_end - t_base, SlidingEnd::Time);
+            let mut arc = 0.0;
+            if let Some(plan) = sliding.plan {
+                stop_at(self.t - t_base + (plan.time - sliding.time), SlidingEnd::Planned);
+                let mut last = drop(&step.x0);
+                for k in 1..=CHORDS {
+                    let point = drop(&step.at(k as f64 / CHORDS as f64));
+                    let chord = (point - last).norm();
+                    if sliding.arc + arc + chord >= plan.arc {
+                        let part = (plan.arc - sliding.arc - arc) / chord;
+                        propose((k as f64 - 1.0 + part) / CHORDS as f64, SlidingEnd::Planned);
+                        break;
+                    }
+                    arc += chord;
+                    last = point;
+                }
+            }
+            let end = ends;
+            let theta = end.map_or(1.0, |(theta, _)| theta);
+            let z1 = step.at(theta);
+            let x1 = project(system, &drop(&z1));
+            let t1 = match end {
+                Some((_, SlidingEnd::Time)) => self.t_end,
+                _ => (t_base + z1[N]).min(self.t_end),
+            };
+            if end.is_some() && sliding.plan.is_some() {
+                let mut last = drop(&step.x0);
+                arc = 0.0;
+                for k in 1..=CHORDS {
+                    let point = drop(&step.at(theta * k as f64 / CHORDS as f64));
+                    arc += (point - last).norm();
+                    last = point;
+                }
+            }
+            sliding.time += t1 - self.t;
+            sliding.arc += arc;
+            let interpolant = InPhysicalTime { system, inner: step.interpolant, end: theta, clock: (before, z1[N]) };
+            let drift = system.switching(&drop(&z1)).abs();
+            idle = if t1 - self.t <= 4.0 * f64::EPSILON * t1.abs() { idle + 1 } else { 0 };
+            self.take(mode, t1, x1, &interpolant);
+            if let Some((_, end)) = end {
+                break Some(end);
+            }
+            if idle >= IDLE_STEPS {
+                return Err(self.non_transversal(
+                    "sliding runs into a point where both Lie derivatives vanish and which is not a regular two-fold",
+                ));
+            }
+            if self.stopped {
+                break Some(SlidingEnd::Time);
+            }
+            if method.statistics().steps > self.settings.max_steps {
+                break Some(SlidingEnd::Time);
+            }
+
+            // Running into a two-fold? Look again each time the Lie derivatives have halved.
+            let size = margins(&self.x).into_iter().fold(0.0, f64::max);
+            if size < 0.5 * tried_at {
+                tried_at = size;
+                // From far away Newton's method may have found another two-fold: trust only the latest answer.
+                if let Some(point) = locate(system, &self.x) {
+                    if local.as_ref().is_none_or(|l| (l.point - point).amax() > 1e-9 * (1.0 + point.amax())) {
+                        local = SlidingAtTwoFold::at(system, point);
+                    }
+                }
+            }
+            if let Some(fold) = &local {
+                let distance = (fold.point - self.x).norm();
+                if distance <= self.settings.leg * fold.radius {
+                    if let Some((leg, error)) = fold.time_to_arrive(system, &self.x, sliding.repelling) {
+                        break self.arrive(fold.point, leg, error, mode);
+                    }
+                }
+            }
+            if drift > 1e-10_f64.max(10.0 * self.settings.tolerance.atol) {
+                t_base = self.t;
+                method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY)?;
+            }
+        };
+        self.count(method.statistics())?;
+        let from = Some(mode);
+        match next {
+            None => match local {
+                Some(fold) if self.t < self.t_end && !self.stopped => Ok(State::TwoFold(Box::new(fold))),
+                Some(fold) if self.x == fold.point => Ok(State::TwoFold(Box::new(fold))),
+                _ => Ok(State::Sliding(sliding)),
+            },
+            Some(SlidingEnd::Time) => Ok(State::Sliding(sliding)),
+            Some(SlidingEnd::Planned) => {
+                let side = sliding.plan.map_or(Side::Plus, |plan| plan.side);
+                Ok(self.exit(side, sliding.time, sliding.arc, from))
+            }
+            Some(SlidingEnd::Fold(side)) => self.leave_at_fold(side, &sliding),
+        }
+    }
+
+    /// The last leg into a two-fold. `None`, as the loop's result, says that no other end was met.
+    fn arrive(&mut self, point: SVector<f64, N>, leg: f64, error: f64, mode: Mode) -> Option<SlidingEnd> {
+        let straight = Straight { system: self.system, from: self.x, to: point };
+        let t1 = self.t + leg;
+        if t1 > self.t_end {
+            let end = (self.t_end - self.t) / leg;
+            let x1 = straight.at(end);
+            self.take(mode, self.t_end, x1, &Truncated { inner: &straight, end });
+            return Some(SlidingEnd::Time);
+        }
+        self.take(mode, t1, point, &straight);
+        if !self.stopped {
+            self.event(EventKind::TwoFoldReached { leg, error }, Some(mode), None);
+        }
+        None
+    }
+
+    /// Sliding has come to a fold of the field of `side`.
+    fn leave_at_fold(&mut self, side: Side, sliding: &Sliding) -> Result<State<N>, FilippovError> {
+        let l = self.lie(&self.x);
+        let from = Some(sliding.mode());
+        if sliding.repelling {
+            // The edge of the repelling region is an invisible fold: only the other side is left to go to.
+            let to = side.other();
+            let (time, arc, rule) = (sliding.time, sliding.arc, self.chooser.rule);
+            let first = match to {
+                Side::Plus => l.p,
+                Side::Minus => -l.q,
+            };
+            if first <= 0.0 {
+                return Err(self.non_transversal("repelling sliding ends where both Lie derivatives vanish"));
+            }
+            self.event(EventKind::ExitAtBoundary { to, time, arc, rule }, from, Some(to.into()));
+            return Ok(State::Free { side: to, start: FlightStart::Transversal(first) });
+        }
+        let second = match side {
+            Side::Plus => l.pp,
+            Side::Minus => -l.mm,
+        };
+        if second <= 0.0 {
+            return Err(self.non_transversal("sliding ends at a fold that is not visible (a cusp or a two-fold)"));
+        }
+        self.event(EventKind::LeftByTangency { to: side }, from, Some(side.into()));
+        Ok(State::Free { side, start: FlightStart::Tangent(second) })
+    }
+
+    /// The future at a two-fold.
+    fn depart(&mut self, local: &SlidingAtTwoFold<N>) -> Result<State<N>, FilippovError> {
+        self.zeno = Zeno::default();
+        let [pp, _, _, mm] = local.second;
+        let growth = |side: Side| match side {
+            Side::Plus => pp,
+            Side::Minus => -mm,
+        };
+        let Some(plan) = self.chooser.plan() else {
+            return Ok(State::SetValued(None));
+        };
+        let (side, rule) = (plan.side, self.chooser.rule);
+        let curve = local.through.as_ref().or(local.back.as_ref());
+        let tangent = growth(side) > 0.0;
+        if tangent && (plan.at_once || curve.is_none()) {
+            self.event(EventKind::Exit { to: side, time: 0.0, arc: 0.0, rule }, None, Some(side.into()));
+            return Ok(State::Free { side, start: FlightStart::Tangent(growth(side)) });
+        }
+        let Some(curve) = curve else {
+            return Err(self.no_exit(
+                "no sliding motion leaves this two-fold and the fold of the side asked for is invisible; ask for the other side",
+            ));
+        };
+        let Some(limit) = local.departure_limit(self.system, curve) else {
+            return Err(self.non_transversal("the sliding direction at the two-fold is degenerate"));
+        };
+        let repelling = curve.rate < 0.0;
+        let mode = if repelling { Mode::SlidingRepelling } else { Mode::SlidingAttracting };
+        self.event(if repelling { EventKind::EnteredRepelling } else { EventKind::StartedOnSurface }, None, Some(mode));
+        let sign = curve.rate.signum();
+        let longest = curve.time(sign * limit);
+        let shortest = curve.time(sign * limit * self.settings.departure);
+        // Arc along the curve up to a time, by chords.
+        let arc_until = |t: f64| {
+            let (end, mut last, mut arc) = (curve.sigma(t, limit), local.point, 0.0);
+            for k in 1..=256 {
+                let point = curve.at(end * k as f64 / 256.0);
+                arc += (point - last).norm();
+                last = point;
+            }
+            arc
+        };
+        let mut planned = plan.time;
+        if plan.arc.is_finite() {
+            let excess = |t: f64| arc_until(t) - plan.arc;
+            let last = excess(longest);
+            planned = if last < 0.0 { f64::INFINITY } else { brent(excess, 0.0, longest, -plan.arc.max(1e-300), last) };
+        }
+        let planned = if repelling { planned.max(shortest) } else { f64::INFINITY };
+        let duration = planned.min(longest);
+        let whole = AlongCurve { curve, from: 0.0, to: duration, limit };
+        if self.t + duration > self.t_end {
+            let end = (self.t_end - self.t) / duration;
+            let x1 = project(self.system, &whole.at(end));
+            self.take(mode, self.t_end, x1, &Truncated { inner: &whole, end });
+            return Ok(State::Sliding(Sliding { repelling, plan: repelling.then_some(plan), time: 0.0, arc: 0.0 }));
+        }
+        let x1 = project(self.system, &whole.at(1.0));
+        self.take(mode, self.t + duration, x1, &whole);
+        let arc = arc_until(duration);
+        if repelling && planned <= longest {
+            return Ok(self.exit(side, duration, arc, Some(mode)));
+        }
+        Ok(State::Sliding(if repelling {
+            Sliding { repelling, plan: Some(plan), time: duration, arc }
+        } else {
+            Sliding::ATTRACTING
+        }))
+    }
+}

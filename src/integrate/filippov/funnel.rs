@@ -1,0 +1,109 @@
+//! The funnel: all futures of a set-valued point, indexed by exit time and side.
+
+use nalgebra::SVector;
+
+use super::engine::Departure;
+use super::two_fold::SlidingAtTwoFold;
+use super::{
+    End, ExitRule, FilippovError, FilippovSummary, Settings, Side, SlidingFlow, Trajectory, engine, flow::project,
+};
+use crate::model::{PiecewiseSmooth, VectorField};
+use crate::num::elementary::pow;
+
+/// Which members of the funnel to compute: exit times between the shortest and the longest, both sides of each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FunnelGrid {
+    /// The shortest time of repelling sliding.
+    pub shortest: f64,
+    /// The longest time of repelling sliding. Members whose repelling region ends earlier leave there.
+    pub longest: f64,
+    /// Number of times, at least 1; spaced geometrically, because the funnel is self-similar at a two-fold.
+    pub times: usize,
+    /// Follow each member at most so long after the set-valued point.
+    pub horizon: f64,
+    /// Stop a member when it next comes to a two-fold: there the funnel begins again.
+    pub until_two_fold: bool,
+    /// Recorded points a step.
+    pub per_step: usize,
+}
+
+/// One future.
+#[derive(Clone, Debug)]
+pub struct FunnelMember<const N: usize> {
+    /// Time of repelling sliding asked for.
+    pub exit_time: f64,
+    /// The side left to.
+    pub side: Side,
+    /// The orbit from the set-valued point on.
+    pub trajectory: Trajectory<N>,
+    /// How it ended.
+    pub summary: FilippovSummary<N>,
+}
+
+/// The orbit up to the set-valued point and its futures.
+#[derive(Clone, Debug)]
+pub struct Funnel<const N: usize> {
+    /// The orbit up to there.
+    pub approach: Trajectory<N>,
+    /// The moment at which the future becomes a set.
+    pub t: f64,
+    /// The point.
+    pub point: SVector<f64, N>,
+    /// The futures: by exit time, plus before minus.
+    pub members: Vec<FunnelMember<N>>,
+}
+
+/// Follows the orbit of `x0` to the first point where its future is a set, then that set: [`ExitRule::All`].
+///
+/// # Errors
+/// [`FilippovError::NoSuchExit`] if no set-valued point is reached by `t_end`; those of [`run`](super::run).
+pub fn funnel<P, const N: usize, const M: usize>(
+    system: &P,
+    x0: SVector<f64, N>,
+    t_end: f64,
+    settings: &Settings,
+    grid: &FunnelGrid,
+) -> Result<Funnel<N>, FilippovError>
+where
+    P: PiecewiseSmooth<N>,
+    for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
+{
+    let mut approach = Trajectory::new(grid.per_step);
+    let there = super::run(system, x0, t_end, settings, ExitRule::All, &mut approach)?;
+    if there.end != End::SetValued {
+        return Err(FilippovError::NoSuchExit {
+            t: there.t,
+            state: there.x.iter().copied().collect(),
+            why: "the orbit came to no set-valued point before the end time; extend the run",
+        });
+    }
+    let point = project(system, &there.x);
+    let departure = match there.mode {
+        None => Departure::TwoFold(SlidingAtTwoFold::near(system, &point)),
+        Some(_) => Departure::Repelling,
+    };
+    let mut members = Vec::with_capacity(2 * grid.times);
+    for k in 0..grid.times {
+        let fraction = if grid.times > 1 { k as f64 / (grid.times - 1) as f64 } else { 1.0 };
+        let exit_time = grid.shortest * pow(grid.longest / grid.shortest, fraction);
+        for side in [Side::Plus, Side::Minus] {
+            let mut trajectory = Trajectory::new(grid.per_step);
+            if grid.until_two_fold {
+                trajectory = trajectory.until_two_fold();
+            }
+            let rule = ExitRule::AfterTime { time: exit_time, side };
+            let summary = engine::run_from(
+                system,
+                there.t,
+                point,
+                departure.clone(),
+                there.t + grid.horizon,
+                settings,
+                rule,
+                &mut trajectory,
+            )?;
+            members.push(FunnelMember { exit_time, side, trajectory, summary });
+        }
+    }
+    Ok(Funnel { approach, t: there.t, point, members })
+}

@@ -1,0 +1,183 @@
+//! Truncated power series in one variable: the coefficients of a function of sigma up to a fixed order.
+//!
+//! A `Jet` is a [`Scalar`], so an equation written once also gives the Taylor coefficients of its value along a curve
+//! (Griewank & Walther 2008, ch. 13; the recurrences are those of Knuth, TAOCP 2, sec. 4.7). That is how the invariant
+//! curve of the sliding flow through a two-fold comes from the equations themselves.
+
+use std::cmp::Ordering;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+use super::Scalar;
+
+/// The series c_0 + c_1 sigma + ... + c_(K-1) sigma^(K-1), with everything from sigma^K on dropped. `K` is at least 1.
+#[derive(Clone, Copy, Debug)]
+pub struct Jet<const K: usize> {
+    /// The coefficients.
+    pub c: [f64; K],
+}
+
+impl<const K: usize> Jet<K> {
+    /// A constant.
+    pub fn constant(value: f64) -> Self {
+        let mut c = [0.0; K];
+        c[0] = value;
+        Self { c }
+    }
+
+    /// f(self) from a recurrence: `next(k, f)` gives k f_k from the coefficients before it, `first` is f_0.
+    fn recur(first: f64, mut next: impl FnMut(usize, &[f64; K]) -> f64) -> Self {
+        let mut f = [0.0; K];
+        f[0] = first;
+        for k in 1..K {
+            f[k] = next(k, &f) / k as f64;
+        }
+        Self { c: f }
+    }
+}
+
+impl<const K: usize> PartialEq for Jet<K> {
+    fn eq(&self, other: &Self) -> bool {
+        self.c[0] == other.c[0]
+    }
+}
+
+impl<const K: usize> PartialOrd for Jet<K> {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        self.c[0].partial_cmp(&other.c[0])
+    }
+}
+
+impl<const K: usize> Add for Jet<K> {
+    type Output = Self;
+    fn add(mut self, other: Self) -> Self {
+        self += other;
+        self
+    }
+}
+
+impl<const K: usize> AddAssign for Jet<K> {
+    fn add_assign(&mut self, other: Self) {
+        for (a, b) in self.c.iter_mut().zip(other.c) {
+            *a += b;
+        }
+    }
+}
+
+impl<const K: usize> Sub for Jet<K> {
+    type Output = Self;
+    fn sub(mut self, other: Self) -> Self {
+        self -= other;
+        self
+    }
+}
+
+impl<const K: usize> SubAssign for Jet<K> {
+    fn sub_assign(&mut self, other: Self) {
+        for (a, b) in self.c.iter_mut().zip(other.c) {
+            *a -= b;
+        }
+    }
+}
+
+impl<const K: usize> Mul for Jet<K> {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        let mut c = [0.0; K];
+        for (k, out) in c.iter_mut().enumerate() {
+            *out = (0..=k).map(|j| self.c[j] * other.c[k - j]).sum();
+        }
+        Self { c }
+    }
+}
+
+impl<const K: usize> Div for Jet<K> {
+    type Output = Self;
+    fn div(self, other: Self) -> Self {
+        let mut c = [0.0; K];
+        for k in 0..K {
+            let known: f64 = (0..k).map(|j| c[j] * other.c[k - j]).sum();
+            c[k] = (self.c[k] - known) / other.c[0];
+        }
+        Self { c }
+    }
+}
+
+impl<const K: usize> Neg for Jet<K> {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self { c: self.c.map(|v| -v) }
+    }
+}
+
+impl<const K: usize> Scalar for Jet<K> {
+    fn from_f64(value: f64) -> Self {
+        Self::constant(value)
+    }
+    fn to_f64(self) -> f64 {
+        self.c[0]
+    }
+    fn tanh(self) -> Self {
+        // t' = (1 - t^2) a'
+        Self::recur(Scalar::tanh(self.c[0]), |k, t| {
+            (1..=k)
+                .map(|j| {
+                    let square: f64 = (0..=k - j).map(|i| t[i] * t[k - j - i]).sum();
+                    let slope = if k == j { 1.0 - square } else { -square };
+                    j as f64 * self.c[j] * slope
+                })
+                .sum()
+        })
+    }
+    fn exp(self) -> Self {
+        Self::recur(Scalar::exp(self.c[0]), |k, e| (1..=k).map(|j| j as f64 * self.c[j] * e[k - j]).sum())
+    }
+    fn sin(self) -> Self {
+        sin_cos(&self).0
+    }
+    fn cos(self) -> Self {
+        sin_cos(&self).1
+    }
+    fn sqrt(self) -> Self {
+        // r^2 = a
+        let mut r = [0.0; K];
+        r[0] = Scalar::sqrt(self.c[0]);
+        for k in 1..K {
+            let known: f64 = (1..k).map(|j| r[j] * r[k - j]).sum();
+            r[k] = (self.c[k] - known) / (2.0 * r[0]);
+        }
+        Self { c: r }
+    }
+}
+
+fn sin_cos<const K: usize>(a: &Jet<K>) -> (Jet<K>, Jet<K>) {
+    let (mut s, mut c) = ([0.0; K], [0.0; K]);
+    (s[0], c[0]) = (Scalar::sin(a.c[0]), Scalar::cos(a.c[0]));
+    for k in 1..K {
+        s[k] = (1..=k).map(|j| j as f64 * a.c[j] * c[k - j]).sum::<f64>() / k as f64;
+        c[k] = -(1..=k).map(|j| j as f64 * a.c[j] * s[k - j]).sum::<f64>() / k as f64;
+    }
+    (Jet { c: s }, Jet { c })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn value(j: &Jet<16>, s: f64) -> f64 {
+        j.c.iter().rev().fold(0.0, |acc, c| acc * s + c)
+    }
+
+    #[test]
+    fn series_sum_to_the_function() {
+        let f = |x: f64| -> f64 {
+            Scalar::tanh(x) * Scalar::exp(-x) + Scalar::sin(x) / (2.0 + Scalar::cos(x)) - Scalar::sqrt(1.5 + x)
+        };
+        let mut x = Jet::<16>::constant(0.3);
+        x.c[1] = 1.0;
+        let one = Jet::constant(1.5);
+        let j = x.tanh() * (-x).exp() + x.sin() / (Jet::constant(2.0) + x.cos()) - (one + x).sqrt();
+        for s in [-0.1, 0.05, 0.12] {
+            assert!((value(&j, s) - f(0.3 + s)).abs() < 1e-12, "{s}");
+        }
+    }
+}
