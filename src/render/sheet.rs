@@ -446,6 +446,17 @@ pub enum PlaneLayer {
     Note(Note<[f64; 2]>),
 }
 
+impl PlaneLayer {
+    /// All positions of the layer.
+    pub fn positions(&self) -> &[[f64; 2]] {
+        match self {
+            Self::Dots { points, .. } | Self::Line { points, .. } | Self::Markers { points, .. } => points,
+            Self::Area { outline, .. } => outline,
+            Self::Note(note) => std::slice::from_ref(&note.at),
+        }
+    }
+}
+
 /// A chart in the plane.
 #[derive(Clone, Debug)]
 pub struct PlanePanel {
@@ -597,6 +608,17 @@ pub enum SpaceLayer {
     },
     /// A text, drawn on top.
     Note(Note<[f64; 3]>),
+}
+
+impl SpaceLayer {
+    /// All positions of the layer, without the corners of surfaces.
+    pub fn positions(&self) -> &[[f64; 3]] {
+        match self {
+            Self::Surface { .. } => &[],
+            Self::Line { points, .. } | Self::Markers { points, .. } => points,
+            Self::Note(note) => std::slice::from_ref(&note.at),
+        }
+    }
 }
 
 /// A chart in space, seen in orthographic projection. The first two axes are horizontal, the third points up.

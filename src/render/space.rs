@@ -95,11 +95,11 @@ fn corners() -> impl Iterator<Item = [bool; 3]> {
 /// The three edges that carry ticks: both horizontal axes along the lower rim nearest the viewer, the upright one at the left.
 fn ticked_edges(bounds: &Bounds, scale: f64) -> Vec<TickedEdge> {
     let towards = bounds.camera.towards;
-    let near = towards.map(|t| t > 0.0);
-    // Seen from below, the rim nearest the viewer is the lower one too, but it is then the far side that is in view.
+    // Seen from below, the lower rim that is in front of nothing is the far one.
+    let below = towards[2] < 0.0;
     let rim = |own: usize, other: usize| {
         let mut at = [false; 3];
-        at[other] = near[other];
+        at[other] = (towards[other] > 0.0) != below;
         (own, at)
     };
     let upright = {
@@ -170,7 +170,7 @@ fn labels(panel: &SpacePanel, bounds: &Bounds, scale: f64) -> Vec<Label> {
     for (edge, x, y, reach) in titles {
         let text = &panel.axes[edge.axis].title;
         if !text.is_empty() {
-            let beyond = reach / f64::from(UNITS_PER_POINT) + 1.5;
+            let beyond = reach / f64::from(UNITS_PER_POINT) + 3.0;
             let (rect, _) = label_rect([x, y], edge.out, text, style::LABEL_PT, beyond);
             labels.push(Label { text: text.clone(), size: style::LABEL_PT, rect });
         }
@@ -520,11 +520,26 @@ fn cut_curves(panel: &SpacePanel, bounds: &Bounds, chart: &Chart, buffer: &Depth
 }
 
 fn draw_curves(chart: &mut Chart, pieces: &[Piece], hidden: bool) -> Result<(), RenderError> {
-    for piece in pieces.iter().filter(|p| p.hidden == hidden) {
-        let share = 1.0 - (piece.level as f64 + 1.0) / style::DEPTH_LEVELS as f64;
-        let mut look = piece.style;
-        look.colour = look.colour.lighten(style::DEPTH_FADE * share);
-        chart.thinned_line(&piece.points, &look)?;
+    for level in pieces.chunk_by(|a, b| a.level == b.level) {
+        let chosen = || level.iter().filter(|p| p.hidden == hidden);
+        if !hidden {
+            // A white margin where a nearer curve passes over a farther one makes clear which is in front.
+            for piece in chosen() {
+                let casing = LineStyle::new(style::WHITE, piece.style.width + 2.0 * style::CASING_PT);
+                // The margin ends short of the piece, where the curve goes on in the next depth class.
+                let trim = 0.5 * casing.width * f64::from(UNITS_PER_POINT);
+                let trimmed = polyline::trim(&piece.points, trim / chart.units_per_value());
+                if trimmed.len() > 1 {
+                    chart.thinned_line(&trimmed, &casing)?;
+                }
+            }
+        }
+        for piece in chosen() {
+            let share = 1.0 - (piece.level as f64 + 1.0) / style::DEPTH_LEVELS as f64;
+            let mut look = piece.style;
+            look.colour = look.colour.lighten(style::DEPTH_FADE * share);
+            chart.thinned_line(&piece.points, &look)?;
+        }
     }
     Ok(())
 }
