@@ -110,7 +110,11 @@ fn four_spaces() -> Sheet {
 
 fn charts() -> Sheet {
     let cost = |c: f64, order: f64| -> Vec<[f64; 2]> {
-        (2..12).map(|k| [c * exp(f64::from(k) * 2.302585 / order), exp(-f64::from(k) * 2.302585)]).collect()
+        (2..12)
+            .map(|k| {
+                [c * exp(f64::from(k) * std::f64::consts::LN_10 / order), exp(-f64::from(k) * std::f64::consts::LN_10)]
+            })
+            .collect()
     };
     let mut work =
         PlanePanel::new(Axis::log("function evaluations", 50.0, 2e5), Axis::log("error at the end", 1e-12, 1e-1))

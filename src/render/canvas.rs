@@ -427,11 +427,6 @@ impl Chart<'_> {
         ]
     }
 
-    /// Units on the sheet to a unit of the horizontal axis.
-    pub fn units_per_value(&self) -> f64 {
-        f64::from(self.rect.w) / (self.x.upper - self.x.lower)
-    }
-
     /// Place of a point on the sheet, to the nearest unit.
     pub fn position(&self, p: &[f64; 2]) -> Position {
         let (x, y) = (&self.x, &self.y);

@@ -97,10 +97,10 @@ pub fn kern(left: Glyph, right: Glyph) -> f64 {
                 matrix.get((classes.0.get(left.id), classes.1.get(right.id)))
             }
         };
-        if let Some((first, _)) = value {
-            if first.x_advance != 0 {
-                return f64::from(first.x_advance) / f64::from(font.face.units_per_em());
-            }
+        if let Some((first, _)) = value
+            && first.x_advance != 0
+        {
+            return f64::from(first.x_advance) / f64::from(font.face.units_per_em());
         }
     }
     0.0

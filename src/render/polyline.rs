@@ -186,30 +186,6 @@ pub fn dashes(points: &[[f64; 2]], on: f64, off: f64) -> Vec<Vec<[f64; 2]>> {
     parts
 }
 
-/// A polyline shortened by a length at both ends; empty if nothing is left.
-pub fn trim(points: &[[f64; 2]], length: f64) -> Vec<[f64; 2]> {
-    let once = |points: &[[f64; 2]]| -> Vec<[f64; 2]> {
-        let mut left = length;
-        for (i, pair) in points.windows(2).enumerate() {
-            let (a, b) = (pair[0], pair[1]);
-            let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-            let size = (dx * dx + dy * dy).sqrt();
-            if size > left {
-                let mut rest = vec![[a[0] + dx * left / size, a[1] + dy * left / size]];
-                rest.extend_from_slice(&points[i + 1..]);
-                return rest;
-            }
-            left -= size;
-        }
-        Vec::new()
-    };
-    let mut shortened = once(points);
-    shortened.reverse();
-    let mut shortened = once(&shortened);
-    shortened.reverse();
-    shortened
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -255,12 +231,6 @@ mod tests {
             let nearest = thinned.windows(2).map(|w| distance_squared(*p, w[0], w[1])).fold(f64::INFINITY, f64::min);
             assert!(nearest <= 1.6e-3 * 1.6e-3, "{nearest}");
         }
-    }
-
-    #[test]
-    fn trimming_takes_the_same_length_off_both_ends() {
-        assert_eq!(trim(&[[0.0, 0.0], [1.0, 0.0], [1.0, 2.0]], 0.5), [[0.5, 0.0], [1.0, 0.0], [1.0, 1.5]]);
-        assert!(trim(&[[0.0, 0.0], [1.0, 0.0]], 0.5).is_empty());
     }
 
     #[test]

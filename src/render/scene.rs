@@ -139,22 +139,22 @@ impl Scene {
         if line.is_empty() {
             return;
         }
-        if let Some(Item::Stroke { paint: p, width: w, lines }) = self.items.last_mut() {
-            if *p == paint && *w == width {
-                lines.push(line);
-                return;
-            }
+        if let Some(Item::Stroke { paint: p, width: w, lines }) = self.items.last_mut()
+            && (*p, *w) == (paint, width)
+        {
+            lines.push(line);
+            return;
         }
         self.items.push(Item::Stroke { paint, width, lines: vec![line] });
     }
 
     /// Adds a disc, to the last item if that has the same paint and size.
     pub fn dot(&mut self, paint: Paint, diameter: i32, centre: Position) {
-        if let Some(Item::Dots { paint: p, diameter: d, centres }) = self.items.last_mut() {
-            if *p == paint && *d == diameter {
-                centres.push(centre);
-                return;
-            }
+        if let Some(Item::Dots { paint: p, diameter: d, centres }) = self.items.last_mut()
+            && (*p, *d) == (paint, diameter)
+        {
+            centres.push(centre);
+            return;
         }
         self.items.push(Item::Dots { paint, diameter, centres: vec![centre] });
     }

@@ -634,7 +634,7 @@ pub struct SpacePanel {
     pub elevation: f64,
     /// Whether box, grid, ticks and axis titles are drawn.
     pub boxed: bool,
-    /// Height divided by width of the drawing area; if absent, the sheet's.
+    /// Height divided by width of the drawing area; if absent, what the box needs, at most the sheet's.
     pub aspect: Option<f64>,
     /// What is drawn.
     pub layers: Vec<SpaceLayer>,

@@ -66,7 +66,7 @@ pub const GRID_PT: f64 = 0.4;
 /// Default width of a curve.
 pub const CURVE_PT: f64 = 0.8;
 /// White margin on either side of a curve in space where it passes in front of another.
-pub const CASING_PT: f64 = 0.45;
+pub const CASING_PT: f64 = 0.4;
 /// White margin around the letters of a note.
 pub const HALO_PT: f64 = 0.9;
 /// Length of a major tick.
@@ -100,6 +100,6 @@ pub const DENSITY_LEVELS: usize = 6;
 /// Share of white mixed into the least dense points under density shading.
 pub const DENSITY_LIGHTEST: f64 = 0.52;
 /// Number of depth classes of a 3D curve.
-pub const DEPTH_LEVELS: usize = 6;
+pub const DEPTH_LEVELS: usize = 8;
 /// Share of white mixed into the farthest part of a 3D curve.
 pub const DEPTH_FADE: f64 = 0.6;

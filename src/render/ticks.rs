@@ -57,7 +57,7 @@ pub fn linear(lower: f64, upper: f64, wanted: f64) -> Ticks {
     }
     // Very large or small numbers share a power of ten, which goes into every label: no separate exponent is overlooked.
     let largest = lower.abs().max(upper.abs());
-    let shift = if largest >= 1e5 || largest < 1e-3 { elementary::log10(largest).floor() as i32 } else { 0 };
+    let shift = if !(1e-3..1e5).contains(&largest) { elementary::log10(largest).floor() as i32 } else { 0 };
     let major = (first..=last)
         .map(|k| Tick { value: decimal(k * mantissa, exponent), label: label(k * mantissa, exponent, shift) })
         .collect();
