@@ -1,4 +1,4 @@
-//! Draws a gallery of made-up data with every kind of panel, to look at. `cargo run --release --example render_gallery -- OUTDIR`
+//! Draws a gallery of made-up data with every kind of panel, to look at. `cargo run --release --example render_gallery -- OUTDIR [NAME]`
 
 use twofold::num::elementary::{cos, exp, sin};
 use twofold::render::render;
@@ -213,7 +213,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ("charts", charts()),
         ("edge", edge_cases()),
     ];
-    for (name, sheet) in all {
+    let only = std::env::args().nth(2);
+    for (name, sheet) in all.into_iter().filter(|(name, _)| only.as_deref().is_none_or(|o| o == *name)) {
         let started = std::time::Instant::now();
         let picture = render(&sheet)?;
         println!(

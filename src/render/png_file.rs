@@ -28,7 +28,11 @@ pub fn write(pixels: &Pixels, title: &str, description: &str, sealed: &Sealed) -
         }
         None => {
             info.color_type = ColorType::Rgb;
-            pixels.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
+            let mut rgb = vec![0; pixels.rgba.len() / 4 * 3];
+            for (to, from) in rgb.chunks_exact_mut(3).zip(pixels.rgba.chunks_exact(4)) {
+                to.copy_from_slice(&from[..3]);
+            }
+            rgb
         }
     };
     let mut file = Vec::new();
