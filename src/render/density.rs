@@ -36,8 +36,7 @@ pub fn arrange(places: &[Position], look: &DotStyle) -> Cloud {
     });
     // An even number of units, because a circle is drawn by its radius.
     let diameter = (units(diameter) / 2 * 2).max(2);
-    let few = style::DOT_DIAMETER_PT[2].0;
-    if !look.density || counts.occupied <= few {
+    if !look.density || counts.occupied <= style::DENSITY_FROM {
         return Cloud { diameter, groups: vec![Group { colour: look.colour, members: order }] };
     }
     let density: Vec<u32> = order.iter().map(|i| counts.around(places[*i])).collect();

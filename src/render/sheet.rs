@@ -621,7 +621,8 @@ impl SpaceLayer {
     }
 }
 
-/// A chart in space, seen in orthographic projection. The first two axes are horizontal, the third points up.
+/// A chart in space, seen in orthographic projection. The first two axes are horizontal, the third points up; all are linear. Curves and
+/// surfaces are cut off at the box.
 #[derive(Clone, Debug)]
 pub struct SpacePanel {
     /// The two horizontal axes and the upright one.

@@ -94,11 +94,14 @@ pub const DOTTED_PT: (f64, f64) = (0.05, 2.0);
 
 /// Diameter of a point by how many distinguishable places (cells of half a point) its layer occupies: few points are drawn large
 /// enough to be found at a glance, many small enough to show structure. Pairs (at most this many places, diameter).
-pub const DOT_DIAMETER_PT: [(usize, f64); 5] = [(16, 4.2), (150, 2.0), (1_500, 1.2), (6_000, 0.9), (usize::MAX, 0.7)];
+pub const DOT_DIAMETER_PT: [(usize, f64); 6] =
+    [(16, 4.2), (80, 2.2), (300, 1.5), (1_500, 1.15), (6_000, 0.8), (usize::MAX, 0.55)];
+/// Number of places above which a layer is shaded by density, if it asks for that.
+pub const DENSITY_FROM: usize = 1_500;
 /// Number of lightness steps of density shading.
 pub const DENSITY_LEVELS: usize = 6;
 /// Share of white mixed into the least dense points under density shading.
-pub const DENSITY_LIGHTEST: f64 = 0.52;
+pub const DENSITY_LIGHTEST: f64 = 0.45;
 /// Number of depth classes of a 3D curve.
 pub const DEPTH_LEVELS: usize = 8;
 /// Share of white mixed into the farthest part of a 3D curve.

@@ -335,3 +335,38 @@ fn what_lies_behind_a_surface_is_drawn_before_it_and_the_rest_after() {
     assert!(order(near), "a line in front of a wall is drawn after it");
     assert!(!order(far), "a line behind a wall is drawn before it");
 }
+
+#[test]
+fn region_colours_differ_in_greyscale() {
+    // Relative luminance (IEC 61966-2-1) of each region as it appears on paper.
+    let share = f64::from(style::SURFACE_OPACITY) / 100.0;
+    let luminance = |c: Colour| {
+        let seen = c.lighten(1.0 - share);
+        let linear = |v: u8| {
+            let v = f64::from(v) / 255.0;
+            if v <= 0.04045 { v / 12.92 } else { crate::num::elementary::pow((v + 0.055) / 1.055, 2.4) }
+        };
+        0.2126 * linear(seen.r) + 0.7152 * linear(seen.g) + 0.0722 * linear(seen.b)
+    };
+    let [a, r, c] = [style::ATTRACTING, style::REPELLING, style::CROSSING].map(luminance);
+    assert!(r - a > 0.15 && c - r > 0.15, "{a} {r} {c}");
+}
+
+#[test]
+fn density_shading_never_changes_where_points_are() {
+    let points: Vec<[f64; 2]> = (0..40_000).map(|i| [f64::from(i % 211) / 211.0, f64::from(i / 211) / 190.0]).collect();
+    let places = |density: bool| {
+        let look = DotStyle { density, ..DotStyle::late() };
+        let panel = PlanePanel::new(Axis::linear("", 0.0, 1.0), Axis::linear("", 0.0, 1.0)).dots(points.clone(), look);
+        let scene = layout::draw(&Sheet::new(ColumnWidth::Double, 1, "").panel("", "", panel)).unwrap();
+        let mut all: Vec<Position> = scene
+            .items
+            .into_iter()
+            .filter_map(|i| if let Item::Dots { centres, .. } = i { Some(centres) } else { None })
+            .flatten()
+            .collect();
+        all.sort_unstable();
+        all
+    };
+    assert_eq!(places(true), places(false));
+}
