@@ -1,4 +1,4 @@
-//! Draws a gallery of made-up data with every kind of panel, to look at. `cargo run --release --example render_gallery -- OUTDIR`
+//! Draws a gallery of made-up data with every kind of panel, to look at. `cargo run --release --example render_gallery -- OUTDIR [NAME]`
 
 use twofold::num::elementary::{cos, exp, sin};
 use twofold::render::render;
@@ -110,7 +110,11 @@ fn four_spaces() -> Sheet {
 
 fn charts() -> Sheet {
     let cost = |c: f64, order: f64| -> Vec<[f64; 2]> {
-        (2..12).map(|k| [c * exp(f64::from(k) * 2.302585 / order), exp(-f64::from(k) * 2.302585)]).collect()
+        (2..12)
+            .map(|k| {
+                [c * exp(f64::from(k) * std::f64::consts::LN_10 / order), exp(-f64::from(k) * std::f64::consts::LN_10)]
+            })
+            .collect()
     };
     let mut work =
         PlanePanel::new(Axis::log("function evaluations", 50.0, 2e5), Axis::log("error at the end", 1e-12, 1e-1))
@@ -162,6 +166,34 @@ fn charts() -> Sheet {
         .panel("(c)", "sketch", sketch)
 }
 
+fn helix() -> SpacePanel {
+    let unit = |t: &str| Axis::linear(t, -1.0, 1.0);
+    let turn = |from: u32, to: u32| {
+        (from..to).map(|i| f64::from(i) * 0.02).map(|t| [0.8 * cos(t), 0.8 * sin(t), t / 8.0 - 1.0]).collect()
+    };
+    let plane = grid_surface(
+        (-1.0, 1.0, 20),
+        (-1.0, 1.0, 20),
+        |u, v| [u, v, 0.0],
+        |u, v| {
+            if u > 0.0 && v > 0.0 {
+                style::ATTRACTING
+            } else if u < 0.0 && v < 0.0 {
+                style::REPELLING
+            } else {
+                style::CROSSING
+            }
+        },
+    );
+    SpacePanel::new(unit("*x*"), unit("*y*"), unit("*z*"))
+        .surface(plane)
+        .line(turn(0, 300), LineStyle::default())
+        .arrow(turn(299, 500), LineStyle::new(style::BLUE, 1.2))
+        .line(turn(499, 780), LineStyle::new(style::VERMILLION, 1.0).dashed())
+        .arrow(vec![[0.0, 0.0, 0.0], [0.0, 0.0, 0.8]], LineStyle::default())
+        .note([0.0, 0.0, 0.8], "*h* > 0", Anchor::Above)
+}
+
 fn edge_cases() -> Sheet {
     Sheet::new(ColumnWidth::Double, 4, "Edge cases.")
         .title("Edge cases")
@@ -197,6 +229,8 @@ fn edge_cases() -> Sheet {
             )
             .camera(40.0, -20.0),
         )
+        .panel("(f)", "unboxed", helix().unboxed())
+        .panel("(g)", "dashed", helix())
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -209,7 +243,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ("charts", charts()),
         ("edge", edge_cases()),
     ];
-    for (name, sheet) in all {
+    let only = std::env::args().nth(2);
+    for (name, sheet) in all.into_iter().filter(|(name, _)| only.as_deref().is_none_or(|o| o == *name)) {
         let started = std::time::Instant::now();
         let picture = render(&sheet)?;
         println!(

@@ -13,6 +13,10 @@ use super::font::{CAP_HEIGHT, Cut};
 use super::rich_text::{self, RichTextError, Turn};
 use super::scene::{Paint, Scene, UNITS_PER_POINT, units};
 use super::sheet::Colour;
+use super::style::{HALO_PT, WHITE};
+
+/// A font family name that asks for a white margin around the letters: a text style of plotters has no other place to say so.
+pub const HALO_FAMILY: &str = "serif with halo";
 
 /// The backend.
 pub struct SceneBackend<'a> {
@@ -93,7 +97,7 @@ impl DrawingBackend for SceneBackend<'_> {
             // A ring is a disc with a smaller one of paper on top: no curve has to be stroked.
             let width = style.stroke_width() as i32;
             self.scene.dot(paint(style.color()), 2 * radius as i32 + width, center);
-            self.scene.dot(Paint { colour: super::style::WHITE, opacity: 100 }, 2 * radius as i32 - width, center);
+            self.scene.dot(Paint { colour: WHITE, opacity: 100 }, 2 * radius as i32 - width, center);
         }
         Ok(())
     }
@@ -124,6 +128,9 @@ impl DrawingBackend for SceneBackend<'_> {
             _ => ((pos.0 + along, pos.1 + below), Turn::Level),
         };
         let path = line.outlines(size, origin, turn);
+        if style.family().as_str() == HALO_FAMILY {
+            self.scene.halo(&path, units(2.0 * HALO_PT));
+        }
         self.scene.text(paint(style.color()), path, line.plain);
         Ok(())
     }

@@ -6,7 +6,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::RenderError;
-use super::backend::SceneBackend;
+use super::backend::{HALO_FAMILY, SceneBackend};
 use super::density;
 use super::font::CAP_HEIGHT;
 use super::polyline;
@@ -101,6 +101,8 @@ pub struct Type {
     pub bold: bool,
     /// Whether it runs upwards.
     pub upwards: bool,
+    /// Whether the letters have a white margin.
+    pub halo: bool,
     /// Horizontal anchor.
     pub h: HPos,
     /// Vertical anchor; `Bottom` is the baseline.
@@ -110,7 +112,7 @@ pub struct Type {
 impl Type {
     /// Text of this size, anchored by the left end of its baseline.
     pub fn new(size: f64) -> Self {
-        Self { size, colour: style::INK, bold: false, upwards: false, h: HPos::Left, v: VPos::Bottom }
+        Self { size, colour: style::INK, bold: false, upwards: false, halo: false, h: HPos::Left, v: VPos::Bottom }
     }
 
     /// With another colour.
@@ -128,6 +130,12 @@ impl Type {
     /// Bold.
     pub fn bold(mut self) -> Self {
         self.bold = true;
+        self
+    }
+
+    /// With a white margin around the letters.
+    pub fn halo(mut self) -> Self {
+        self.halo = true;
         self
     }
 
@@ -164,7 +172,8 @@ impl<'a> Canvas<'a> {
             return Ok(());
         }
         let cut = if how.bold { FontStyle::Bold } else { FontStyle::Normal };
-        let mut font = ("serif", how.size * f64::from(UNITS_PER_POINT), cut).into_font();
+        let family = if how.halo { HALO_FAMILY } else { "serif" };
+        let mut font = (family, how.size * f64::from(UNITS_PER_POINT), cut).into_font();
         if how.upwards {
             font = font.transform(FontTransform::Rotate270);
         }
@@ -277,7 +286,7 @@ impl<'a> Canvas<'a> {
         self.polygon(vec![at(-0.25, 0.0), at(0.75, 0.36), at(0.55, 0.0), at(0.75, -0.36)], look.colour, look.opacity)
     }
 
-    /// Sets a note at a place on the sheet, on a white veil.
+    /// Sets a note at a place on the sheet.
     pub fn note<P>(&self, note: &Note<P>, at: Position) -> Result<(), RenderError> {
         let width = text_width(&note.text, note.size);
         let (cap, gap) = (units(CAP_HEIGHT * note.size), units(0.45 * note.size));
@@ -288,10 +297,7 @@ impl<'a> Canvas<'a> {
             Anchor::Above => (at.0 - width / 2, at.1 - gap),
             Anchor::Below => (at.0 - width / 2, at.1 + gap + cap),
         };
-        let pad = units(0.12 * note.size);
-        let veil = Rect { x: x - pad, y: baseline - cap - pad, w: width + 2 * pad, h: cap + 2 * pad + pad };
-        self.fill(veil, style::WHITE, 70)?;
-        self.text(&note.text, (x, baseline), Type::new(note.size).colour(note.colour))
+        self.text(&note.text, (x, baseline), Type::new(note.size).colour(note.colour).halo())
     }
 
     /// Width of a legend entry.

@@ -28,74 +28,119 @@ const SAME: i32 = 3;
 
 /// Arranges points at the given places on the sheet.
 pub fn arrange(places: &[Position], look: &DotStyle) -> Cloud {
-    let mut order: Vec<(i32, i32, usize)> =
-        places.iter().enumerate().map(|(i, p)| (p.1.div_euclid(SAME), p.0.div_euclid(SAME), i)).collect();
-    order.sort_unstable();
-    // The first point of each cell stands for it.
-    order.dedup_by_key(|c| (c.0, c.1));
-    let mut cells: Vec<(i32, i32)> = places.iter().map(|p| (p.1.div_euclid(PLACE), p.0.div_euclid(PLACE))).collect();
-    cells.sort_unstable();
-    let occupied = cells.chunk_by(|a, b| a == b).count();
+    let order = distinct(places);
+    let counts = Counts::new(places);
     let diameter = look.diameter.unwrap_or_else(|| {
-        let fitting = style::DOT_DIAMETER_PT.iter().find(|(most, _)| occupied <= *most);
+        let fitting = style::DOT_DIAMETER_PT.iter().find(|(most, _)| counts.occupied <= *most);
         fitting.map_or(style::DOT_DIAMETER_PT[0].1, |f| f.1)
     });
     // An even number of units, because a circle is drawn by its radius.
     let diameter = (units(diameter) / 2 * 2).max(2);
-    let few = style::DOT_DIAMETER_PT[2].0;
-    if !look.density || occupied <= few {
-        let members = order.into_iter().map(|c| c.2).collect();
-        return Cloud { diameter, groups: vec![Group { colour: look.colour, members }] };
+    if !look.density || counts.occupied <= style::DENSITY_FROM {
+        return Cloud { diameter, groups: vec![Group { colour: look.colour, members: order }] };
     }
-    let counts = neighbourhood_counts(&cells);
-    let count_at = |p: Position| {
-        let cell = (p.1.div_euclid(PLACE), p.0.div_euclid(PLACE));
-        counts.binary_search_by_key(&cell, |c| c.0).map_or(1, |i| counts[i].1)
-    };
-    let mut sorted: Vec<u32> = order.iter().map(|c| count_at(places[c.2])).collect();
+    let density: Vec<u32> = order.iter().map(|i| counts.around(places[*i])).collect();
+    let mut sorted = density.clone();
     sorted.sort_unstable();
     // From the fifth to the 95th percentile of density on a logarithmic scale: single outliers do not set the scale.
-    let quantile = |q: usize| elementary::ln(f64::from(sorted[(sorted.len() - 1) * q / 100].max(1)));
+    let logarithm = |count: u32| elementary::ln(f64::from(count.max(1)));
+    let quantile = |q: usize| logarithm(sorted[(sorted.len() - 1) * q / 100]);
     let (thin, dense) = (quantile(5), quantile(95));
     let top = style::DENSITY_LEVELS - 1;
+    let level = |count: u32| {
+        let share = if dense > thin { ((logarithm(count) - thin) / (dense - thin)).clamp(0.0, 1.0) } else { 1.0 };
+        (share * top as f64).round() as usize
+    };
+    let most = sorted.last().map_or(0, |m| *m as usize);
+    let levels: Vec<usize> = (0..=most.min(4096)).map(|count| level(count as u32)).collect();
     let mut groups: Vec<Group> = (0..style::DENSITY_LEVELS)
         .map(|level| {
             let white = style::DENSITY_LIGHTEST * (1.0 - level as f64 / top as f64);
             Group { colour: look.colour.lighten(white), members: Vec::new() }
         })
         .collect();
-    for (_, _, i) in order {
-        let density = elementary::ln(f64::from(count_at(places[i]).max(1)));
-        let share = if dense > thin { ((density - thin) / (dense - thin)).clamp(0.0, 1.0) } else { 1.0 };
-        groups[(share * top as f64).round() as usize].members.push(i);
+    for (i, count) in order.into_iter().zip(density) {
+        let level = levels.get(count as usize).copied().unwrap_or_else(|| level(count));
+        groups[level].members.push(i);
     }
     Cloud { diameter, groups }
 }
 
-/// For every occupied cell, the number of points in it and the eight cells around it; sorted by cell.
-fn neighbourhood_counts(sorted_cells: &[(i32, i32)]) -> Vec<((i32, i32), u32)> {
-    let own: Vec<((i32, i32), u32)> =
-        sorted_cells.chunk_by(|a, b| a == b).map(|run| (run[0], run.len() as u32)).collect();
-    let mut sums: Vec<u32> = own.iter().map(|c| c.1).collect();
-    // A row above and a row below are walked along with the row itself.
-    for shift in [-1, 1] {
-        let mut k = 0;
-        for i in 0..own.len() {
-            let (row, column) = own[i].0;
-            if i > 0 && own[i - 1].0 == (row, column + shift) {
-                sums[i] += own[i - 1].1;
-            }
-            if i + 1 < own.len() && own[i + 1].0 == (row, column + shift) {
-                sums[i] += own[i + 1].1;
-            }
-            let first = (row + shift, column - 1);
-            while k < own.len() && own[k].0 < first {
-                k += 1;
-            }
-            sums[i] += own[k..].iter().take_while(|c| c.0 <= (row + shift, column + 1)).map(|c| c.1).sum::<u32>();
-        }
+/// One point for each cell of side [`SAME`], the first given, in rows from the top: neighbours follow each other, which keeps the
+/// vector files small.
+fn distinct(places: &[Position]) -> Vec<usize> {
+    let Some(bounds) = Bounds::of(places, SAME) else { return Vec::new() };
+    if bounds.rows > 1 << 20 || bounds.columns > 1 << 20 || places.len() > 1 << 24 {
+        // Far beyond any sheet; the packed keys below would not hold it.
+        return (0..places.len()).collect();
     }
-    own.iter().zip(sums).map(|(c, s)| (c.0, s)).collect()
+    let mut keys: Vec<u64> = places
+        .iter()
+        .enumerate()
+        .map(|(i, p)| {
+            let (row, column) = bounds.cell(*p);
+            (row as u64) << 44 | (column as u64) << 24 | i as u64
+        })
+        .collect();
+    keys.sort_unstable();
+    keys.dedup_by_key(|k| *k >> 24);
+    keys.into_iter().map(|k| (k & 0xff_ffff) as usize).collect()
+}
+
+/// A grid of square cells over the places of points.
+struct Bounds {
+    first: (i32, i32),
+    side: i32,
+    rows: usize,
+    columns: usize,
+}
+
+impl Bounds {
+    fn of(places: &[Position], side: i32) -> Option<Self> {
+        let low = |f: fn(&Position) -> i32| places.iter().map(f).min();
+        let high = |f: fn(&Position) -> i32| places.iter().map(f).max();
+        let (x0, y0) = (low(|p| p.0)?.div_euclid(side), low(|p| p.1)?.div_euclid(side));
+        let (x1, y1) = (high(|p| p.0)?.div_euclid(side), high(|p| p.1)?.div_euclid(side));
+        Some(Self { first: (x0, y0), side, rows: (y1 - y0 + 1) as usize, columns: (x1 - x0 + 1) as usize })
+    }
+
+    /// Row and column of the cell that holds a place.
+    fn cell(&self, p: Position) -> (usize, usize) {
+        ((p.1.div_euclid(self.side) - self.first.1) as usize, (p.0.div_euclid(self.side) - self.first.0) as usize)
+    }
+}
+
+/// How many points lie in each cell of side [`PLACE`].
+struct Counts {
+    bounds: Option<Bounds>,
+    cells: Vec<u32>,
+    occupied: usize,
+}
+
+impl Counts {
+    fn new(places: &[Position]) -> Self {
+        let bounds = Bounds::of(places, PLACE);
+        let mut cells = vec![0u32; bounds.as_ref().map_or(0, |b| b.rows * b.columns)];
+        let mut occupied = 0;
+        if let Some(b) = &bounds {
+            for p in places {
+                let (row, column) = b.cell(*p);
+                let cell = &mut cells[row * b.columns + column];
+                occupied += usize::from(*cell == 0);
+                *cell += 1;
+            }
+        }
+        Self { bounds, cells, occupied }
+    }
+
+    /// Number of points in the cell of a place and the eight around it.
+    fn around(&self, p: Position) -> u32 {
+        let Some(b) = &self.bounds else { return 0 };
+        let (row, column) = b.cell(p);
+        let columns = column.saturating_sub(1)..(column + 2).min(b.columns);
+        let rows = row.saturating_sub(1)..(row + 2).min(b.rows);
+        rows.map(|r| self.cells[r * b.columns..][columns.clone()].iter().sum::<u32>()).sum()
+    }
 }
 
 #[cfg(test)]
@@ -126,11 +171,18 @@ mod tests {
 
     #[test]
     fn neighbourhoods_count_all_nine_cells() {
-        let mut cells = vec![(0, 0), (0, 1), (0, 1), (1, 2), (-1, 0), (5, 5), (0, 3)];
-        cells.sort_unstable();
-        let counts = neighbourhood_counts(&cells);
-        let brute =
-            |c: (i32, i32)| cells.iter().filter(|d| (d.0 - c.0).abs() <= 1 && (d.1 - c.1).abs() <= 1).count() as u32;
-        assert!(counts.iter().all(|(c, n)| *n == brute(*c)), "{counts:?}");
+        let cells = [(0, 0), (0, 1), (0, 1), (1, 2), (-1, 0), (5, 5), (0, 3), (-1, -1)];
+        let places: Vec<Position> = cells.iter().map(|c| (c.0 * PLACE + 3, c.1 * PLACE + PLACE - 1)).collect();
+        let counts = Counts::new(&places);
+        assert_eq!(counts.occupied, 7);
+        for (p, c) in places.iter().zip(&cells) {
+            let near = cells.iter().filter(|d| (d.0 - c.0).abs() <= 1 && (d.1 - c.1).abs() <= 1).count();
+            assert_eq!(counts.around(*p) as usize, near, "{c:?}");
+        }
+    }
+
+    #[test]
+    fn no_points_make_an_empty_cloud() {
+        assert!(arrange(&[], &DotStyle::late()).groups.iter().all(|g| g.members.is_empty()));
     }
 }

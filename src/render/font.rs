@@ -8,6 +8,7 @@ use ttf_parser::{Face, GlyphId, OutlineBuilder, Tag};
 static REGULAR: &[u8] = include_bytes!("../../assets/fonts/LibertinusSerif-Regular.otf");
 static ITALIC: &[u8] = include_bytes!("../../assets/fonts/LibertinusSerif-Italic.otf");
 static BOLD: &[u8] = include_bytes!("../../assets/fonts/LibertinusSerif-Bold.otf");
+static BOLD_ITALIC: &[u8] = include_bytes!("../../assets/fonts/LibertinusSerif-BoldItalic.otf");
 
 /// A cut of the font family.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,12 +17,14 @@ pub enum Cut {
     Regular,
     /// Italic: variables.
     Italic,
-    /// Bold: panel labels, warnings.
+    /// Bold: headings, panel labels, warnings.
     Bold,
+    /// Variables among bold text.
+    BoldItalic,
 }
 
 /// Height of capitals as a share of the font size.
-pub const CAP_HEIGHT: f64 = 0.645;
+pub const CAP_HEIGHT: f64 = 0.658;
 
 struct Loaded {
     face: Face<'static>,
@@ -29,12 +32,13 @@ struct Loaded {
 }
 
 fn loaded(cut: Cut) -> &'static Loaded {
-    static FONTS: OnceLock<[Loaded; 3]> = OnceLock::new();
-    let fonts = FONTS.get_or_init(|| [REGULAR, ITALIC, BOLD].map(load));
+    static FONTS: OnceLock<[Loaded; 4]> = OnceLock::new();
+    let fonts = FONTS.get_or_init(|| [REGULAR, ITALIC, BOLD, BOLD_ITALIC].map(load));
     match cut {
         Cut::Regular => &fonts[0],
         Cut::Italic => &fonts[1],
         Cut::Bold => &fonts[2],
+        Cut::BoldItalic => &fonts[3],
     }
 }
 
@@ -93,10 +97,10 @@ pub fn kern(left: Glyph, right: Glyph) -> f64 {
                 matrix.get((classes.0.get(left.id), classes.1.get(right.id)))
             }
         };
-        if let Some((first, _)) = value {
-            if first.x_advance != 0 {
-                return f64::from(first.x_advance) / f64::from(font.face.units_per_em());
-            }
+        if let Some((first, _)) = value
+            && first.x_advance != 0
+        {
+            return f64::from(first.x_advance) / f64::from(font.face.units_per_em());
         }
     }
     0.0
@@ -171,8 +175,8 @@ mod tests {
 
     #[test]
     fn every_cut_has_the_letters_and_the_regular_one_the_signs() {
-        for cut in [Cut::Regular, Cut::Italic, Cut::Bold] {
-            for c in "AZaz09()[]+,.;:=/αβγδεθλμνπρσφψωΓΔΛΣΦΨΩ".chars() {
+        for cut in [Cut::Regular, Cut::Italic, Cut::Bold, Cut::BoldItalic] {
+            for c in "AZaz09()[]+,.;:=/αβγδεθλμνπρσφψωΓΔΛΣΦΨΩ−×≤".chars() {
                 let g = glyph(cut, c).unwrap();
                 assert_eq!(g.cut, cut, "{c}");
                 assert!(!outline(g).is_empty(), "{c}");

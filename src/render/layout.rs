@@ -132,13 +132,18 @@ fn content_insets(panel: &Panel, w: i32, h: i32) -> Insets {
     }
 }
 
-fn aspect(panel: &Panel, sheet: &Sheet) -> f64 {
-    let own = match &panel.content {
-        Content::Plane(p) => plane::natural_aspect(p),
-        Content::Space(p) => p.aspect,
-        Content::Blank => None,
-    };
-    own.unwrap_or(sheet.panel_aspect)
+/// Height of a panel's drawing area at a width.
+fn height(panel: &Panel, sheet: &Sheet, w: i32) -> i32 {
+    let at = |aspect: f64| (f64::from(w) * aspect).round() as i32;
+    match &panel.content {
+        Content::Plane(p) => at(plane::natural_aspect(p).unwrap_or(sheet.panel_aspect)),
+        Content::Space(p) => match p.aspect {
+            Some(aspect) => at(aspect),
+            // A box is given no more height than it can use.
+            None => space::natural_height(p, w, at(sheet.panel_aspect)),
+        },
+        Content::Blank => 0,
+    }
 }
 
 fn plan_panels(sheet: &Sheet, inner: i32, margin: i32, y: &mut i32) -> Vec<(Rect, i32)> {
@@ -154,7 +159,7 @@ fn plan_panels(sheet: &Sheet, inner: i32, margin: i32, y: &mut i32) -> Vec<(Rect
         right.fill(0);
         for row in &rows {
             for (c, panel) in row.iter().enumerate() {
-                let i = content_insets(panel, w, (f64::from(w) * aspect(panel, sheet)) as i32);
+                let i = content_insets(panel, w, height(panel, sheet, w));
                 left[c] = left[c].max(i.left);
                 right[c] = right[c].max(i.right);
             }
@@ -164,7 +169,7 @@ fn plan_panels(sheet: &Sheet, inner: i32, margin: i32, y: &mut i32) -> Vec<(Rect
     }
     let mut places = Vec::new();
     for (r, row) in rows.iter().enumerate() {
-        let h = row.iter().map(|p| (f64::from(w) * aspect(p, sheet)).round() as i32).max().unwrap_or(0);
+        let h = row.iter().map(|p| height(p, sheet, w)).max().unwrap_or(0);
         let inset = |f: fn(Insets) -> i32| row.iter().map(|p| f(content_insets(p, w, h))).max().unwrap_or(0);
         let title = row.iter().map(title_height).max().unwrap_or(0);
         if r > 0 {

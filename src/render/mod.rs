@@ -94,6 +94,8 @@ pub struct Rendered {
     pub pdf: Vec<u8>,
     /// The pixels of the PNG file.
     pub pixels: Pixels,
+    /// How many given positions were not finite numbers (or not positive on a logarithmic axis) and were left out.
+    pub left_out: usize,
 }
 
 /// Draws a sheet.
@@ -111,7 +113,24 @@ pub fn render(sheet: &Sheet) -> Result<Rendered, RenderError> {
         svg: provenance::seal(svg::write(&scene, &title, &sheet.description, &sealed))?,
         pdf: provenance::seal(pdf::write(&scene, &title, &sheet.description, &sealed))?,
         pixels,
+        left_out: left_out(sheet),
     })
+}
+
+fn left_out(sheet: &Sheet) -> usize {
+    let count = |panel: &sheet::Panel| match &panel.content {
+        sheet::Content::Plane(p) => {
+            let bad = |axis: &sheet::Axis, v: f64| !v.is_finite() || (axis.logarithmic && v <= 0.0);
+            let bad = |q: &&[f64; 2]| bad(&p.x, q[0]) || bad(&p.y, q[1]);
+            p.layers.iter().map(|l| l.positions().iter().filter(bad).count()).sum::<usize>()
+        }
+        sheet::Content::Space(p) => {
+            let bad = |q: &&[f64; 3]| !q.iter().all(|v| v.is_finite());
+            p.layers.iter().map(|l| l.positions().iter().filter(bad).count()).sum()
+        }
+        sheet::Content::Blank => 0,
+    };
+    sheet.panels.iter().map(count).sum()
 }
 
 fn check(sheet: &Sheet) -> Result<(), RenderError> {
@@ -155,3 +174,6 @@ fn check(sheet: &Sheet) -> Result<(), RenderError> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;

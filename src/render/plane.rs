@@ -24,6 +24,9 @@ pub struct Insets {
     pub bottom: i32,
 }
 
+/// How far letters reach below the baseline of an axis title.
+const DESCENT_PT: f64 = 2.2;
+
 /// The value on which an axis is linear: the value itself, or its decimal logarithm.
 fn scaled(axis: &Axis, value: f64) -> f64 {
     if !axis.logarithmic {
@@ -111,9 +114,8 @@ pub fn insets(panel: &PlanePanel, w: i32, h: i32) -> Insets {
     }
     let (x, y) = spans(panel, w, h);
     let widest = y_ticks(&panel.y, y, h).major.iter().map(|t| text_width(&t.label, style::TICK_PT)).max().unwrap_or(0);
-    let line = units(style::LABEL_PT * style::LEADING);
-    let y_title = if panel.y.title.is_empty() { 0 } else { line };
-    let x_title = if panel.x.title.is_empty() { 0 } else { line };
+    let y_title = if panel.y.title.is_empty() { 0 } else { units(style::LABEL_PT * 1.1) };
+    let x_title = if panel.x.title.is_empty() { 0 } else { units(3.5 + CAP_HEIGHT * style::LABEL_PT + DESCENT_PT) };
     // The last label of the horizontal axis may stand out by half its width.
     let ticks = x_ticks(&panel.x, x, w);
     let right = ticks.major.last().map_or(0, |t| {
@@ -124,7 +126,7 @@ pub fn insets(panel: &PlanePanel, w: i32, h: i32) -> Insets {
         left: widest + units(style::TICK_GAP_PT) + y_title + units(1.0),
         right: right.max(units(1.0)),
         top: units(3.0),
-        bottom: units(style::TICK_GAP_PT + style::TICK_PT * 1.05) + x_title,
+        bottom: units(style::TICK_GAP_PT + 0.8 + CAP_HEIGHT * style::TICK_PT + 1.0) + x_title,
     }
 }
 
@@ -229,7 +231,7 @@ fn draw_axes(
         canvas.text(&t.label, (rect.x - gap, py), Type::new(style::TICK_PT).anchor(HPos::Right, VPos::Center))?;
     }
     let room = insets(panel, rect.w, rect.h);
-    let base = rect.bottom() + room.bottom - units(2.2);
+    let base = rect.bottom() + room.bottom - units(DESCENT_PT);
     canvas.text(
         &panel.x.title,
         (rect.x + rect.w / 2, base),

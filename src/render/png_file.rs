@@ -1,7 +1,6 @@
 //! Pixels as a PNG file with its printed size and its provenance, and back.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 use std::io::Cursor;
 
 use png::{BitDepth, ColorType, DeflateCompression, Encoder, Filter, Info, PixelDimensions, Unit};
@@ -29,13 +28,17 @@ pub fn write(pixels: &Pixels, title: &str, description: &str, sealed: &Sealed) -
         }
         None => {
             info.color_type = ColorType::Rgb;
-            pixels.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
+            let mut rgb = vec![0; pixels.rgba.len() / 4 * 3];
+            for (to, from) in rgb.chunks_exact_mut(3).zip(pixels.rgba.chunks_exact(4)) {
+                to.copy_from_slice(&from[..3]);
+            }
+            rgb
         }
     };
-    let filter = if info.color_type == ColorType::Rgb { Filter::Up } else { Filter::NoFilter };
     let mut file = Vec::new();
     let mut encoder = Encoder::with_info(&mut file, info)?;
-    encoder.set_filter(filter);
+    // Drawings repeat whole stretches of pixels; filters made for photographs hide that and make larger files more slowly.
+    encoder.set_filter(Filter::NoFilter);
     encoder.set_deflate_compression(DeflateCompression::Level(LEVEL));
     encoder.add_itxt_chunk("Title".to_owned(), title.to_owned())?;
     encoder.add_itxt_chunk("Description".to_owned(), description.to_owned())?;
@@ -51,35 +54,58 @@ pub fn write(pixels: &Pixels, title: &str, description: &str, sealed: &Sealed) -
 /// Effort of compression: higher levels cost more time than all the drawing.
 const LEVEL: u8 = 3;
 
+/// Palette and indices of a picture of at most 256 colours. The palette is sorted.
 fn indexed(pixels: &Pixels) -> Option<(Vec<u8>, Vec<u8>)> {
-    let mut colours: BTreeMap<[u8; 3], u8> = BTreeMap::new();
-    let mut last = None;
+    let mut table = ColourTable::new();
+    let mut indices = Vec::with_capacity(pixels.rgba.len() / 4);
+    let mut last = (u32::MAX, 0);
     for p in pixels.rgba.chunks_exact(4) {
-        let c = [p[0], p[1], p[2]];
-        if last != Some(c) {
-            last = Some(c);
-            if colours.insert(c, 0).is_none() && colours.len() > 256 {
-                return None;
+        let c = u32::from_be_bytes([0, p[0], p[1], p[2]]);
+        if last.0 != c {
+            last = (c, table.index(c)?);
+        }
+        indices.push(last.1);
+    }
+    let mut order: Vec<usize> = (0..table.colours.len()).collect();
+    order.sort_unstable_by_key(|i| table.colours[*i]);
+    let mut rank = [0u8; 256];
+    for (position, i) in order.iter().enumerate() {
+        rank[*i] = position as u8;
+    }
+    indices.iter_mut().for_each(|i| *i = rank[usize::from(*i)]);
+    let palette = order.iter().flat_map(|i| table.colours[*i].to_be_bytes()[1..].to_vec()).collect();
+    Some((palette, indices))
+}
+
+/// Colours numbered in the order in which they are met, found by open addressing.
+struct ColourTable {
+    colours: Vec<u32>,
+    slots: Vec<Option<u8>>,
+}
+
+impl ColourTable {
+    const SLOTS: usize = 1024;
+
+    fn new() -> Self {
+        Self { colours: Vec::new(), slots: vec![None; Self::SLOTS] }
+    }
+
+    /// The number of a colour; `None` if it would be the 257th.
+    fn index(&mut self, colour: u32) -> Option<u8> {
+        let mut at = (colour.wrapping_mul(0x9e37_79b1) >> 22) as usize;
+        loop {
+            match self.slots[at] {
+                Some(i) if self.colours[usize::from(i)] == colour => return Some(i),
+                Some(_) => at = (at + 1) % Self::SLOTS,
+                None => {
+                    let i = u8::try_from(self.colours.len()).ok()?;
+                    self.slots[at] = Some(i);
+                    self.colours.push(colour);
+                    return Some(i);
+                }
             }
         }
     }
-    for (i, index) in colours.values_mut().enumerate() {
-        *index = i as u8;
-    }
-    let palette = colours.keys().flatten().copied().collect();
-    let mut last = ([0; 3], colours.get(&[0; 3]).copied().unwrap_or(0));
-    let indices = pixels
-        .rgba
-        .chunks_exact(4)
-        .map(|p| {
-            let c = [p[0], p[1], p[2]];
-            if last.0 != c {
-                last = (c, colours[&c]);
-            }
-            last.1
-        })
-        .collect();
-    Some((palette, indices))
 }
 
 /// Pixels of any PNG file of eight bits or fewer per channel, as opaque RGBA where the file has no transparency.

@@ -6,6 +6,7 @@
 use tiny_skia::{Color, FillRule, LineCap, LineJoin, Paint as SkPaint, Path, PathBuilder, Pixmap, Stroke, Transform};
 
 use super::scene::{Item, Paint, Position, Scene, Segment, UNITS_PER_PIXEL};
+use super::sheet::Colour;
 
 /// Decoded pixels: opaque RGBA, row by row from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -22,6 +23,7 @@ pub struct Pixels {
 pub fn rasterise(scene: &Scene) -> Option<Pixels> {
     let mut pixmap = Pixmap::new(scene.width_px, scene.height_px)?;
     pixmap.fill(Color::WHITE);
+    let mut stamps: Vec<Stamp> = Vec::new();
     for item in &scene.items {
         match item {
             Item::Fill { paint, path, .. } => {
@@ -40,7 +42,14 @@ pub fn rasterise(scene: &Scene) -> Option<Pixels> {
                     pixmap.stroke_path(&path, &ink(*paint), &stroke, Transform::identity(), None);
                 }
             }
-            Item::Dots { paint, diameter, centres } => stamp(&mut pixmap, *paint, *diameter, centres),
+            Item::Dots { paint, diameter, centres } => {
+                let known = stamps.iter().position(|s| (s.diameter, s.opacity) == (*diameter, paint.opacity));
+                let known = known.unwrap_or_else(|| {
+                    stamps.push(Stamp::new(*diameter, paint.opacity));
+                    stamps.len() - 1
+                });
+                stamps[known].draw(&mut pixmap, paint.colour, centres);
+            }
         }
     }
     Some(Pixels { width: scene.width_px, height: scene.height_px, rgba: pixmap.take() })
@@ -118,33 +127,49 @@ fn divide(from: Position, a: Position, b: Position, to: Position) -> impl Iterat
     })
 }
 
-/// Draws discs: each is a mask of coverages for its position within a pixel.
-fn stamp(pixmap: &mut Pixmap, paint: Paint, diameter: i32, centres: &[Position]) {
-    let phases = (UNITS_PER_PIXEL * UNITS_PER_PIXEL) as usize;
-    let mut masks: Vec<Option<Mask>> = (0..phases).map(|_| None).collect();
-    let (width, height) = (pixmap.width() as i32, pixmap.height() as i32);
-    let data = pixmap.data_mut();
-    let colour = [paint.colour.r, paint.colour.g, paint.colour.b].map(u32::from);
-    for centre in centres {
-        let (px, py) = (centre.0.div_euclid(UNITS_PER_PIXEL), centre.1.div_euclid(UNITS_PER_PIXEL));
-        let (fx, fy) = (centre.0.rem_euclid(UNITS_PER_PIXEL), centre.1.rem_euclid(UNITS_PER_PIXEL));
-        let mask =
-            masks[(fy * UNITS_PER_PIXEL + fx) as usize].get_or_insert_with(|| Mask::new(fx, fy, diameter, paint));
-        for row in 0..mask.side {
-            let y = py + mask.first + row;
-            if y < 0 || y >= height {
+/// Masks of discs of one size and opacity, one for each position of the centre within a pixel, made when first needed.
+struct Stamp {
+    diameter: i32,
+    opacity: u8,
+    masks: Vec<Option<Mask>>,
+}
+
+impl Stamp {
+    fn new(diameter: i32, opacity: u8) -> Self {
+        let phases = UNITS_PER_PIXEL * UNITS_PER_PIXEL;
+        Self { diameter, opacity, masks: (0..phases).map(|_| None).collect() }
+    }
+
+    /// Draws discs.
+    fn draw(&mut self, pixmap: &mut Pixmap, colour: Colour, centres: &[Position]) {
+        let (width, height) = (pixmap.width() as i32, pixmap.height() as i32);
+        let data = pixmap.data_mut();
+        let ink = [colour.r, colour.g, colour.b].map(u32::from);
+        for centre in centres {
+            let (px, py) = (centre.0.div_euclid(UNITS_PER_PIXEL), centre.1.div_euclid(UNITS_PER_PIXEL));
+            let (fx, fy) = (centre.0.rem_euclid(UNITS_PER_PIXEL), centre.1.rem_euclid(UNITS_PER_PIXEL));
+            let mask = self.masks[(fy * UNITS_PER_PIXEL + fx) as usize]
+                .get_or_insert_with(|| Mask::new(fx, fy, self.diameter, self.opacity));
+            let left = px + mask.first;
+            // Columns of the mask that lie on the sheet.
+            let (from, to) = ((-left).clamp(0, mask.side), (width - left).clamp(0, mask.side));
+            if from >= to {
                 continue;
             }
-            for column in 0..mask.side {
-                let x = px + mask.first + column;
-                let cover = mask.cover[(row * mask.side + column) as usize];
-                if cover == 0 || x < 0 || x >= width {
+            for (row, cover) in mask.cover.chunks_exact(mask.side as usize).enumerate() {
+                let y = py + mask.first + row as i32;
+                if y < 0 || y >= height {
                     continue;
                 }
-                let at = 4 * (y * width + x) as usize;
-                for (channel, ink) in colour.iter().enumerate() {
-                    let under = u32::from(data[at + channel]);
-                    data[at + channel] = ((under * (255 - cover) + ink * cover + 127) / 255) as u8;
+                let start = 4 * (y * width + left + from) as usize;
+                let line = &mut data[start..start + 4 * (to - from) as usize];
+                for (pixel, cover) in line.chunks_exact_mut(4).zip(&cover[from as usize..to as usize]) {
+                    if *cover == 0 {
+                        continue;
+                    }
+                    for (under, ink) in pixel.iter_mut().zip(ink) {
+                        *under = ((u32::from(*under) * (255 - cover) + ink * cover + 127) / 255) as u8;
+                    }
                 }
             }
         }
@@ -160,7 +185,7 @@ struct Mask {
 }
 
 impl Mask {
-    fn new(fx: i32, fy: i32, diameter: i32, paint: Paint) -> Self {
+    fn new(fx: i32, fy: i32, diameter: i32, opacity: u8) -> Self {
         let reach = (diameter / 2 + UNITS_PER_PIXEL) / UNITS_PER_PIXEL;
         let (first, side) = (-reach, 2 * reach + 1);
         let mut cover = Vec::with_capacity((side * side) as usize);
@@ -177,7 +202,7 @@ impl Mask {
                         inside += u32::from(dx * dx + dy * dy <= diameter * diameter);
                     }
                 }
-                let full = (255 * u32::from(paint.opacity) + 50) / 100;
+                let full = (255 * u32::from(opacity) + 50) / 100;
                 cover.push((inside * full + samples / 2) / samples);
             }
         }

@@ -1,6 +1,6 @@
 //! Rich text: a small markup for variables, superscripts and subscripts, set in the embedded font.
 //!
-//! `*x*` is italic, `!warn!` is not special; `^{...}` and `_{...}` raise and lower (one character needs no braces); a backslash
+//! `*x*` is italic; `^{...}` and `_{...}` raise and lower (one character needs no braces); a backslash
 //! takes the next character literally. A hyphen before a number or inside a superscript or subscript becomes a minus sign.
 
 use super::font::{self, Cut, Glyph, Stroke};
@@ -145,12 +145,17 @@ impl Setter<'_> {
     }
 
     fn place(&mut self, c: char, scale: f64, rise: f64) -> Result<(), RichTextError> {
-        let cut = if self.italic { Cut::Italic } else { self.base };
+        let cut = match (self.italic, self.base) {
+            (true, Cut::Bold) => Cut::BoldItalic,
+            (true, _) => Cut::Italic,
+            (false, base) => base,
+        };
         let glyph =
             font::glyph(cut, c).ok_or_else(|| RichTextError::Glyph { text: self.source.to_owned(), character: c })?;
         if let Some(previous) = self.previous {
             self.pen += font::kern(previous, glyph) * scale;
-            if previous.cut == Cut::Italic && glyph.cut != Cut::Italic && !c.is_whitespace() {
+            let leans = |g: Glyph| matches!(g.cut, Cut::Italic | Cut::BoldItalic);
+            if leans(previous) && !leans(glyph) && !c.is_whitespace() {
                 // Italic correction: a leaning letter must not touch an upright neighbour.
                 self.pen += 0.035 * scale;
             }

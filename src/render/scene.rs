@@ -139,24 +139,55 @@ impl Scene {
         if line.is_empty() {
             return;
         }
-        if let Some(Item::Stroke { paint: p, width: w, lines }) = self.items.last_mut() {
-            if *p == paint && *w == width {
-                lines.push(line);
-                return;
-            }
+        if let Some(Item::Stroke { paint: p, width: w, lines }) = self.items.last_mut()
+            && (*p, *w) == (paint, width)
+        {
+            lines.push(line);
+            return;
         }
         self.items.push(Item::Stroke { paint, width, lines: vec![line] });
     }
 
     /// Adds a disc, to the last item if that has the same paint and size.
     pub fn dot(&mut self, paint: Paint, diameter: i32, centre: Position) {
-        if let Some(Item::Dots { paint: p, diameter: d, centres }) = self.items.last_mut() {
-            if *p == paint && *d == diameter {
-                centres.push(centre);
-                return;
-            }
+        if let Some(Item::Dots { paint: p, diameter: d, centres }) = self.items.last_mut()
+            && (*p, *d) == (paint, diameter)
+        {
+            centres.push(centre);
+            return;
         }
         self.items.push(Item::Dots { paint, diameter, centres: vec![centre] });
+    }
+
+    /// Draws the contours of a path in white, as a margin for what is then filled. Curves are followed by four chords, so that no
+    /// renderer has to stroke a curve.
+    pub fn halo(&mut self, path: &[Segment], width: i32) {
+        let paint = Paint { colour: super::style::WHITE, opacity: 85 };
+        let mut contour: Vec<Position> = Vec::new();
+        for segment in path {
+            match *segment {
+                Segment::Move(p) => contour = vec![p],
+                Segment::Line(p) => contour.push(p),
+                Segment::Cubic(a, b, p) => {
+                    let from = contour.last().copied().unwrap_or(p);
+                    for k in 1..=4i64 {
+                        let (t, s) = (k, 4 - k);
+                        let at = |f: fn(Position) -> i32| {
+                            let [p0, p1, p2, p3] = [from, a, b, p].map(|q| i64::from(f(q)));
+                            let sum = s * s * s * p0 + 3 * s * s * t * p1 + 3 * s * t * t * p2 + t * t * t * p3;
+                            ((sum + 32).div_euclid(64)) as i32
+                        };
+                        contour.push((at(|q| q.0), at(|q| q.1)));
+                    }
+                }
+                Segment::Close => {
+                    if let Some(first) = contour.first().copied() {
+                        contour.push(first);
+                    }
+                    self.polyline(paint, width, std::mem::take(&mut contour));
+                }
+            }
+        }
     }
 
     /// Adds text that has been turned into outlines.

@@ -446,6 +446,17 @@ pub enum PlaneLayer {
     Note(Note<[f64; 2]>),
 }
 
+impl PlaneLayer {
+    /// All positions of the layer.
+    pub fn positions(&self) -> &[[f64; 2]] {
+        match self {
+            Self::Dots { points, .. } | Self::Line { points, .. } | Self::Markers { points, .. } => points,
+            Self::Area { outline, .. } => outline,
+            Self::Note(note) => std::slice::from_ref(&note.at),
+        }
+    }
+}
+
 /// A chart in the plane.
 #[derive(Clone, Debug)]
 pub struct PlanePanel {
@@ -599,7 +610,19 @@ pub enum SpaceLayer {
     Note(Note<[f64; 3]>),
 }
 
-/// A chart in space, seen in orthographic projection. The first two axes are horizontal, the third points up.
+impl SpaceLayer {
+    /// All positions of the layer, without the corners of surfaces.
+    pub fn positions(&self) -> &[[f64; 3]] {
+        match self {
+            Self::Surface { .. } => &[],
+            Self::Line { points, .. } | Self::Markers { points, .. } => points,
+            Self::Note(note) => std::slice::from_ref(&note.at),
+        }
+    }
+}
+
+/// A chart in space, seen in orthographic projection. The first two axes are horizontal, the third points up; all are linear. Curves and
+/// surfaces are cut off at the box.
 #[derive(Clone, Debug)]
 pub struct SpacePanel {
     /// The two horizontal axes and the upright one.
@@ -612,7 +635,7 @@ pub struct SpacePanel {
     pub elevation: f64,
     /// Whether box, grid, ticks and axis titles are drawn.
     pub boxed: bool,
-    /// Height divided by width of the drawing area; if absent, the sheet's.
+    /// Height divided by width of the drawing area; if absent, what the box needs, at most the sheet's.
     pub aspect: Option<f64>,
     /// What is drawn.
     pub layers: Vec<SpaceLayer>,

@@ -52,6 +52,15 @@ struct Bounds {
 }
 
 impl Bounds {
+    fn new(panel: &SpacePanel) -> Self {
+        let longest = panel.proportions.iter().copied().fold(0.0, f64::max);
+        Self {
+            spans: [0, 1, 2].map(|i| plane::span(&panel.axes[i])),
+            size: panel.proportions.map(|p| p / longest),
+            camera: Camera::new(panel.azimuth, panel.elevation),
+        }
+    }
+
     fn lower(&self) -> [f64; 3] {
         self.spans.map(|s| s.lower)
     }
@@ -95,11 +104,11 @@ fn corners() -> impl Iterator<Item = [bool; 3]> {
 /// The three edges that carry ticks: both horizontal axes along the lower rim nearest the viewer, the upright one at the left.
 fn ticked_edges(bounds: &Bounds, scale: f64) -> Vec<TickedEdge> {
     let towards = bounds.camera.towards;
-    let near = towards.map(|t| t > 0.0);
-    // Seen from below, the rim nearest the viewer is the lower one too, but it is then the far side that is in view.
+    // Seen from below, the lower rim that is in front of nothing is the far one.
+    let below = towards[2] < 0.0;
     let rim = |own: usize, other: usize| {
         let mut at = [false; 3];
-        at[other] = near[other];
+        at[other] = (towards[other] > 0.0) != below;
         (own, at)
     };
     let upright = {
@@ -170,7 +179,7 @@ fn labels(panel: &SpacePanel, bounds: &Bounds, scale: f64) -> Vec<Label> {
     for (edge, x, y, reach) in titles {
         let text = &panel.axes[edge.axis].title;
         if !text.is_empty() {
-            let beyond = reach / f64::from(UNITS_PER_POINT) + 1.5;
+            let beyond = reach / f64::from(UNITS_PER_POINT) + 3.0;
             let (rect, _) = label_rect([x, y], edge.out, text, style::LABEL_PT, beyond);
             labels.push(Label { text: text.clone(), size: style::LABEL_PT, rect });
         }
@@ -191,12 +200,7 @@ fn label_rect(p: [f64; 2], out: [f64; 2], text: &str, size: f64, gap: f64) -> (R
 
 /// Draws a panel into a rectangle.
 pub fn draw(canvas: &Canvas, panel: &SpacePanel, rect: Rect) -> Result<(), RenderError> {
-    let longest = panel.proportions.iter().copied().fold(0.0, f64::max);
-    let bounds = Bounds {
-        spans: [0, 1, 2].map(|i| plane::span(&panel.axes[i])),
-        size: panel.proportions.map(|p| p / longest),
-        camera: Camera::new(panel.azimuth, panel.elevation),
-    };
+    let bounds = Bounds::new(panel);
     let (scale, centre) = fit(panel, &bounds, rect);
     let origin = [f64::from(centre.0), f64::from(centre.1)];
     // The chart's coordinates are those of the projected box, equally scaled; its rectangle is the panel's.
@@ -246,36 +250,47 @@ pub fn draw(canvas: &Canvas, panel: &SpacePanel, rect: Rect) -> Result<(), Rende
     canvas.legend(&panel.legend, rect, panel.legend_corner)
 }
 
+/// Height in units that a panel needs at a width, at most `highest`: that of the box with its labels.
+pub fn natural_height(panel: &SpacePanel, width: i32, highest: i32) -> i32 {
+    let bounds = Bounds::new(panel);
+    let rect = Rect { x: 0, y: 0, w: width, h: highest };
+    let e = extent(panel, &bounds, fit(panel, &bounds, rect).0);
+    // Rounding of the labels' places may move them by a unit.
+    ((e[3] - e[1]).ceil() as i32 + 4).min(highest)
+}
+
+/// Left, upper, right and lower end of the box with its labels relative to the box's centre, in units.
+fn extent(panel: &SpacePanel, bounds: &Bounds, scale: f64) -> [f64; 4] {
+    let mut e = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
+    let mut add = |x: f64, y: f64| e = [e[0].min(x), e[1].min(y), e[2].max(x), e[3].max(y)];
+    for c in corners() {
+        let s = bounds.corner(c);
+        add(s[0] * scale, -s[1] * scale);
+    }
+    if panel.boxed {
+        for l in labels(panel, bounds, scale) {
+            add(f64::from(l.rect.x), f64::from(l.rect.y));
+            add(f64::from(l.rect.right()), f64::from(l.rect.bottom()));
+        }
+    }
+    e
+}
+
 /// Scale (units per unit length) and centre at which the box with its labels fills the rectangle.
 fn fit(panel: &SpacePanel, bounds: &Bounds, rect: Rect) -> (f64, (i32, i32)) {
-    let extent = |scale: f64| {
-        let mut e = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
-        let mut add = |x: f64, y: f64| e = [e[0].min(x), e[1].min(y), e[2].max(x), e[3].max(y)];
-        for c in corners() {
-            let s = bounds.corner(c);
-            add(s[0] * scale, -s[1] * scale);
-        }
-        if panel.boxed {
-            for l in labels(panel, bounds, scale) {
-                add(f64::from(l.rect.x), f64::from(l.rect.y));
-                add(f64::from(l.rect.right()), f64::from(l.rect.bottom()));
-            }
-        }
-        e
-    };
     // Labels keep their size while the box grows, so the largest scale is found by bisection.
     let (w, h) = (f64::from(rect.w), f64::from(rect.h));
     let (mut low, mut high) = (1.0, 4.0 * (w + h));
     for _ in 0..24 {
         let middle = 0.5 * (low + high);
-        let e = extent(middle);
+        let e = extent(panel, bounds, middle);
         if e[2] - e[0] <= w && e[3] - e[1] <= h {
             low = middle;
         } else {
             high = middle;
         }
     }
-    let e = extent(low);
+    let e = extent(panel, bounds, low);
     let x = f64::from(rect.x) + 0.5 * (w - (e[0] + e[2]));
     let y = f64::from(rect.y) + 0.5 * (h - (e[1] + e[3]));
     (low, (x.round() as i32, y.round() as i32))
@@ -285,12 +300,12 @@ fn fit(panel: &SpacePanel, bounds: &Bounds, rect: Rect) -> (f64, (i32, i32)) {
 fn draw_box(canvas: &Canvas, chart: &mut Chart, bounds: &Bounds, scale: f64) -> Result<(), RenderError> {
     let far = bounds.camera.towards.map(|t| t <= 0.0);
     let flat = |s: Seen| [s[0], s[1]];
-    for axis in 0..3 {
+    for (axis, end) in far.into_iter().enumerate() {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let face: Vec<[f64; 2]> = [(false, false), (true, false), (true, true), (false, true)]
             .iter()
             .map(|(a, b)| {
-                let mut c = [far[axis]; 3];
+                let mut c = [end; 3];
                 (c[u], c[v]) = (*a, *b);
                 flat(bounds.corner(c))
             })
@@ -520,11 +535,22 @@ fn cut_curves(panel: &SpacePanel, bounds: &Bounds, chart: &Chart, buffer: &Depth
 }
 
 fn draw_curves(chart: &mut Chart, pieces: &[Piece], hidden: bool) -> Result<(), RenderError> {
-    for piece in pieces.iter().filter(|p| p.hidden == hidden) {
-        let share = 1.0 - (piece.level as f64 + 1.0) / style::DEPTH_LEVELS as f64;
-        let mut look = piece.style;
-        look.colour = look.colour.lighten(style::DEPTH_FADE * share);
-        chart.thinned_line(&piece.points, &look)?;
+    let of = |level: usize| pieces.iter().filter(move |p| p.level == level && p.hidden == hidden);
+    for level in 0..style::DEPTH_LEVELS {
+        if !hidden {
+            // A white margin where a curve passes over one at least two depth classes behind makes clear which is in front. It is drawn
+            // before the neighbouring class, so that it does not cut into the curve's own continuation.
+            for piece in of(level + 1) {
+                let width = piece.style.width + 2.0 * style::CASING_PT;
+                chart.thinned_line(&piece.points, &LineStyle::new(style::WHITE, width))?;
+            }
+        }
+        for piece in of(level) {
+            let share = 1.0 - (piece.level as f64 + 1.0) / style::DEPTH_LEVELS as f64;
+            let mut look = piece.style;
+            look.colour = look.colour.lighten(style::DEPTH_FADE * share);
+            chart.thinned_line(&piece.points, &look)?;
+        }
     }
     Ok(())
 }

@@ -65,6 +65,10 @@ pub const FRAME_PT: f64 = 0.6;
 pub const GRID_PT: f64 = 0.4;
 /// Default width of a curve.
 pub const CURVE_PT: f64 = 0.8;
+/// White margin on either side of a curve in space where it passes in front of another.
+pub const CASING_PT: f64 = 0.4;
+/// White margin around the letters of a note.
+pub const HALO_PT: f64 = 0.9;
 /// Length of a major tick.
 pub const TICK_LENGTH_PT: f64 = 3.0;
 /// Length of a minor tick.
@@ -72,9 +76,9 @@ pub const MINOR_TICK_LENGTH_PT: f64 = 1.7;
 /// Distance between a tick and its label.
 pub const TICK_GAP_PT: f64 = 2.5;
 /// Distance between two major ticks that the tick placement aims for, horizontally.
-pub const TICK_SPACING_X_PT: f64 = 34.0;
+pub const TICK_SPACING_X_PT: f64 = 26.0;
 /// Distance between two major ticks that the tick placement aims for, vertically.
-pub const TICK_SPACING_Y_PT: f64 = 26.0;
+pub const TICK_SPACING_Y_PT: f64 = 21.0;
 /// Margin around the sheet.
 pub const MARGIN_PT: f64 = 5.0;
 /// Gap between panels.
@@ -90,12 +94,15 @@ pub const DOTTED_PT: (f64, f64) = (0.05, 2.0);
 
 /// Diameter of a point by how many distinguishable places (cells of half a point) its layer occupies: few points are drawn large
 /// enough to be found at a glance, many small enough to show structure. Pairs (at most this many places, diameter).
-pub const DOT_DIAMETER_PT: [(usize, f64); 5] = [(16, 4.2), (150, 2.0), (1_500, 1.3), (8_000, 0.95), (usize::MAX, 0.75)];
+pub const DOT_DIAMETER_PT: [(usize, f64); 6] =
+    [(16, 4.2), (80, 2.2), (300, 1.5), (1_500, 1.15), (6_000, 0.8), (usize::MAX, 0.55)];
+/// Number of places above which a layer is shaded by density, if it asks for that.
+pub const DENSITY_FROM: usize = 1_500;
 /// Number of lightness steps of density shading.
 pub const DENSITY_LEVELS: usize = 6;
 /// Share of white mixed into the least dense points under density shading.
-pub const DENSITY_LIGHTEST: f64 = 0.52;
+pub const DENSITY_LIGHTEST: f64 = 0.45;
 /// Number of depth classes of a 3D curve.
-pub const DEPTH_LEVELS: usize = 6;
+pub const DEPTH_LEVELS: usize = 8;
 /// Share of white mixed into the farthest part of a 3D curve.
 pub const DEPTH_FADE: f64 = 0.6;

@@ -57,7 +57,7 @@ pub fn linear(lower: f64, upper: f64, wanted: f64) -> Ticks {
     }
     // Very large or small numbers share a power of ten, which goes into every label: no separate exponent is overlooked.
     let largest = lower.abs().max(upper.abs());
-    let shift = if largest >= 1e5 || largest < 1e-3 { elementary::log10(largest).floor() as i32 } else { 0 };
+    let shift = if !(1e-3..1e5).contains(&largest) { elementary::log10(largest).floor() as i32 } else { 0 };
     let major = (first..=last)
         .map(|k| Tick { value: decimal(k * mantissa, exponent), label: label(k * mantissa, exponent, shift) })
         .collect();
@@ -126,15 +126,31 @@ pub fn logarithmic(lower: f64, upper: f64, wanted: f64) -> Ticks {
             }
         }
     }
+    // One notation along an axis: plain numbers, or powers of ten throughout.
+    if ticks.major.iter().any(|t| t.label.contains('^')) {
+        for tick in &mut ticks.major {
+            if let Some((mantissa, exponent)) = tick.label.parse::<f64>().ok().and_then(one_digit) {
+                tick.label = power_notation(mantissa, exponent);
+            }
+        }
+    }
     ticks
+}
+
+/// The digit and the exponent of a plain label between 0.01 and 9000.
+fn one_digit(value: f64) -> Option<(i64, i32)> {
+    (-2..=3).flat_map(|e| (1..=9).map(move |m| (m, e))).find(|(m, e)| decimal(*m, *e) == value)
 }
 
 fn power_label(mantissa: i64, exponent: i32) -> String {
     match (mantissa, exponent) {
         (m, -2..=3) => fixed(m, exponent),
-        (1, e) => format!("10^{{{e}}}"),
-        (m, e) => format!("{m}×10^{{{e}}}"),
+        (m, e) => power_notation(m, e),
     }
+}
+
+fn power_notation(mantissa: i64, exponent: i32) -> String {
+    if mantissa == 1 { format!("10^{{{exponent}}}") } else { format!("{mantissa}×10^{{{exponent}}}") }
 }
 
 #[cfg(test)]
@@ -171,6 +187,7 @@ mod tests {
     fn log_ticks_are_powers_of_ten() {
         assert_eq!(labels(&logarithmic(1e-8, 1e-4, 8.0)), ["10^{-8}", "10^{-7}", "10^{-6}", "10^{-5}", "10^{-4}"]);
         assert_eq!(labels(&logarithmic(3.0, 60.0, 8.0)), ["5", "10", "20", "50"]);
+        assert_eq!(labels(&logarithmic(50.0, 2e5, 8.0)), ["10^{2}", "10^{3}", "10^{4}", "10^{5}"]);
         assert!(logarithmic(1e-300, 1e300, 6.0).major.len() <= 8);
     }
 
