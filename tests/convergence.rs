@@ -4,8 +4,8 @@
 
 use nalgebra::{Matrix3, SVector, matrix, vector};
 use proptest::prelude::*;
-use twofold::integrate::{Failure, Lsoda, Radau5, Statistics, Stepper, Tolerance};
-use twofold::model::VectorField;
+use twofold::integrate::{Dopri5, Failure, Lsoda, Radau5, Statistics, Stepper, Tolerance};
+use twofold::model::{Caricature, Hysteretic, Relaxation, VectorField};
 use twofold::num::Scalar;
 
 /// x' = S diag(-rates) S^-1 x, with a well-conditioned S.
@@ -117,4 +117,39 @@ fn leaving_the_domain_is_named() {
         };
         assert!((t - 2.0).abs() < 0.01, "{failure}");
     }
+}
+
+/// Why no method makes the literal hysteretic system cheap. On the attracting part of the surface phi never comes to rest:
+/// it swings between 0 and 1, and x through layers of width eps'^2 = 1e-4 with it. The swings are the solution (every
+/// method and tolerance finds the same number of them), not a fast mode that an implicit method could step over.
+#[test]
+fn hysteretic_chatter_is_the_solution() {
+    fn swings<M: Stepper<4>>(mut stepper: M) -> (usize, u64) {
+        let field = Hysteretic {
+            system: Caricature::with_reinjection(1e-1, 1e-5),
+            eps: 1e-3,
+            eps_prime: 1e-2,
+            relaxation: Relaxation::Literal,
+        };
+        // Up to shortly before the first visit of the singularity, after which no two methods agree.
+        stepper.restart(&field, 0.0, vector![0.2, 0.0, -1.0, 1.0], 10.0, 0.25).unwrap();
+        let (mut t, mut swings) = (0.0, 0);
+        while t < 10.0 {
+            let step = stepper.step(&field).unwrap();
+            swings += usize::from((step.x0[3] > 0.5) != (step.x1[3] > 0.5));
+            t = step.t1;
+        }
+        (swings, stepper.statistics().evaluations)
+    }
+    let tolerance = |tol: f64| Tolerance { rtol: tol, atol: tol };
+    let found = [
+        swings(Dopri5::new(tolerance(1e-8))),
+        swings(Lsoda::new(tolerance(1e-8))),
+        swings(Radau5::new(tolerance(1e-8))),
+        swings(Dopri5::new(tolerance(1e-11))),
+        swings(Radau5::new(tolerance(1e-11))),
+    ];
+    println!("{found:?}");
+    assert!(found[0].0 > 100, "{found:?}");
+    assert!(found.iter().all(|f| f.0 == found[0].0), "{found:?}");
 }
