@@ -153,3 +153,30 @@ fn hysteretic_chatter_is_the_solution() {
     assert!(found[0].0 > 100, "{found:?}");
     assert!(found.iter().all(|f| f.0 == found[0].0), "{found:?}");
 }
+
+/// Frozen bits: debug and release, any machine. A changed library, compiler or line of arithmetic shows here first.
+#[test]
+fn known_bits() {
+    struct Lorenz;
+    impl VectorField<3> for Lorenz {
+        fn eval<T: Scalar>(&self, x: &SVector<T, 3>) -> SVector<T, 3> {
+            vector![
+                (x[1] - x[0]).scale(10.0),
+                x[0] * (T::from_f64(28.0) - x[2]) - x[1],
+                x[0] * x[1] - x[2].scale(8.0 / 3.0)
+            ]
+        }
+    }
+    fn bits<M: Stepper<3>>(mut stepper: M) -> [u64; 3] {
+        stepper.restart(&Lorenz, 0.0, vector![1.0, 1.0, 1.0], 10.0, f64::INFINITY).unwrap();
+        loop {
+            let step = stepper.step(&Lorenz).unwrap();
+            if step.t1 == 10.0 {
+                return step.x1.map(f64::to_bits).into();
+            }
+        }
+    }
+    let tolerance = Tolerance { rtol: 1e-10, atol: 1e-10 };
+    assert_eq!(bits(Lsoda::new(tolerance)), [13840577990770740755, 13838984908581557768, 4627643076308680571]);
+    assert_eq!(bits(Radau5::new(tolerance)), [13840577990728014749, 13838984908002717238, 4627643076391555881]);
+}
