@@ -180,3 +180,16 @@ fn known_bits() {
     assert_eq!(bits(Lsoda::new(tolerance)), [13840577990770740755, 13838984908581557768, 4627643076308680571]);
     assert_eq!(bits(Radau5::new(tolerance)), [13840577990728014749, 13838984908002717238, 4627643076391555881]);
 }
+
+/// Tolerances of zero cannot be met; they must not run for ever or return nonsense.
+#[test]
+fn zero_tolerance_is_a_named_failure() {
+    let field = Linear::with_rates([1.0, 2.0, 3.0]);
+    let zero = Tolerance { rtol: 0.0, atol: 0.0 };
+    for start in [vector![1.0, 1.0, 1.0], vector![0.0, 1.0, 0.0]] {
+        let lsoda = solve(Lsoda::new(zero), &field, start, 1.0);
+        assert!(matches!(lsoda, Err(Failure::StepUnderflow { .. })), "{lsoda:?}");
+        let radau = solve(Radau5::new(zero), &field, start, 1.0);
+        assert!(matches!(radau, Err(Failure::StepUnderflow { .. } | Failure::NotConverged { .. })), "{radau:?}");
+    }
+}
