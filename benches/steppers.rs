@@ -8,7 +8,7 @@ use std::hint::black_box;
 use criterion::{BenchmarkId, Criterion, Throughput};
 use nalgebra::{SVector, vector};
 use twofold::integrate::{
-    Dopri5, Failure, Ignore, Lsoda, Radau5, Schedule, Statistics, StepCap, Stepper, Tolerance, drive,
+    Dopri5, Failure, Flow, Lsoda, Observer, Radau5, Schedule, Statistics, Step, StepCap, Stepper, Tolerance, drive,
 };
 use twofold::model::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
 use twofold::num::elementary::exp10;
@@ -33,15 +33,27 @@ fn hysteretic(alpha: f64) -> Hysteretic<Caricature> {
     }
 }
 
+/// Counts how often the last component passes 1/2: the swings of a hysteretic phi.
+struct Swings(u64);
+
+impl<const N: usize> Observer<N> for Swings {
+    fn step(&mut self, step: &Step<'_, N>) -> Flow {
+        self.0 += u64::from((step.x0[N - 1] > 0.5) != (step.x1[N - 1] > 0.5));
+        Flow::Continue
+    }
+}
+
 fn run<F: VectorField<N>, M: Stepper<N>, const N: usize>(
     field: &F,
     start: SVector<f64, N>,
     t_end: f64,
     mut stepper: M,
-) -> Result<Statistics, Failure> {
+) -> Result<(Statistics, u64), Failure> {
+    let mut swings = Swings(0);
     let schedule = Schedule { restart_every: Some(100.0), kick: None };
     let cap = StepCap::FractionOfSegment(0.1);
-    drive(field, start, t_end, &mut stepper, &schedule, cap, 100_000_000, &mut Ignore, &()).map(|s| s.statistics)
+    drive(field, start, t_end, &mut stepper, &schedule, cap, 100_000_000, &mut swings, &())
+        .map(|s| (s.statistics, swings.0))
 }
 
 fn by_name<F: VectorField<N>, const N: usize>(
@@ -49,7 +61,7 @@ fn by_name<F: VectorField<N>, const N: usize>(
     field: &F,
     start: SVector<f64, N>,
     t_end: f64,
-) -> Result<Statistics, Failure> {
+) -> Result<(Statistics, u64), Failure> {
     match method {
         "dopri5" => run(field, start, t_end, Dopri5::new(tolerance())),
         "lsoda" => run(field, start, t_end, Lsoda::new(tolerance())),
@@ -62,18 +74,19 @@ const METHODS: [&str; 3] = ["dopri5", "lsoda", "radau5"];
 fn counts(t_end: f64) {
     println!("work for t = {t_end}");
     println!(
-        "{:24} {:7} {:>9} {:>9} {:>11} {:>9} {:>9} {:>9}",
-        "system", "method", "steps", "rejected", "evaluations", "Jacobians", "BDF", "switches"
+        "{:24} {:7} {:>9} {:>9} {:>11} {:>9} {:>9} {:>9} {:>9}",
+        "system", "method", "steps", "rejected", "evaluations", "Jacobians", "BDF", "switches", "swings"
     );
-    let print = |system: &str, method: &str, result: Result<Statistics, Failure>| match result {
-        Ok(s) => println!(
-            "{system:24} {method:7} {:9} {:9} {:11} {:9} {:9} {:9}",
+    let print = |system: &str, method: &str, result: Result<(Statistics, u64), Failure>| match result {
+        Ok((s, swings)) => println!(
+            "{system:24} {method:7} {:9} {:9} {:11} {:9} {:9} {:9} {:>9}",
             s.steps,
             s.rejected + s.convergence_failures,
             s.evaluations,
             s.jacobians,
             s.stiff_steps,
-            s.method_switches
+            s.method_switches,
+            if system.starts_with("hysteretic") { swings.to_string() } else { String::new() },
         ),
         Err(failure) => println!("{system:24} {method:7} {failure}"),
     };

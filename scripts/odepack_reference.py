@@ -5,7 +5,8 @@ Frozen: run by hand, committed with the versions used, never run by the tests.
 
     pip install scipy==1.14.1 && python3 scripts/odepack_reference.py
 
-SciPy 1.14 is among the last that compile ODEPACK's own Fortran. Every run is made with analytic Jacobians and one
+SciPy 1.14 is among the last that compile ODEPACK's own Fortran (SciPy 1.17's translation to C gives the same counts
+in 60 of the 62 runs, and in all those that rounding does not decide). Every run is made with analytic Jacobians and one
 step at a time (solve_ivp's LSODA class: ITASK = 5, the end of the run is a wall), so that steps, evaluations,
 orders and switches are ODEPACK's own counters (IWORK, RWORK), not a wrapper's.
 

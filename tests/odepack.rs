@@ -207,6 +207,21 @@ fn radau5_reaches_the_reference_solutions() {
     for_each(&mut Check(reference()));
 }
 
+/// The data of the work-precision picture: complete, and without the rows that a non-stiff method cannot give.
+#[test]
+fn work_precision_rows() {
+    let rows = data::rows();
+    for known in &reference().problems {
+        let count = |method| rows.iter().filter(|r| r.problem == known.name && r.method == method).count();
+        for method in ["odepack-lsoda", "lsoda", "radau5"] {
+            assert_eq!(count(method), known.runs.len(), "{} {method}", known.name);
+        }
+        let too_stiff = ["robertson", "van-der-pol-1000", "oregonator"].contains(&known.name.as_str());
+        assert_eq!(count("dopri5"), if too_stiff { 0 } else { known.runs.len() }, "{}", known.name);
+    }
+    assert!(rows.iter().all(|r| r.error.is_finite() && r.evaluations > 0));
+}
+
 /// `cargo test --release --test odepack table -- --ignored --nocapture`
 #[test]
 #[ignore = "prints the comparison, run by run, for a reader"]

@@ -9,14 +9,20 @@
 //!
 //! | here | there |
 //! |---|---|
-//! | [`coefficients`] | EL, TESCO, SM1 |
-//! | [`nordsieck`] | YH, the scaled history |
-//! | [`selection`] | step, order and method selection |
+//! | `coefficients` | EL, TESCO, SM1 |
+//! | `nordsieck` | YH, the scaled history |
+//! | `selection` | step, order and method selection |
 //! | `correction` | ACOR |
 //! | `lipschitz` | PDEST, PDLAST: the Lipschitz constant seen by the iteration |
 //!
 //! Errors are measured in the norm max_i |e_i| / (rtol |x_i| + atol). The dense output is the Nordsieck polynomial of the
-//! step just made. The end of the run is a wall (ODEPACK's ITASK 4 and 5): no evaluation is made beyond it.
+//! step just made. The end of the run is a wall (ODEPACK's ITASK 4 and 5): no evaluation is made beyond it, and the end
+//! also sets the scale of the first step, as TOUT does there.
+//!
+//! How near it comes to ODEPACK is tested in tests/odepack.rs. Of 62 runs of its LSODA on ten problems, 27 make the same
+//! decisions from starts 1e-12 apart; there steps, evaluations, Jacobians, orders and switches are the same here, one by
+//! one. In the others rounding decides sooner or later, and the counts here differ from ODEPACK's as ODEPACK's differ from
+//! themselves, by at most 9 %.
 
 mod coefficients;
 mod nordsieck;
@@ -26,7 +32,7 @@ use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 use super::linear::Lu;
-use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
+use super::step::{Failure, Statistics, Step, Stepper, Tolerance, finite};
 use crate::model::{VectorField, jacobian};
 use crate::num::elementary::{pow, sqrt};
 use coefficients::{ADAMS, ADAMS_ORDERS, ADAMS_STABILITY, BDF, BDF_ORDERS, Formula};
@@ -98,7 +104,6 @@ pub struct Lsoda<const N: usize> {
     /// The step that the history is scaled with.
     h: f64,
     history: Nordsieck<N>,
-    dense: Dense,
     /// 1 / (rtol |x_i| + atol) at the start of the step.
     weights: SVector<f64, N>,
     /// e of the corrector formula y <- y + l e.
@@ -137,34 +142,22 @@ pub struct Lsoda<const N: usize> {
     held: bool,
 }
 
-/// Where on the history the last step's dense output is.
-#[derive(Clone, Copy, Debug)]
-struct Dense {
-    order: usize,
-    /// The step's length in units of `h`.
-    length: f64,
-}
-
-impl<const N: usize> Interpolant<N> for Lsoda<N> {
-    fn at(&self, theta: f64) -> SVector<f64, N> {
-        self.history.at(self.dense.order, (theta - 1.0) * self.dense.length)
-    }
-    fn degree(&self) -> usize {
-        self.dense.order
-    }
-}
-
 /// The corrector iteration diverged or was too slow.
 struct NotConverged;
 
 impl<const N: usize> Lsoda<N> {
     /// A stepper with the given tolerances.
     pub fn new(tolerance: Tolerance) -> Self {
+        Self { switches: Vec::with_capacity(SWITCHES_KEPT), ..Self::blank(tolerance) }
+    }
+
+    /// A stepper that knows nothing yet, and has allocated nothing.
+    fn blank(tolerance: Tolerance) -> Self {
         let zero = SVector::zeros();
         Self {
             tolerance,
             statistics: Statistics::default(),
-            switches: Vec::with_capacity(SWITCHES_KEPT),
+            switches: Vec::new(),
             t: 0.0,
             t_end: 0.0,
             max_step: f64::INFINITY,
@@ -172,7 +165,6 @@ impl<const N: usize> Lsoda<N> {
             order: 1,
             h: 0.0,
             history: Nordsieck::new(zero, zero),
-            dense: Dense { order: 1, length: 1.0 },
             weights: zero,
             correction: zero,
             correction_before: zero,
@@ -467,9 +459,21 @@ impl<const N: usize> Lsoda<N> {
                     // The estimates are lost in rounding. Only a step that stability holds down is a sign.
                     return self.stability_bound.then_some(Change { family: Family::Bdf, order: q, ratio: 2.0 });
                 }
-                let adams = self.adams_growth(error, q, self.lipschitz);
                 // The same derivative, through the other formula's constants.
-                let bdf = growth(BIAS_SAME, error * error_ratio(q), q);
+                let bdf_error = error * error_ratio(q);
+                // At equal accuracy BDF is never the longer step by SWITCH_RATIO (see `error_ratio`), so stability must
+                // decide: BDF's growth, at most 1/(bias error^(1/(q+1))), against SWITCH_RATIO times the stable growth.
+                // Raised to the power q + 1 this needs no root; nearly every step ends here.
+                let bound = self.lipschitz * self.h / (SWITCH_RATIO * BIAS_SAME * ADAMS_STABILITY[q - 1]);
+                let mut power = 1.000_001 * bound;
+                for _ in 0..q {
+                    power *= bound;
+                }
+                if bdf_error > power {
+                    return None;
+                }
+                let adams = self.adams_growth(error, q, self.lipschitz);
+                let bdf = growth(BIAS_SAME, bdf_error, q);
                 (bdf >= SWITCH_RATIO * adams).then_some(Change { family: Family::Bdf, order: q, ratio: bdf })
             }
             Family::Bdf => {
@@ -511,7 +515,7 @@ impl<const N: usize> Lsoda<N> {
 }
 
 /// Error of the BDF formula over error of the Adams formula of the same order, for the same y_(q+1): an e stands for
-/// l_q e, whatever the family.
+/// l_q e, whatever the family. From 1 (order 1, the same formula) upwards.
 fn error_ratio(q: usize) -> f64 {
     let (adams, bdf) = (&ADAMS[q - 1], &BDF[q - 1]);
     adams.same * adams.l[q] / (bdf.same * bdf.l[q])
@@ -532,7 +536,7 @@ impl<const N: usize> Stepper<N> for Lsoda<N> {
         if !finite(&x) || !finite(&derivative) {
             return Err(Failure::NotFinite { t, state: Failure::state(&x) });
         }
-        let fresh = Self::new(self.tolerance);
+        let fresh = Self::blank(self.tolerance);
         *self = Self {
             statistics: std::mem::take(&mut self.statistics),
             switches: std::mem::take(&mut self.switches),
@@ -556,7 +560,9 @@ impl<const N: usize> Stepper<N> for Lsoda<N> {
         self.weigh();
         let (t0, x0) = (self.t, *self.history.x());
         let underflow = |h: f64| Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) };
-        if self.norm(&x0) * EPSILON > 1.0 {
+        // Tolerances below the rounding of x itself (or zero: a NaN here).
+        let rounding = self.norm(&x0) * EPSILON;
+        if rounding > 1.0 || rounding.is_nan() {
             return Err(underflow(self.h));
         }
         let (mut not_converged, mut too_inaccurate) = (0, 0);
@@ -612,7 +618,6 @@ impl<const N: usize> Stepper<N> for Lsoda<N> {
         };
 
         self.history.correct(self.order, self.formula(), &self.correction);
-        self.dense = Dense { order: self.order, length: 1.0 };
         self.t = t0 + self.h;
         if (self.t - self.t_end).abs() <= 100.0 * EPSILON * (self.t.abs() + self.h) {
             self.t = self.t_end;
@@ -634,7 +639,7 @@ impl<const N: usize> Stepper<N> for Lsoda<N> {
         if !self.held {
             self.look_ahead(error);
         }
-        Ok(Step { t0, t1: self.t, x0, x1, interpolant: self })
+        Ok(Step { t0, t1: self.t, x0, x1, interpolant: &self.history })
     }
 
     fn statistics(&self) -> &Statistics {

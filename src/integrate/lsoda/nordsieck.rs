@@ -3,11 +3,14 @@
 use nalgebra::SVector;
 
 use super::coefficients::{COLUMNS, Formula};
+use crate::integrate::step::Interpolant;
 
 /// Scaled derivatives y_j = h^j x^(j)/j! at one time, j = 0..=q used.
 #[derive(Clone, Debug)]
 pub(super) struct Nordsieck<const N: usize> {
     y: [SVector<f64, N>; COLUMNS],
+    /// The order of the step that led here: the degree of the polynomial that is its dense output.
+    degree: usize,
 }
 
 impl<const N: usize> Nordsieck<N> {
@@ -15,7 +18,7 @@ impl<const N: usize> Nordsieck<N> {
         let mut y = [SVector::zeros(); COLUMNS];
         y[0] = x;
         y[1] = h_derivative;
-        Self { y }
+        Self { y, degree: 1 }
     }
 
     pub fn column(&self, j: usize) -> &SVector<f64, N> {
@@ -56,6 +59,7 @@ impl<const N: usize> Nordsieck<N> {
         for (y, l) in self.y[..=order].iter_mut().zip(formula.l) {
             *y += e * l;
         }
+        self.degree = order;
     }
 
     /// Goes over to the step `ratio` times as long.
@@ -66,14 +70,22 @@ impl<const N: usize> Nordsieck<N> {
             *y *= power;
         }
     }
+}
 
-    /// The polynomial x(t + s h), of degree `order`.
-    pub fn at(&self, order: usize, s: f64) -> SVector<f64, N> {
-        let mut x = self.y[order];
-        for y in self.y[..order].iter().rev() {
+/// The Nordsieck polynomial, over the step that was corrected last and has not been rescaled since. It misses that
+/// step's start by about the local error, as the dense output of a multistep method does: it is the new polynomial, not
+/// the one before.
+impl<const N: usize> Interpolant<N> for Nordsieck<N> {
+    fn at(&self, theta: f64) -> SVector<f64, N> {
+        let s = theta - 1.0;
+        let mut x = self.y[self.degree];
+        for y in self.y[..self.degree].iter().rev() {
             x = x * s + y;
         }
         x
+    }
+    fn degree(&self) -> usize {
+        self.degree
     }
 }
 
@@ -87,13 +99,14 @@ mod tests {
         let mut y = Nordsieck::new(SVector::from([1.0]), SVector::from([1.5]));
         y.set_column(2, SVector::from([0.75]));
         y.set_column(3, SVector::from([0.125]));
-        assert_eq!(y.at(3, 1.0)[0], 3.375);
+        y.degree = 3;
+        assert_eq!(y.at(2.0)[0], 3.375);
         y.predict(3);
         assert_eq!([0, 1, 2, 3].map(|j| y.column(j)[0]), [3.375, 3.375, 1.125, 0.125]);
-        assert_eq!(y.at(3, -1.0)[0], 1.0);
+        assert_eq!(y.at(0.0)[0], 1.0);
         y.retract(3);
         assert_eq!([0, 1, 2, 3].map(|j| y.column(j)[0]), [1.0, 1.5, 0.75, 0.125]);
         y.rescale(3, 2.0);
-        assert_eq!(y.at(3, 1.0)[0], 8.0);
+        assert_eq!(y.at(2.0)[0], 8.0);
     }
 }

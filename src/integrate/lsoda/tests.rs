@@ -260,3 +260,11 @@ fn failures_are_named() {
     let nan = lsoda.restart(&Explosion, 0.0, vector![f64::NAN], 2.0, f64::INFINITY);
     assert!(matches!(nan, Err(Failure::NotFinite { .. })));
 }
+
+/// What the shortcut in the stiffness test rests on.
+#[test]
+fn bdf_is_never_the_more_accurate_formula() {
+    for q in 1..=BDF_ORDERS {
+        assert!(error_ratio(q) >= 1.0, "order {q}: {}", error_ratio(q));
+    }
+}
