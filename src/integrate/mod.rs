@@ -9,8 +9,10 @@ pub mod driver;
 pub mod roots;
 pub mod schedule;
 pub mod step;
+pub mod taylor;
 
 pub use dopri5::Dopri5;
 pub use driver::{Ignore, Observer, Summary, Watch, drive};
 pub use schedule::{Kick, KickLaw, Kicker, Schedule, StepCap};
 pub use step::{Failure, Flow, Interpolant, Statistics, Step, Stepper, Tolerance};
+pub use taylor::Taylor;
