@@ -15,7 +15,7 @@ use nalgebra::SVector;
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
 use crate::model::VectorField;
 use crate::num::elementary::{exp, ln, pow};
-use crate::num::series::{Program, Solution};
+use crate::num::series::{Constants, FromDecimal, Program, Solution};
 use crate::num::{DoubleDouble, Scalar};
 
 /// How far a step inside a layer may move the argument of its tanh.
@@ -33,7 +33,7 @@ const EDGE_MARGIN: f64 = 1.0;
 const EDGE_SEARCH: usize = 100;
 
 /// A number type that this method can work in.
-pub trait Precision: Scalar {
+pub trait Precision: Scalar + FromDecimal {
     /// Relative spacing of the numbers.
     const EPSILON: f64;
     /// tanh is exactly +-1 beyond this argument.
@@ -58,7 +58,7 @@ impl Precision for DoubleDouble {
 pub struct Taylor<const N: usize, S = f64> {
     tolerance: Tolerance,
     statistics: Statistics,
-    program: Program<N>,
+    constants: Constants,
     solution: Solution<S, N>,
     order: usize,
     t: S,
@@ -98,6 +98,12 @@ impl<const N: usize> Taylor<N, DoubleDouble> {
     pub fn extended(tolerance: Tolerance) -> Self {
         Self::with_tolerance(tolerance)
     }
+
+    /// Reads the equation's constants as decimal numbers ([`Constants::Decimal`]), from the next restart on.
+    pub fn with_decimal_constants(mut self) -> Self {
+        self.constants = Constants::Decimal;
+        self
+    }
 }
 
 impl<const N: usize, S: Precision> Taylor<N, S> {
@@ -109,8 +115,8 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         Self {
             tolerance,
             statistics: Statistics { highest_order: order as u64, ..Statistics::default() },
-            program: Program::default(),
-            solution: Solution::new(order),
+            constants: Constants::Binary,
+            solution: Solution::new(order, Program::default(), Constants::Binary),
             order,
             t: S::zero(),
             x: zero,
@@ -161,7 +167,8 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
     }
 
     fn record<F: VectorField<N>>(&mut self, field: &F) {
-        self.program = Program::record(&self.x.map(S::to_f64), |x| field.eval(x));
+        let program = Program::record(&self.x.map(S::to_f64), |x| field.eval(x));
+        self.solution.set_program(program, self.constants);
         self.statistics.evaluations += 1;
     }
 
@@ -277,10 +284,10 @@ impl<const N: usize, S: Precision> Stepper<N> for Taylor<N, S> {
 
     fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
         let (t0, x0) = (self.t.to_f64(), self.x.map(S::to_f64));
-        if self.program.depends_on_values() {
+        if self.solution.program().depends_on_values() {
             self.record(field);
         }
-        self.solution.expand(&self.program, &self.x);
+        self.solution.expand(&self.x);
         // One evaluation of the series costs about as much as one of the right-hand side per degree.
         self.statistics.evaluations += self.order as u64;
 

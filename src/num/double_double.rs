@@ -78,6 +78,32 @@ impl DoubleDouble {
         Self { high, low }
     }
 
+    /// The shortest decimal number that reads as `value`: `from_decimal(0.1)` is one tenth, to 106 bits.
+    pub fn from_decimal(value: f64) -> Self {
+        if !value.is_finite() {
+            return Self::from_f64(value);
+        }
+        // Rust prints the shortest digits that read back as the same number, on every platform.
+        let text = format!("{value:e}");
+        let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+        let mut number = Self::zero();
+        let mut exponent: i32 = exponent.parse().unwrap_or(0);
+        let mut after_point = false;
+        for c in digits.chars() {
+            if let Some(digit) = c.to_digit(10) {
+                // At most 17 digits: exact.
+                number = number.times_f64(10.0).plus_f64(f64::from(digit));
+                exponent -= i32::from(after_point);
+            } else {
+                after_point |= c == '.';
+            }
+        }
+        let ten = Self::from_f64(10.0);
+        let power = (0..exponent.abs()).fold(Self::one(), |power, _| power * ten);
+        let number = if exponent < 0 { number / power } else { number * power };
+        if value < 0.0 { -number } else { number }
+    }
+
     /// The nearest `f64`.
     #[inline]
     pub fn high(self) -> f64 {
@@ -350,6 +376,18 @@ mod tests {
         assert_eq!((dd(1.0) + tiny) - dd(1.0), tiny - (tiny - ((dd(1.0) + tiny) - dd(1.0))));
         assert!(gap((dd(1.0) + tiny) - dd(1.0), tiny) < 1e-6);
         assert!(dd(1.0) + tiny > dd(1.0) && dd(1.0) - tiny < dd(1.0));
+    }
+
+    #[test]
+    fn decimals() {
+        for (value, n, d) in [(0.1, 1.0, 10.0), (-1.2, -6.0, 5.0), (1e-5, 1.0, 1e5), (12345.678, 12345678.0, 1000.0)] {
+            assert!(gap(DoubleDouble::from_decimal(value), dd(n) / dd(d)) < 4.0 * DoubleDouble::EPSILON, "{value}");
+        }
+        for exact in [0.0, 0.5, -3.0, 1e20] {
+            assert_eq!(DoubleDouble::from_decimal(exact), dd(exact));
+        }
+        assert_eq!(DoubleDouble::from_decimal(0.2).to_f64(), 0.2);
+        assert_eq!(DoubleDouble::from_decimal(f64::INFINITY).to_f64(), f64::INFINITY);
     }
 
     #[test]

@@ -15,7 +15,7 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Range, Sub, SubAssign};
 
 use nalgebra::SVector;
 
-use super::Scalar;
+use super::{DoubleDouble, Scalar};
 
 /// Index of an operation in a program.
 type Node = usize;
@@ -44,6 +44,34 @@ enum Operation {
     Sin(Node),
     /// Cosine of the node; the sine is the operation before.
     Cos(Node),
+}
+
+impl Operation {
+    /// The operation's constant.
+    fn constant(self) -> Option<f64> {
+        match self {
+            Operation::Constant(c) | Operation::Scale(_, c) | Operation::Over(_, c) => Some(c),
+            _ => None,
+        }
+    }
+}
+
+/// Numbers that can stand for a decimal number more exactly than `f64`.
+pub trait FromDecimal {
+    /// The shortest decimal number that reads as `value`.
+    fn from_decimal(value: f64) -> Self;
+}
+
+impl FromDecimal for f64 {
+    fn from_decimal(value: f64) -> Self {
+        value
+    }
+}
+
+impl FromDecimal for DoubleDouble {
+    fn from_decimal(value: f64) -> Self {
+        DoubleDouble::from_decimal(value)
+    }
 }
 
 thread_local! {
@@ -233,19 +261,54 @@ impl<const N: usize> Program<N> {
     }
 }
 
+/// What an equation's constants, given as `f64`, stand for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Constants {
+    /// Themselves: the same equation that `f64` methods solve.
+    #[default]
+    Binary,
+    /// The shortest decimal number that reads as this `f64`: 0.1 is one tenth. In extended precision, that is another
+    /// equation: the 1e-17 between the two is seen in the 13th digit after one visit to the singularity and a hundred
+    /// units of time.
+    Decimal,
+}
+
 /// Power series in t, of the solution of x' = f(x) and of everything computed on the way.
 #[derive(Clone, Debug)]
 pub struct Solution<S, const N: usize> {
     degree: usize,
     /// The series of all operations, `degree + 1` coefficients each.
     coefficients: Vec<S>,
-    tanh_arguments: Vec<Node>,
+    program: Program<N>,
+    /// The constant in each operation of the program (zero if it has none).
+    constants: Vec<S>,
 }
 
-impl<S: Scalar, const N: usize> Solution<S, N> {
-    /// Room for series up to `degree`.
-    pub fn new(degree: usize) -> Self {
-        Self { degree, coefficients: Vec::new(), tanh_arguments: Vec::new() }
+impl<S: Scalar + FromDecimal, const N: usize> Solution<S, N> {
+    /// Room for series up to `degree`, of solutions of x' = f(x), f being `program`.
+    pub fn new(degree: usize, program: Program<N>, constants: Constants) -> Self {
+        let mut solution =
+            Self { degree, coefficients: Vec::new(), program: Program::default(), constants: Vec::new() };
+        solution.set_program(program, constants);
+        solution
+    }
+
+    /// Replaces the equation.
+    pub fn set_program(&mut self, program: Program<N>, constants: Constants) {
+        self.constants.clear();
+        self.constants.extend(program.operations.iter().map(|operation| match (operation.constant(), constants) {
+            (None, _) => S::zero(),
+            (Some(c), Constants::Binary) => S::from_f64(c),
+            (Some(c), Constants::Decimal) => S::from_decimal(c),
+        }));
+        self.coefficients.clear();
+        self.coefficients.resize(program.operations.len() * (self.degree + 1), S::zero());
+        self.program = program;
+    }
+
+    /// The equation.
+    pub fn program(&self) -> &Program<N> {
+        &self.program
     }
 
     fn range(&self, node: Node) -> Range<usize> {
@@ -259,26 +322,26 @@ impl<S: Scalar, const N: usize> Solution<S, N> {
 
     /// The series of the arguments of every tanh in the equation, up to degree `degree - 1`.
     pub fn tanh_arguments(&self) -> impl Iterator<Item = &[S]> {
-        self.tanh_arguments.iter().map(|node| {
+        self.program.tanh_arguments.iter().map(|node| {
             let range = self.range(*node);
             &self.coefficients[range.start..range.end - 1]
         })
     }
 
-    /// Computes the series of the solution of x' = f(x) through `x` at t = 0, f being `program`.
-    pub fn expand(&mut self, program: &Program<N>, x: &SVector<S, N>) {
+    /// Computes the series of the solution that passes through `x` at t = 0.
+    pub fn expand(&mut self, x: &SVector<S, N>) {
         let width = self.degree + 1;
-        self.tanh_arguments.clone_from(&program.tanh_arguments);
-        self.coefficients.clear();
-        self.coefficients.resize(program.operations.len() * width, S::zero());
+        // Recurrences rely on coefficients not yet computed being zero.
+        self.coefficients.fill(S::zero());
         for (i, value) in x.iter().enumerate() {
             self.coefficients[i * width] = *value;
         }
         for k in 0..self.degree {
-            for (node, operation) in program.operations.iter().enumerate().skip(N) {
-                self.coefficients[node * width + k] = self.coefficient(*operation, node, k);
+            for node in N..self.program.operations.len() {
+                self.coefficients[node * width + k] = self.coefficient(self.program.operations[node], node, k);
             }
-            for (i, output) in program.outputs.iter().enumerate() {
+            for i in 0..N {
+                let output = self.program.outputs[i];
                 self.coefficients[i * width + k + 1] =
                     self.coefficients[output * width + k] / S::from_f64((k + 1) as f64);
             }
@@ -292,9 +355,9 @@ impl<S: Scalar, const N: usize> Solution<S, N> {
         let one_over = |sum: S| sum / S::from_f64(k as f64);
         match operation {
             Operation::Variable(i) => series(i)[k],
-            Operation::Constant(c) => {
+            Operation::Constant(_) => {
                 if k == 0 {
-                    S::from_f64(c)
+                    self.constants[node]
                 } else {
                     S::zero()
                 }
@@ -302,8 +365,8 @@ impl<S: Scalar, const N: usize> Solution<S, N> {
             Operation::Add(a, b) => series(a)[k] + series(b)[k],
             Operation::Sub(a, b) => series(a)[k] - series(b)[k],
             Operation::Neg(a) => -series(a)[k],
-            Operation::Scale(a, c) => series(a)[k].scale(c),
-            Operation::Over(a, c) => series(a)[k] / S::from_f64(c),
+            Operation::Scale(a, _) => series(a)[k] * self.constants[node],
+            Operation::Over(a, _) => series(a)[k] / self.constants[node],
             Operation::Mul(a, b) if a == b => square(series(a), k),
             Operation::Mul(a, b) => convolution(series(a), series(b), 0, k),
             Operation::Div(a, b) => {
@@ -375,7 +438,6 @@ fn weighted<S: Scalar>(a: &[S], b: &[S], k: usize) -> S {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::num::DoubleDouble;
     use nalgebra::vector;
 
     fn expand<const N: usize>(
@@ -383,8 +445,8 @@ mod tests {
         x: SVector<f64, N>,
         f: impl Fn(&SVector<Recorded, N>) -> SVector<Recorded, N>,
     ) -> Solution<DoubleDouble, N> {
-        let mut solution = Solution::new(degree);
-        solution.expand(&Program::record(&x, f), &x.map(DoubleDouble::from_f64));
+        let mut solution = Solution::new(degree, Program::record(&x, f), Constants::Binary);
+        solution.expand(&x.map(DoubleDouble::from_f64));
         solution
     }
 
@@ -468,6 +530,19 @@ mod tests {
         let c = s.component(0);
         assert_eq!(c[1], DoubleDouble::one());
         assert!(c[2..].iter().all(|c| *c == DoubleDouble::zero()));
+    }
+
+    #[test]
+    fn decimal_constants_are_decimal() {
+        let x = vector![1.0];
+        let p = Program::record(&x, |x| vector![x[0].scale(0.1) / Recorded::from_f64(1e-3) + Recorded::from_f64(-1.2)]);
+        let slope = |constants| {
+            let mut s = Solution::<DoubleDouble, 1>::new(1, p.clone(), constants);
+            s.expand(&vector![DoubleDouble::one()]);
+            (s.component(0)[1] - DoubleDouble::from_decimal(98.8)).to_f64().abs()
+        };
+        assert!(slope(Constants::Decimal) < 1e-29);
+        assert!(slope(Constants::Binary) > 1e-16);
     }
 
     #[test]

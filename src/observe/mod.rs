@@ -2,6 +2,7 @@
 //!
 //! Everything here looks at accepted steps and their interpolants from outside; no solver knows that it is observed.
 
+pub mod digits;
 pub mod path;
 pub mod section;
 
