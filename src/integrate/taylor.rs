@@ -21,7 +21,7 @@ use crate::num::{DoubleDouble, Scalar};
 /// How far a step inside a layer may move the argument of its tanh.
 pub const LAYER_STRIDE: f64 = 0.5;
 
-/// Jorba & Zou (2005), sec. 3.2.1: the step is shortened by exp(-0.7/(p - 1)) for safety.
+/// Jorba & Zou (2005), sec. 3: the step is shortened by exp(-0.7/(p - 1)) for safety.
 const SAFETY_EXPONENT: f64 = -0.7;
 
 /// A step is planned outside a layer only from this far beyond the edge, and then lands less than this far beyond: else
@@ -108,7 +108,7 @@ impl<const N: usize> Taylor<N, DoubleDouble> {
 
 impl<const N: usize, S: Precision> Taylor<N, S> {
     fn with_tolerance(tolerance: Tolerance) -> Self {
-        // Jorba & Zou (2005), eq. (3-1): for analytic solutions the work per unit of time is least at this order.
+        // Jorba & Zou (2005), sec. 3: for analytic solutions the work per unit of time is least at this order.
         let smallest = tolerance.rtol.min(tolerance.atol).clamp(S::EPSILON / 16.0, 1e-2);
         let order = (1.0 - 0.5 * ln(smallest)).ceil() as usize;
         let zero = SVector::from_element(S::zero());
@@ -178,7 +178,7 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
     }
 
     /// The step that the series allow: the terms of degree p - 1 and p stay below atol + rtol |x|, component by
-    /// component. With p as in [`Taylor::with_tolerance`] this is Jorba & Zou's step (their eqs 3-6 to 3-8), a factor e^2
+    /// component. With p as in [`Taylor::with_tolerance`] this is Jorba & Zou's step (2005, sec. 3), a factor e^2
     /// inside the radius of convergence that these two terms suggest.
     fn accurate_step(&self) -> f64 {
         let p = self.order;

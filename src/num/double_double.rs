@@ -144,7 +144,7 @@ impl DoubleDouble {
     }
 
     /// exp(self) - 1 for |self| < 0.36: Taylor series of self/512, then e^(2a) - 1 = 2 (e^a - 1) + (e^a - 1)^2 nine times
-    /// (Hida, Li & Bailey 2001, sec. 4.4). Without the 1, nothing is lost for small arguments.
+    /// (Hida, Li & Bailey 2001). Without the 1, nothing is lost for small arguments.
     fn small_exp_m1(self) -> Self {
         let r = self.times_f64(1.0 / Self::REDUCTION);
         let (mut term, mut sum) = (r, r);

@@ -2,7 +2,7 @@
 //!
 //! [`Program::record`] runs an equation once on numbers that write down what is done with them. A [`Solution`] then yields,
 //! for any [`Scalar`], the coefficients of the solution's power series one degree after another, each operation by its
-//! own recurrence (Moore 1966, ch. 11; Griewank & Walther 2008, table 13.2; Jorba & Zou 2005, prop. 1). Degree K costs
+//! own recurrence (Moore 1966, ch. 11; Griewank & Walther 2008, table 13.2; Jorba & Zou 2005, sec. 2). Degree K costs
 //! O(K^2) per nonlinear operation. A truncated series that is itself a `Scalar` would have to be evaluated anew at
 //! every degree, O(K^3)/3; that is why there is none.
 //!
@@ -268,8 +268,7 @@ pub enum Constants {
     #[default]
     Binary,
     /// The shortest decimal number that reads as this `f64`: 0.1 is one tenth. In extended precision, that is another
-    /// equation: the 1e-17 between the two is seen in the 13th digit after one visit to the singularity and a hundred
-    /// units of time.
+    /// equation: on the paper's orbits, the 1e-17 between the two has grown to 1e-12 a hundred units of time later.
     Decimal,
 }
 

@@ -5,6 +5,20 @@
 //! put numbers on that: how many digits of each crossing a method gets right ([`agreement`]), and how much larger a
 //! small disturbance is after a visit, as a function of when it was made ([`amplification`]). Both are measured
 //! against an orbit in double-double arithmetic ([`reference`]).
+//!
+//! Measured with this module, first visit, reconstructed reading (alpha = 1e-1), growth of a disturbance between 0.1 before
+//! and 0.1 after the passage, by its direction:
+//!
+//! ```text
+//! eps                              1e-2              1e-3              1e-4
+//! across the layer (x)             1e9 .. 3e9        7e11 .. 8e12      8e14 .. 5e16
+//! along the surface (y, z)         1e6 .. 1.5e8      6e9 .. 1.1e11     2e12 .. 2.7e14
+//! made at t = 0                    0.09 .. 0.12      0.02              0.006
+//! ```
+//!
+//! Three to four digits per decade of eps. What is brought in from outside is contracted on the way in by as much, and a
+//! little more: the *place* of the exit crossing hardly depends on the start (its time does). In the printed reading
+//! (alpha = 1e-3) the growth in x at the passage is larger still: 1e14, 2e16, 2e20.
 
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
@@ -185,7 +199,8 @@ pub struct Amplification {
 
 /// Amplified rounding of double-double numbers stays below this up to growths of about 1e20.
 pub const SMALLEST_RESPONSE: f64 = 1e-9;
-/// The response to a disturbance is linear up to here, to a few per cent at the smallest eps of the paper's kind, 1e-4.
+/// Up to here the response to a disturbance is linear to about one per cent for eps from 1e-2 to 1e-4 (compared with
+/// responses 1e3 times smaller).
 pub const LARGEST_RESPONSE: f64 = 1e-4;
 /// A disturbance must be far above the spacing of double-double numbers near 1e-2.
 const SMALLEST_SIZE: f64 = 1e-29;
