@@ -162,3 +162,14 @@ macro_rules! conforms {
 conforms!(dopri5, Dopri5);
 conforms!(lsoda, Lsoda);
 conforms!(radau5, Radau5);
+conforms!(taylor, Taylor);
+conforms!(taylor_extended, Extended);
+
+/// The same promises in double-double arithmetic.
+struct Extended;
+impl Extended {
+    #[allow(clippy::new_ret_no_self)] // takes the place of a stepper's type in the macro
+    fn new<const N: usize>(tolerance: Tolerance) -> Taylor<N, twofold::num::DoubleDouble> {
+        Taylor::extended(tolerance)
+    }
+}

@@ -13,6 +13,7 @@ pub mod radau5;
 pub mod roots;
 pub mod schedule;
 pub mod step;
+pub mod taylor;
 
 pub use dopri5::Dopri5;
 pub use driver::{Ignore, Observer, Summary, Watch, drive};
@@ -20,3 +21,4 @@ pub use lsoda::Lsoda;
 pub use radau5::Radau5;
 pub use schedule::{Kick, KickLaw, Kicker, Schedule, StepCap};
 pub use step::{Failure, Flow, Interpolant, Statistics, Step, Stepper, Tolerance};
+pub use taylor::Taylor;

@@ -5,6 +5,7 @@
 pub mod attractor;
 pub mod floquet;
 pub mod lyapunov;
+pub mod digits;
 pub mod path;
 pub mod section;
 pub mod tangent;

@@ -50,6 +50,11 @@ impl SectionRecorder {
         Self { coordinate, value, crossings: Vec::new() }
     }
 
+    /// The passages so far, in time order.
+    pub fn crossings(&self) -> &[Crossing] {
+        &self.crossings
+    }
+
     /// The passages, in time order.
     pub fn into_crossings(self) -> Vec<Crossing> {
         self.crossings
