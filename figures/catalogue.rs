@@ -6,6 +6,10 @@ use twofold::figure::Figure;
 
 #[path = "fig2/main.rs"]
 mod fig2;
+#[path = "fig4/main.rs"]
+mod fig4;
+#[path = "fig5/main.rs"]
+mod fig5;
 #[path = "fig6/main.rs"]
 mod fig6;
 #[path = "fig7/main.rs"]
@@ -19,5 +23,14 @@ mod lottery;
 
 /// Every figure, in the paper's order, then our own.
 pub fn all() -> Vec<Figure> {
-    vec![fig2::figure(), fig6::figure(), fig7::figure(), fig8::figure(), fig9::figure(), lottery::figure()]
+    vec![
+        fig2::figure(),
+        fig4::figure(),
+        fig5::figure(),
+        fig6::figure(),
+        fig7::figure(),
+        fig8::figure(),
+        fig9::figure(),
+        lottery::figure(),
+    ]
 }

@@ -3,7 +3,8 @@
 use super::simulate::{Data, Recording};
 use super::spec::SystemSpec;
 use super::{Camera, Panel, Picture, View, surface, wording};
-use crate::observe::{Crossing, Sample};
+use crate::integrate::filippov::{EventKind, Mode, Side};
+use crate::observe::{Crossing, Motion, Sample};
 use crate::record::Hash;
 use crate::render::sheet::{
     Axis, ColumnWidth, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle, PlanePanel, Sheet,
@@ -83,9 +84,9 @@ fn section_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording],
 
 /// Paths in space: the same box in every panel.
 fn space_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording], camera: &Camera) -> Sheet {
-    let samples = || recordings.iter().flat_map(|r| samples(&r.data));
+    let curves: Vec<Vec<Curve>> = recordings.iter().map(|r| curves(&r.data)).collect();
     let ranges: [(f64, f64); 3] = std::array::from_fn(|i| {
-        let (low, high) = range_of(samples().map(|s| s.x[i]));
+        let (low, high) = range_of(curves.iter().flatten().flat_map(|c| &c.points).map(|x| x[i]));
         let margin = 0.04 * (high - low);
         (low - margin, high + margin)
     });
@@ -96,22 +97,78 @@ fn space_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording], c
         Axis::linear(format!("*{}*", greek(names[order[k]])), low, high)
     };
     let turn = |x: [f64; 3]| order.map(|i| x[i]);
-    for (panel, recording) in picture.panels.iter().zip(recordings) {
+    for ((panel, recording), curves) in picture.panels.iter().zip(recordings).zip(&curves) {
         let mut patches = surface::patches(&panel.run.system, &ranges, SURFACE_CELLS);
         for corner in patches.iter_mut().flat_map(|p| p.corners.iter_mut()) {
             *corner = turn(*corner);
         }
-        let path = self::samples(&recording.data).iter().map(|s| turn(s.x)).collect();
-        let mut chart = SpacePanel::new(axis(0), axis(1), axis(2))
-            .camera(camera.azimuth, camera.elevation)
-            .surface(patches)
-            .line(path, LineStyle::new(style::INK, PATH_PT));
+        let mut chart =
+            SpacePanel::new(axis(0), axis(1), axis(2)).camera(camera.azimuth, camera.elevation).surface(patches);
+        for curve in curves {
+            chart = chart.line(curve.points.iter().map(|x| turn(*x)).collect(), curve.style);
+        }
+        let exits: Vec<[f64; 3]> = exits(&recording.data).into_iter().map(turn).collect();
+        if !exits.is_empty() {
+            chart = chart.markers(exits, EXIT);
+        }
         if let Some(point) = surface::singularity(&panel.run.system) {
             chart = chart.markers(vec![turn(point)], SINGULARITY);
         }
         sheet = sheet.panel(label(picture, panel), panel.title.as_str(), chart);
     }
-    region_legend(sheet)
+    let sheet = region_legend(sheet);
+    match recordings.first().map(|r| &r.data) {
+        Some(Data::Motion(_)) => sheet
+            .legend(LegendEntry::new(LegendKey::Line(SLIDING), "sliding"))
+            .legend(LegendEntry::new(LegendKey::Marker(EXIT), "exit")),
+        Some(Data::Funnel { .. }) => sheet
+            .legend(LegendEntry::new(LegendKey::Line(APPROACH), "the one way in"))
+            .legend(LegendEntry::new(LegendKey::Line(TO_PLUS), "ways out to *h* > 0"))
+            .legend(LegendEntry::new(LegendKey::Line(TO_MINUS), "ways out to *h* < 0")),
+        _ => sheet,
+    }
+}
+
+/// A curve in space.
+struct Curve {
+    points: Vec<[f64; 3]>,
+    style: LineStyle,
+}
+
+/// What is drawn of a recording in space.
+fn curves(data: &Data) -> Vec<Curve> {
+    let points = |samples: &[Sample]| samples.iter().map(|s| s.x).collect::<Vec<_>>();
+    let motion = |motion: &Motion, flight: LineStyle, sliding: LineStyle| -> Vec<Curve> {
+        let style = |mode: &Mode| if mode.slides() { sliding } else { flight };
+        motion.pieces.iter().map(|(mode, samples)| Curve { points: points(samples), style: style(mode) }).collect()
+    };
+    match data {
+        Data::Section(_) => Vec::new(),
+        Data::Path(samples) => vec![Curve { points: points(samples), style: LineStyle::new(style::INK, PATH_PT) }],
+        Data::Motion(m) => motion(m, FLIGHT, SLIDING),
+        Data::Funnel { approach, futures } => {
+            let mut all = Vec::new();
+            for future in futures {
+                let style = if future.side == Side::Plus { TO_PLUS } else { TO_MINUS };
+                all.extend(motion(&future.motion, style, style));
+            }
+            all.extend(motion(approach, APPROACH, APPROACH));
+            all
+        }
+    }
+}
+
+/// Where a motion leaves repelling sliding.
+fn exits(data: &Data) -> Vec<[f64; 3]> {
+    match data {
+        Data::Motion(motion) => motion
+            .events
+            .iter()
+            .filter(|e| matches!(e.kind, EventKind::Exit { .. } | EventKind::ExitAtBoundary { .. }))
+            .map(|e| e.state.into())
+            .collect(),
+        _ => Vec::new(),
+    }
 }
 
 /// What the colours of the surface mean.
@@ -128,20 +185,25 @@ fn region_legend(sheet: Sheet) -> Sheet {
 const SURFACE_CELLS: usize = 60;
 /// Width of a long path, in points: thinner than a curve, so that windings stay apart.
 const PATH_PT: f64 = 0.5;
+/// Free flight of a Filippov motion.
+const FLIGHT: LineStyle = LineStyle::new(style::INK, 0.6);
+/// Sliding, drawn apart from flight by width and colour.
+const SLIDING: LineStyle = LineStyle::new(style::GREEN, 1.6);
+/// The motion up to a set-valued point.
+const APPROACH: LineStyle = LineStyle::new(style::INK, 1.4);
+/// Futures on the side h > 0.
+const TO_PLUS: LineStyle = LineStyle::new(style::BLUE, 0.5);
+/// Futures on the side h < 0.
+const TO_MINUS: LineStyle = LineStyle::new(style::VERMILLION, 0.5);
+/// The end of repelling sliding.
+const EXIT: MarkerStyle = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::GREEN, size: 3.6 };
 /// The two-fold.
 const SINGULARITY: MarkerStyle = MarkerStyle::new(MarkerShape::Dot, style::MAGENTA);
 
 fn crossings(data: &Data) -> &[Crossing] {
     match data {
         Data::Section(crossings) => crossings,
-        Data::Path(_) => &[],
-    }
-}
-
-fn samples(data: &Data) -> &[Sample] {
-    match data {
-        Data::Path(samples) => samples,
-        Data::Section(_) => &[],
+        _ => &[],
     }
 }
 

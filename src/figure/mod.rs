@@ -18,8 +18,9 @@ pub mod wording;
 
 use serde::{Deserialize, Serialize};
 
+use crate::integrate::filippov::ExitRule;
 use crate::model::Caricature;
-use spec::{Method, RunSpec};
+use spec::{Method, RunSpec, SwitchSpec};
 use verdict::Claim;
 
 /// A figure of the paper.
@@ -180,6 +181,12 @@ impl Picture {
             for kick in self.panels.iter_mut().filter_map(|p| p.run.schedule.kick.as_mut()) {
                 changed |= kick.seed != seed;
                 kick.seed = seed;
+            }
+            for panel in &mut self.panels {
+                if let SwitchSpec::Filippov { exit: ExitRule::Random { seed: old, .. }, .. } = &mut panel.run.switch {
+                    changed |= *old != seed;
+                    *old = seed;
+                }
             }
             if changed {
                 suffix += &format!("-seed{seed}");

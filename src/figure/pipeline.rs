@@ -125,7 +125,7 @@ pub fn compute(picture: &Picture, progress: &Progress) -> Result<Computed, Pipel
         .map(|(panel, recording)| PanelEntry {
             label: panel.label.clone(),
             spec: Hash::of_json(&panel.run),
-            data: Hash::of(&encode::bits(&recording.data)),
+            data: Hash::of(&encode::bits(&panel.run, &recording.data)),
         })
         .collect();
     let spec = Hash::of(&canonical_json(&picture.panels.iter().map(|p| (&p.label, &p.run)).collect::<Vec<_>>()));

@@ -2,10 +2,15 @@
 
 use nalgebra::{SVector, vector};
 
-use super::spec::{Method, Observation, RunSpec, SpecError, SwitchSpec, SystemSpec};
-use crate::integrate::{Dopri5, Failure, Lsoda, Observer, Radau5, Statistics, Stepper, Watch, drive};
+use super::spec::{FunnelSpec, Method, Observation, RunSpec, SpecError, SwitchSpec, SystemSpec};
+use crate::integrate::filippov::{
+    self, AllModes, ExitRule, FilippovError, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent, Side,
+};
+use crate::integrate::{
+    Dopri5, Failure, Flow, Lsoda, Observer, Radau5, Statistics, Step, Stepper, Taylor, Watch, drive,
+};
 use crate::model::{Hysteretic, PiecewiseSmooth, Smoothed, VectorField};
-use crate::observe::{Crossing, PathRecorder, Sample, SectionRecorder};
+use crate::observe::{Crossing, Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder};
 
 /// What a run left behind.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +34,26 @@ pub enum Data {
     Path(Vec<Sample>),
     /// A Poincare section.
     Section(Vec<Crossing>),
+    /// A Filippov motion: pieces by mode, and events.
+    Motion(Motion),
+    /// The approach to a set-valued point and its futures.
+    Funnel {
+        /// The motion up to there.
+        approach: Motion,
+        /// The futures, by exit time, plus before minus.
+        futures: Vec<Future>,
+    },
+}
+
+/// One future of a set-valued point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Future {
+    /// Time of repelling sliding asked for.
+    pub exit_time: f64,
+    /// The side left to.
+    pub side: Side,
+    /// The motion from the set-valued point on.
+    pub motion: Motion,
 }
 
 impl Data {
@@ -37,6 +62,10 @@ impl Data {
         match self {
             Data::Path(samples) => samples.len(),
             Data::Section(crossings) => crossings.len(),
+            Data::Motion(motion) => motion.len(),
+            Data::Funnel { approach, futures } => {
+                approach.len() + futures.iter().map(|f| f.motion.len()).sum::<usize>()
+            }
         }
     }
 
@@ -55,6 +84,9 @@ pub enum RunError {
     /// The integration failed.
     #[error(transparent)]
     Integration(#[from] Failure),
+    /// The Filippov motion could not go on.
+    #[error(transparent)]
+    Filippov(#[from] FilippovError),
 }
 
 /// Computes a run.
@@ -74,7 +106,110 @@ fn switch<P: PiecewiseSmooth<3> + Copy>(spec: &RunSpec, system: P, watch: &dyn W
             let field = Hysteretic { system, eps, eps_prime, relaxation };
             observe(spec, &field, vector![x0[0], x0[1], x0[2], phi0], watch)
         }
+        SwitchSpec::Filippov { exit, funnel } => discontinuous(spec, &system, x0, exit, funnel, watch),
     }
+}
+
+/// The discontinuous system, event by event.
+fn discontinuous<P: PiecewiseSmooth<3>>(
+    spec: &RunSpec,
+    system: &P,
+    x0: SVector<f64, 3>,
+    exit: ExitRule,
+    funnel: Option<FunnelSpec>,
+    watch: &dyn Watch,
+) -> Result<Recording, RunError> {
+    let settings = filippov::Settings {
+        tolerance: spec.method.tolerance,
+        max_step: spec.method.step_cap.for_segment(spec.t_end),
+        max_steps: spec.method.max_steps,
+        ..filippov::Settings::default()
+    };
+    let recording = |data, summary: FilippovSummary<3>| Recording {
+        data,
+        t: summary.t,
+        x: summary.x.into(),
+        most_steps_in_segment: summary.statistics.steps,
+        statistics: summary.statistics,
+    };
+    match (spec.observe, funnel) {
+        (Observation::Path { .. }, Some(funnel)) => futures(spec, system, x0, &settings, &funnel),
+        (Observation::Path { chord }, None) => {
+            let mut recorder = Watched { inner: MotionRecorder::new(chord), watch };
+            let end = filippov::run(system, x0, spec.t_end, &settings, exit, &mut recorder)?;
+            Ok(recording(Data::Motion(recorder.inner.into_motion()), end))
+        }
+        (Observation::Section { coordinate, value }, _) => {
+            let mut recorder = SectionRecorder::new(coordinate, value);
+            let mut watched = Watched { inner: AllModes(&mut recorder), watch };
+            let end = filippov::run(system, x0, spec.t_end, &settings, exit, &mut watched)?;
+            Ok(recording(Data::Section(recorder.into_crossings()), end))
+        }
+    }
+}
+
+/// A Filippov observer that also reports progress.
+struct Watched<'a, O> {
+    inner: O,
+    watch: &'a dyn Watch,
+}
+
+impl<O: FilippovObserver<3>> FilippovObserver<3> for Watched<'_, O> {
+    fn step(&mut self, mode: Mode, step: &Step<'_, 3>) -> Flow {
+        self.inner.step(mode, step)
+    }
+    fn event(&mut self, event: &ModeEvent<3>) -> Flow {
+        if self.watch.reached(event.t) { self.inner.event(event) } else { Flow::Stop }
+    }
+}
+
+/// The funnel: the approach to the set-valued point, and its futures.
+fn futures<P: PiecewiseSmooth<3>>(
+    spec: &RunSpec,
+    system: &P,
+    x0: SVector<f64, 3>,
+    settings: &filippov::Settings,
+    funnel: &FunnelSpec,
+) -> Result<Recording, RunError> {
+    let grid = FunnelGrid {
+        shortest: funnel.shortest,
+        longest: funnel.longest,
+        times: funnel.times,
+        horizon: funnel.horizon,
+        until_two_fold: funnel.until_two_fold,
+        per_step: POINTS_PER_STEP,
+    };
+    let found = filippov::funnel(system, x0, spec.t_end, settings, &grid)?;
+    let mut statistics = Statistics::default();
+    for member in &found.members {
+        statistics.steps += member.summary.statistics.steps;
+        statistics.rejected += member.summary.statistics.rejected;
+        statistics.evaluations += member.summary.statistics.evaluations;
+        statistics.restarts += member.summary.statistics.restarts;
+        statistics.highest_order = member.summary.statistics.highest_order;
+    }
+    let futures = found
+        .members
+        .into_iter()
+        .map(|m| Future { exit_time: m.exit_time, side: m.side, motion: motion(m.trajectory) })
+        .collect();
+    Ok(Recording {
+        data: Data::Funnel { approach: motion(found.approach), futures },
+        t: found.t,
+        x: found.point.into(),
+        most_steps_in_segment: statistics.steps,
+        statistics,
+    })
+}
+
+/// Recorded points in each step of a funnel's orbits.
+const POINTS_PER_STEP: usize = 6;
+
+fn motion(trajectory: filippov::Trajectory<3>) -> Motion {
+    let samples =
+        |points: Vec<(f64, SVector<f64, 3>)>| points.into_iter().map(|(t, x)| Sample { t, x: x.into() }).collect();
+    let pieces = trajectory.pieces.into_iter().map(|p| (p.mode, samples(p.points))).collect();
+    Motion { pieces, events: trajectory.events }
 }
 
 fn observe<F: VectorField<N>, const N: usize>(
@@ -108,6 +243,8 @@ fn integrate<F: VectorField<N>, O: Observer<N>, const N: usize>(
         Method::Lsoda => step(spec, field, x0, Lsoda::new(spec.method.tolerance), observer, watch),
         Method::Dopri5 => step(spec, field, x0, Dopri5::new(spec.method.tolerance), observer, watch),
         Method::Radau5 => step(spec, field, x0, Radau5::new(spec.method.tolerance), observer, watch),
+        Method::Taylor => step(spec, field, x0, Taylor::new(spec.method.tolerance), observer, watch),
+        Method::TaylorExtended => step(spec, field, x0, Taylor::extended(spec.method.tolerance), observer, watch),
     }
 }
 

@@ -5,6 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::integrate::filippov::ExitRule;
 use crate::integrate::{Schedule, StepCap, Tolerance};
 use crate::model::{Caricature, Relaxation, Transition, Wheel};
 use crate::num::elementary::exp10;
@@ -71,6 +72,30 @@ pub enum SwitchSpec {
         /// phi at the start.
         phi0: f64,
     },
+    /// The discontinuous system itself, in Filippov's sense (sec. 3).
+    Filippov {
+        /// How repelling sliding ends: the choice that the equations do not make.
+        exit: ExitRule,
+        /// Which futures are followed if `exit` is [`ExitRule::All`]; required there, absent elsewhere.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        funnel: Option<FunnelSpec>,
+    },
+}
+
+/// Which members of a funnel are computed: exit times, geometrically spaced, and both sides of each.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FunnelSpec {
+    /// Shortest time of repelling sliding.
+    pub shortest: f64,
+    /// Longest time of repelling sliding.
+    pub longest: f64,
+    /// Number of times.
+    pub times: usize,
+    /// Follow each future so long at most.
+    pub horizon: f64,
+    /// Stop a future when it next comes to a two-fold.
+    pub until_two_fold: bool,
 }
 
 impl SwitchSpec {
@@ -95,6 +120,10 @@ pub enum Method {
     Dopri5,
     /// Radau IIA of order 5.
     Radau5,
+    /// Taylor series that resolve the layer, in f64.
+    Taylor,
+    /// The same in double-double arithmetic, about 32 digits: the reference.
+    TaylorExtended,
 }
 
 impl Method {
@@ -104,6 +133,8 @@ impl Method {
             Method::Lsoda => "lsoda",
             Method::Dopri5 => "dopri5",
             Method::Radau5 => "radau5",
+            Method::Taylor => "taylor",
+            Method::TaylorExtended => "taylor-extended",
         }
     }
 }
@@ -214,6 +245,40 @@ impl RunSpec {
                 positive("eps", eps)?;
                 positive("eps-prime", eps_prime)?;
                 finite("phi0", phi0)?;
+            }
+            SwitchSpec::Filippov { exit, funnel } => {
+                let wrong = |rule| Err(SpecError { field: "exit", value: format!("{exit:?}"), rule });
+                if exit.validate().is_err() {
+                    return wrong("times and lengths are finite and not below 0, probabilities between 0 and 1");
+                }
+                if (exit == ExitRule::All) != funnel.is_some() {
+                    return wrong("\"all\" and a description of the funnel go together");
+                }
+                if let Some(funnel) = funnel {
+                    positive("funnel-shortest", funnel.shortest)?;
+                    positive("funnel-longest", funnel.longest)?;
+                    positive("funnel-horizon", funnel.horizon)?;
+                    if funnel.times == 0 || funnel.times > 100_000 {
+                        return error("funnel-times", funnel.times as f64, "give a number from 1 to 100000");
+                    }
+                    if let Observation::Section { .. } = self.observe {
+                        return wrong("a funnel is recorded as paths; leave out --section");
+                    }
+                }
+                if self.method.name != Method::Dopri5 {
+                    return Err(SpecError {
+                        field: "method",
+                        value: self.method.name.name().into(),
+                        rule: "Filippov motion is integrated by dopri5 between events",
+                    });
+                }
+                if self.schedule != Schedule::default() {
+                    return Err(SpecError {
+                        field: "switch",
+                        value: "filippov".into(),
+                        rule: "restarts and kicks apply to smoothed and hysteretic runs; leave them out",
+                    });
+                }
             }
         }
         positive("rtol", self.method.tolerance.rtol)?;

@@ -214,5 +214,7 @@ fn exponent_of<P: PiecewiseSmooth<3> + Copy>(run: &RunSpec, system: P, x: [f64; 
             let settings = lyapunov::Settings { duration: 2_000.0, ..lyapunov::Settings::default() };
             lyapunov::largest::<4, 8, _>(&field, vector![x[0], x[1], x[2], phi], &settings).ok()
         }
+        // A set-valued motion has no tangent flow.
+        SwitchSpec::Filippov { .. } => None,
     }
 }

@@ -3,6 +3,7 @@
 use super::Reading;
 use super::spec::{MethodSpec, RunSpec, SwitchSpec, SystemSpec};
 use crate::integrate::StepCap;
+use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use crate::model::{Relaxation, Transition};
 
 /// A number as a printer would set it: 0.13, 10^{-5}, 1.05×10^{-8}, 200 000.
@@ -85,6 +86,31 @@ pub fn switch(switch: &SwitchSpec) -> String {
             number(*eps),
             number(*eps_prime)
         ),
+        SwitchSpec::Filippov { exit, .. } => format!("discontinuous (Filippov), exit {}", exit_rule(exit)),
+    }
+}
+
+/// An exit rule in words.
+pub fn exit_rule(rule: &ExitRule) -> String {
+    let to = |side: Side| match side {
+        Side::Plus => "*h* > 0",
+        Side::Minus => "*h* < 0",
+    };
+    match rule {
+        ExitRule::AtOnce { side } => format!("at once to {}", to(*side)),
+        ExitRule::AfterTime { time, side } => format!("after a time of {} to {}", number(*time), to(*side)),
+        ExitRule::AfterArc { arc, side } => format!("after an arc of {} to {}", number(*arc), to(*side)),
+        ExitRule::Random { law, plus_probability, seed, stream } => {
+            let law = match law {
+                SlidingLaw::Uniform { longest } => format!("uniform up to {}", number(*longest)),
+                SlidingLaw::Exponential { mean } => format!("exponential with mean {}", number(*mean)),
+            };
+            format!(
+                "after a random time ({law}) to a random side (*h* > 0 with probability {}; ChaCha8, seed {seed}, stream {stream})",
+                number(*plus_probability)
+            )
+        }
+        ExitRule::All => "all: the whole funnel".into(),
     }
 }
 

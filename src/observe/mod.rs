@@ -3,13 +3,15 @@
 //! Everything here looks at accepted steps and their interpolants from outside; no solver knows that it is observed.
 
 pub mod attractor;
+pub mod digits;
 pub mod floquet;
 pub mod lyapunov;
-pub mod digits;
+pub mod motion;
 pub mod path;
 pub mod section;
 pub mod tangent;
 pub mod tangle;
 
+pub use motion::{Motion, MotionRecorder};
 pub use path::{PathRecorder, Sample};
 pub use section::{Crossing, Direction, SectionRecorder};

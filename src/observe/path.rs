@@ -28,7 +28,12 @@ impl PathRecorder {
     /// A recorder that starts at `x0`; `chord` is the largest distance between polyline and interpolant, in the
     /// state's units.
     pub fn new<const N: usize>(x0: &SVector<f64, N>, chord: f64) -> Self {
-        Self { chord, samples: vec![Sample { t: 0.0, x: first_three(x0) }] }
+        Self::starting(0.0, x0, chord)
+    }
+
+    /// A recorder that starts at time `t`.
+    pub fn starting<const N: usize>(t: f64, x: &SVector<f64, N>, chord: f64) -> Self {
+        Self { chord, samples: vec![Sample { t, x: first_three(x) }] }
     }
 
     /// The path.

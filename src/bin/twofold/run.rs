@@ -7,6 +7,7 @@ use twofold::figure::progress::Progress;
 use twofold::figure::simulate::simulate;
 use twofold::figure::spec::*;
 use twofold::figure::{Reading, encode};
+use twofold::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use twofold::integrate::{Kick, KickLaw, Schedule, StepCap, Tolerance};
 use twofold::model::{Relaxation, Transition, Wheel};
 use twofold::record;
@@ -74,9 +75,9 @@ pub struct RunFlags {
     /// Final time.
     #[arg(long, default_value_t = 150.0, allow_hyphen_values = true)]
     t_end: f64,
-    /// Integration method.
-    #[arg(long, value_enum, default_value = "lsoda")]
-    method: Method,
+    /// Integration method [default: lsoda; dopri5 with --switch filippov].
+    #[arg(long, value_enum)]
+    method: Option<Method>,
     /// Relative tolerance [default: 10^-7.97727, NDSolve's].
     #[arg(long, allow_hyphen_values = true)]
     rtol: Option<f64>,
@@ -101,6 +102,25 @@ pub struct RunFlags {
     /// Law of a kick.
     #[arg(long, value_enum, requires = "kick_every")]
     kick_law: Option<KickLaw>,
+    /// How repelling sliding ends (with --switch filippov): at-once:SIDE, after-time:T:SIDE, after-arc:L:SIDE, with SIDE plus or
+    /// minus; random:exponential:MEAN or random:uniform:LONGEST (see --seed, --stream, --plus-probability); all.
+    #[arg(long, value_name = "RULE")]
+    exit: Option<String>,
+    /// Probability of leaving to h > 0 under a random exit rule.
+    #[arg(long, default_value_t = 0.5, allow_hyphen_values = true)]
+    plus_probability: f64,
+    /// Number of exit times of a funnel (--exit all); each is followed to both sides.
+    #[arg(long, value_name = "N", default_value_t = 12)]
+    funnel_times: usize,
+    /// Shortest time of repelling sliding in a funnel.
+    #[arg(long, value_name = "T", default_value_t = 0.05, allow_hyphen_values = true)]
+    funnel_shortest: f64,
+    /// Longest time of repelling sliding in a funnel.
+    #[arg(long, value_name = "T", default_value_t = 2.0, allow_hyphen_values = true)]
+    funnel_longest: f64,
+    /// Follow each future so long, or to its next two-fold.
+    #[arg(long, value_name = "T", default_value_t = 50.0, allow_hyphen_values = true)]
+    funnel_horizon: f64,
     /// Seed of the random numbers.
     #[arg(long, default_value_t = 2013)]
     seed: u64,
@@ -117,7 +137,7 @@ pub struct RunFlags {
     #[arg(long, value_name = "FILE", conflicts_with_all = [
         "system", "switch", "reading", "alpha", "beta", "v_plus", "v_minus", "eps", "sigma", "eps_prime", "hysteresis", "start",
         "t_end", "method", "rtol", "atol", "max_step", "max_steps", "restart", "kick_every", "kick_size", "kick_law", "seed",
-        "stream", "section", "chord",
+        "stream", "section", "chord", "exit", "plus_probability", "funnel_times", "funnel_shortest", "funnel_longest", "funnel_horizon",
     ])]
     spec: Option<PathBuf>,
 }
@@ -136,6 +156,8 @@ enum Switch {
     Smoothed,
     /// Eq. (10).
     Hysteretic,
+    /// The discontinuous system itself.
+    Filippov,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -151,8 +173,16 @@ enum Format {
 enum Misuse {
     #[error("{flag} belongs to the caricature; leave it out with --system wheel")]
     NotOfTheWheel { flag: &'static str },
-    #[error("--sigma perturbs the smoothed switch; leave it out with --switch hysteretic")]
+    #[error("--sigma perturbs the smoothed switch; leave it out, or use --switch smoothed")]
     SigmaWithoutSmoothing,
+    #[error(
+        "at the two-fold the future is a set, and nothing is chosen silently: give --exit at-once:plus, after-time:0.3:minus, after-arc:0.2:plus, random:exponential:0.5, or all"
+    )]
+    NoExitRule,
+    #[error(
+        "--exit \"{0}\" is not a rule; give one such as at-once:plus, after-time:0.3:minus, after-arc:0.2:plus, random:exponential:0.5, random:uniform:1, or all"
+    )]
+    Exit(String),
     #[error("--start has {found} numbers; give three, such as 0.2,0,-1")]
     Start { found: usize },
     #[error("--section \"{text}\": {problem}; give one of {known} and a number, such as {example}=0")]
@@ -235,15 +265,31 @@ fn spec(a: &RunFlags) -> Result<RunSpec, Misuse> {
             let eps_prime = a.eps_prime.unwrap_or(10.0 * a.eps);
             SwitchSpec::Hysteretic { eps: a.eps, eps_prime, relaxation: a.hysteresis, phi0: 1.0 }
         }
+        Switch::Filippov => {
+            if a.sigma.is_some() {
+                return Err(Misuse::SigmaWithoutSmoothing);
+            }
+            let exit = exit_rule(a)?;
+            let funnel = (exit == ExitRule::All).then_some(FunnelSpec {
+                shortest: a.funnel_shortest,
+                longest: a.funnel_longest,
+                times: a.funnel_times,
+                horizon: a.funnel_horizon,
+                until_two_fold: true,
+            });
+            SwitchSpec::Filippov { exit, funnel }
+        }
     };
     let start = match &a.start {
         None if a.system == System::Wheel => [0.69267, 0.0, 0.0],
         None => [0.2, 0.0, -1.0],
         Some(numbers) => numbers.as_slice().try_into().map_err(|_| Misuse::Start { found: numbers.len() })?,
     };
-    let defaults = MethodSpec::ndsolve_defaults(a.method);
+    let discontinuous = matches!(switch, SwitchSpec::Filippov { .. });
+    let name = a.method.unwrap_or(if discontinuous { Method::Dopri5 } else { Method::Lsoda });
+    let defaults = MethodSpec::ndsolve_defaults(name);
     let method = MethodSpec {
-        name: a.method,
+        name,
         tolerance: Tolerance {
             rtol: a.rtol.unwrap_or(defaults.tolerance.rtol),
             atol: a.atol.unwrap_or(defaults.tolerance.atol),
@@ -270,6 +316,28 @@ fn spec(a: &RunFlags) -> Result<RunSpec, Misuse> {
         method,
         schedule: Schedule { restart_every: a.restart, kick },
         observe,
+    })
+}
+
+/// Reads "after-time:0.3:minus".
+fn exit_rule(a: &RunFlags) -> Result<ExitRule, Misuse> {
+    let text = a.exit.as_deref().ok_or(Misuse::NoExitRule)?;
+    let wrong = || Misuse::Exit(text.to_owned());
+    let side = |word: &str| match word {
+        "plus" => Ok(Side::Plus),
+        "minus" => Ok(Side::Minus),
+        _ => Err(wrong()),
+    };
+    let number = |word: &str| word.parse::<f64>().map_err(|_| wrong());
+    let random = |law| ExitRule::Random { law, plus_probability: a.plus_probability, seed: a.seed, stream: a.stream };
+    Ok(match text.split(':').collect::<Vec<_>>().as_slice() {
+        ["at-once", s] => ExitRule::AtOnce { side: side(s)? },
+        ["after-time", t, s] => ExitRule::AfterTime { time: number(t)?, side: side(s)? },
+        ["after-arc", l, s] => ExitRule::AfterArc { arc: number(l)?, side: side(s)? },
+        ["random", "exponential", m] => random(SlidingLaw::Exponential { mean: number(m)? }),
+        ["random", "uniform", l] => random(SlidingLaw::Uniform { longest: number(l)? }),
+        ["all"] => ExitRule::All,
+        _ => return Err(wrong()),
     })
 }
 
