@@ -66,8 +66,8 @@ pub enum RenderError {
         /// Its value.
         value: f64,
     },
-    /// The picture is too large to be held.
-    #[error("the picture is too large")]
+    /// The picture is higher than 8000 pixels.
+    #[error("the picture is too large: give it fewer rows of panels, or a smaller aspect")]
     TooLarge,
     /// Drawing failed inside plotters.
     #[error("drawing failed: {0}")]
@@ -102,6 +102,10 @@ pub struct Rendered {
 pub fn render(sheet: &Sheet) -> Result<Rendered, RenderError> {
     check(sheet)?;
     let scene = layout::draw(sheet)?;
+    // Beyond this the rasteriser would leave out anti-aliasing.
+    if scene.height_px > 8_000 {
+        return Err(RenderError::TooLarge);
+    }
     let pixels = raster::rasterise(&scene).ok_or(RenderError::TooLarge)?;
     let title = match &sheet.title {
         Some(title) => rich_text::set(title, font::Cut::Regular)?.plain,

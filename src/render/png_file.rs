@@ -3,7 +3,8 @@
 use std::borrow::Cow;
 use std::io::Cursor;
 
-use png::{BitDepth, ColorType, DeflateCompression, Encoder, Filter, Info, PixelDimensions, Unit};
+use miniz_oxide::deflate::compress_to_vec_zlib;
+use png::{BitDepth, ColorType, Encoder, Info, PixelDimensions, Unit};
 
 use super::RenderError;
 use super::provenance::Sealed;
@@ -20,11 +21,11 @@ pub fn write(pixels: &Pixels, title: &str, description: &str, sealed: &Sealed) -
     let per_metre = (f64::from(DPI) / 0.0254).round() as u32;
     info.pixel_dims = Some(PixelDimensions { xppu: per_metre, yppu: per_metre, unit: Unit::Meter });
     info.bit_depth = BitDepth::Eight;
-    let data = match indexed(pixels) {
+    let stream = match indexed(pixels) {
         Some((palette, indices)) => {
             info.color_type = ColorType::Indexed;
             info.palette = Some(Cow::Owned(palette));
-            indices
+            image_stream(&indices, pixels.width as usize)
         }
         None => {
             info.color_type = ColorType::Rgb;
@@ -32,23 +33,33 @@ pub fn write(pixels: &Pixels, title: &str, description: &str, sealed: &Sealed) -
             for (to, from) in rgb.chunks_exact_mut(3).zip(pixels.rgba.chunks_exact(4)) {
                 to.copy_from_slice(&from[..3]);
             }
-            rgb
+            image_stream(&rgb, 3 * pixels.width as usize)
         }
     };
     let mut file = Vec::new();
     let mut encoder = Encoder::with_info(&mut file, info)?;
-    // Drawings repeat whole stretches of pixels; filters made for photographs hide that and make larger files more slowly.
-    encoder.set_filter(Filter::NoFilter);
-    encoder.set_deflate_compression(DeflateCompression::Level(LEVEL));
     encoder.add_itxt_chunk("Title".to_owned(), title.to_owned())?;
     encoder.add_itxt_chunk("Description".to_owned(), description.to_owned())?;
     for (key, value) in &sealed.entries {
         encoder.add_itxt_chunk(format!("{KEYWORD_PREFIX}{key}"), value.clone())?;
     }
     let mut writer = encoder.write_header()?;
-    writer.write_image_data(&data)?;
+    writer.write_chunk(png::chunk::IDAT, &stream)?;
     writer.finish()?;
     Ok(file)
+}
+
+/// The compressed image data of rows of so many bytes.
+///
+/// Rows are not filtered: drawings repeat whole stretches of pixels, and filters made for photographs hide that. Compressed here rather
+/// than by the PNG crate, whose compressor is chosen by cargo features that any dependency can turn on.
+fn image_stream(data: &[u8], row: usize) -> Vec<u8> {
+    let mut rows = Vec::with_capacity(data.len() + data.len() / row + 1);
+    for line in data.chunks_exact(row) {
+        rows.push(0);
+        rows.extend_from_slice(line);
+    }
+    compress_to_vec_zlib(&rows, LEVEL)
 }
 
 /// Effort of compression: higher levels cost more time than all the drawing.

@@ -168,7 +168,10 @@ fn labels(panel: &SpacePanel, bounds: &Bounds, scale: f64) -> Vec<Label> {
             let share = (t.value - s.lower) / (s.upper - s.lower);
             let p = [a[0] + share * (b[0] - a[0]), -(a[1] + share * (b[1] - a[1]))].map(|v| v * scale);
             let (rect, far) = label_rect(p, edge.out, &t.label, style::TICK_PT, style::TICK_LENGTH_PT + 2.0);
-            if labels.iter().any(|l| l.rect.overlaps(rect)) {
+            // Two numbers side by side must not read as one.
+            let pad = units(3.0);
+            let padded = Rect { x: rect.x - pad, w: rect.w + 2 * pad, ..rect };
+            if labels.iter().any(|l| l.rect.overlaps(padded)) {
                 continue;
             }
             reach = reach.max(far);

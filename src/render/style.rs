@@ -105,4 +105,4 @@ pub const DENSITY_LIGHTEST: f64 = 0.45;
 /// Number of depth classes of a 3D curve.
 pub const DEPTH_LEVELS: usize = 8;
 /// Share of white mixed into the farthest part of a 3D curve.
-pub const DEPTH_FADE: f64 = 0.6;
+pub const DEPTH_FADE: f64 = 0.55;

@@ -272,6 +272,8 @@ fn unusable_axes_and_numbers_are_named() {
     assert!(render(&space(good())).is_ok());
     assert!(matches!(render(&space(good().camera(0.0, 91.0))), Err(RenderError::Number { .. })));
     assert!(matches!(render(&space(good().proportions([1.0, 0.0, 1.0]))), Err(RenderError::Number { .. })));
+    let tower = (0..40).fold(Sheet::new(ColumnWidth::Double, 1, ""), |s, _| s.panel("", "", good()));
+    assert!(matches!(render(&tower), Err(RenderError::TooLarge)));
     let faulty = Sheet::new(ColumnWidth::Single, 1, "").title("*x");
     assert!(matches!(render(&faulty), Err(RenderError::Text(RichTextError::Italic { .. }))));
 }
