@@ -1,9 +1,9 @@
 //! The event-driven Filippov integrator against closed forms.
 
-use nalgebra::vector;
+use nalgebra::{SVector, vector};
 use twofold::integrate::filippov::two_fold::SlidingAtTwoFold;
 use twofold::integrate::filippov::{
-    End, EventKind, ExitRule, FilippovError, Mode, Settings, Side, SlidingLaw, Trajectory, run,
+    End, EventKind, ExitRule, FilippovError, FunnelGrid, Mode, Settings, Side, SlidingLaw, Trajectory, funnel, run,
 };
 use twofold::model::filippov::Visibility;
 use twofold::model::{Caricature, Feedback, PiecewiseSmooth, Relay, StickSlip, TwoFoldNormalForm, Wheel};
@@ -72,6 +72,15 @@ fn crossing_return_map_of_the_normal_form() {
     }
 }
 
+fn visible_pair(plus: bool, minus: bool) -> TwoFoldNormalForm {
+    let of = |visible| if visible { Visibility::Visible } else { Visibility::Invisible };
+    TwoFoldNormalForm { plus: of(plus), minus: of(minus), v: 0.0, w: 0.0 }
+}
+
+fn close<const N: usize>(a: SVector<f64, N>, b: SVector<f64, N>, tolerance: f64) {
+    assert!((a - b).amax() <= tolerance, "{:?} is not {:?}", a.as_slice(), b.as_slice());
+}
+
 #[test]
 fn caricature_passes_the_two_fold_several_times() {
     for (alpha, t_end) in [(1e-3, 300.0), (1e-1, 100.0)] {
@@ -79,28 +88,375 @@ fn caricature_passes_the_two_fold_several_times() {
         let mut out = Trajectory::new(4);
         let end = run(&c, vector![0.2, 0.0, -1.0], t_end, &Settings::default(), random(2013, 0.5), &mut out).unwrap();
         let passages = out.events.iter().filter(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).count();
-        println!("alpha {alpha}: {passages} passages, {} events, {:?}", end.events, end.statistics);
-        for e in out.events.iter().take(40) {
-            println!("{:10.5} {:?} {:?} {:?}", e.t, e.state.as_slice(), e.kind, e.to);
-        }
         assert!(passages >= 3, "{passages}");
         assert!(drift(&c, &out) <= 1e-12, "{:e}", drift(&c, &out));
         assert!(wrong_side(&c, &out) <= 1e-12, "{:e}", wrong_side(&c, &out));
         assert_eq!(end.end, End::Time);
+        // Pieces join without gaps, and the mode that an event announces is the mode of the piece that follows.
+        for pair in out.pieces.windows(2) {
+            assert_eq!(pair[0].points.last(), pair[1].points.first());
+        }
+        for event in &out.events {
+            let next = out.pieces.iter().find(|p| p.points[0].0 == event.t && Some(p.mode) == event.to);
+            assert!(event.to.is_none() || next.is_some(), "{event:?}");
+        }
     }
 }
 
 #[test]
-fn the_wheel_runs() {
+fn the_misprinted_sign_never_returns() {
+    // SCIENCE.md section 1: with -z the orbit sticks to a point and never returns.
+    use twofold::model::caricature::MinusSign;
+    let c = Caricature {
+        first_component_of_minus: MinusSign::PrintedInEquation5,
+        ..Caricature::with_reinjection(1e-3, 1e-5)
+    };
+    let mut out = Trajectory::new(1);
+    let end = run(&c, vector![0.2, 0.0, -1.0], 4000.0, &Settings::default(), STAY, &mut out).unwrap();
+    assert_eq!(end.mode, Some(Mode::SlidingAttracting));
+    // It ends on the point where f+ and f- are opposed, lambda f+ + (1 - lambda) f- = 0 with lambda = z/(z - y): that is
+    // (0, 8.084, -9.014); SCIENCE.md says "near (0, 8.9, -9.4)", which does not satisfy this equation.
+    let (y, z) = (end.x[1], end.x[2]);
+    let (lambda, r2) = (z / (z - y), y * y + z * z);
+    assert!((lambda - 1.4 * (1.0 - lambda) + (1e-3 - 1e-5 * y) * r2).abs() < 1e-9);
+    assert!((-1.2 * lambda + 1.0 - lambda + (1e-3 - 1e-5 * z) * r2).abs() < 1e-9);
+    assert!((end.x - vector![0.0, 8.9, -9.4]).norm() < 1.0);
+}
+
+#[test]
+fn the_wheel_returns_to_its_singularity() {
     let w = Wheel::default();
     let mut out = Trajectory::new(4);
-    let local = SlidingAtTwoFold::near(&w, &vector![0.69, -0.57, -0.87]).unwrap();
-    println!("{:?} radius {}", local.directions, local.radius);
-    let start = vector![0.69267, 0.0, 0.0];
-    let end = run(&w, start, 60.0, &Settings::default(), random(1, 0.05), &mut out).unwrap();
-    let passages = out.events.iter().filter(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).count();
-    println!("wheel: {passages} passages, {} events, {:?}", end.events, end.statistics);
-    assert!(passages >= 3, "{passages}");
+    let end = run(&w, vector![0.69267, 0.0, 0.0], 60.0, &Settings::default(), random(1, 0.05), &mut out).unwrap();
+    let at = vector![0.6926698897, -0.5736729677, -0.8666344383];
+    let visits: Vec<_> = out.events.iter().filter(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).collect();
+    assert!(visits.len() >= 3, "{}", visits.len());
+    for visit in visits {
+        close(visit.state, at, 1e-10);
+    }
     assert!(drift(&w, &out) <= 1e-12, "{:e}", drift(&w, &out));
-    assert!(wrong_side(&w, &out) <= 1e-11, "{:e}", wrong_side(&w, &out));
+    assert!(wrong_side(&w, &out) <= 1e-12, "{:e}", wrong_side(&w, &out));
+    assert_eq!(end.end, End::Time);
+}
+
+#[test]
+fn the_wheels_sliding_rates_are_those_of_its_normal_form() {
+    // mu_strong/mu_weak depends on v and w of eq. (4) only: mu² - (v + w) mu + vw - 1 = 0.
+    let local = SlidingAtTwoFold::near(&Wheel::default(), &vector![0.69, -0.57, -0.87]).unwrap();
+    let (v, w) = (-1.84902_f64, -1.98457);
+    let root = (0.25 * (v + w) * (v + w) - v * w + 1.0).sqrt();
+    let ratio = (0.5 * (v + w) - root) / (0.5 * (v + w) + root);
+    let [weak, strong] = local.directions.unwrap();
+    assert!((strong.rate / weak.rate - ratio).abs() < 1e-4 * ratio, "{} {ratio}", strong.rate / weak.rate);
+    assert!(weak.slides() && !strong.slides());
+}
+
+#[test]
+fn time_along_the_invariant_curve_is_the_integrators() {
+    // Sliding from a point of the curve takes the series' time, and stays on the curve.
+    let c = Caricature::with_reinjection(1e-1, 1e-5);
+    let local = SlidingAtTwoFold::near(&c, &vector![0.0, 0.01, 0.01]).unwrap();
+    let curve = local.through.as_ref().unwrap();
+    assert!(curve.radius > 0.1, "{}", curve.radius);
+    for part in [0.3, 0.9] {
+        let start = curve.at(part * curve.radius);
+        let exact = -curve.time(part * curve.radius);
+        let mut out = Trajectory::new(1);
+        let end = run(&c, start, 100.0, &Settings::default(), ExitRule::All, &mut out).unwrap();
+        assert!((end.t - exact).abs() < 1e-10 * exact, "{} {exact}", end.t);
+    }
+    // Into the repelling region: the exit after a given time is the point of the curve at that time.
+    let time = 0.5 * curve.time(-curve.radius);
+    let mut out = Trajectory::new(1);
+    let rule = ExitRule::AfterTime { time, side: Side::Minus };
+    run(&c, vector![0.0, 0.0, 0.0], 3.0, &Settings::default(), rule, &mut out).unwrap();
+    let exit = out.events.iter().find(|e| matches!(e.kind, EventKind::Exit { .. })).unwrap();
+    assert!((exit.t - time).abs() < 1e-14);
+    close(exit.state, curve.at(-0.5 * curve.radius.min(curve.sigma(time, curve.radius).abs() * 2.0)), 1e-12);
+}
+
+#[test]
+fn last_leg_error_is_within_its_estimate() {
+    // The same arrival with the leg begun 10^4 times farther out: the difference is of the size stated.
+    let c = Caricature::with_reinjection(1e-1, 1e-5);
+    let arrival = |leg: f64| {
+        let settings = Settings { leg, ..Settings::default() };
+        let mut out = Trajectory::new(1);
+        run(&c, vector![0.0, 1.0, 0.2], 100.0, &settings, ExitRule::All, &mut out).unwrap();
+        let error = |e: &EventKind| if let EventKind::TwoFoldReached { error, .. } = *e { Some(error) } else { None };
+        out.events.iter().find_map(|e| error(&e.kind).map(|error| (e.t, error))).unwrap()
+    };
+    let (exact, tiny) = arrival(1e-8);
+    assert!(tiny < 1e-14, "{tiny:e}");
+    for leg in [1e-2, 1e-3, 1e-4] {
+        let (t, estimate) = arrival(leg);
+        let error = (t - exact).abs();
+        assert!(error <= estimate + 1e-12, "leg {leg}: {error:e}, estimate {estimate:e}");
+    }
+}
+
+#[test]
+fn visible_visible_sliding_leaves_along_the_fold() {
+    // v = w = 0, p = y, q = -z: p' = q, q' = p, t' = q - p. From (p, q) = (-1, 2): p = 0 when e^-s = 3^-1/2, q = 3^1/2,
+    // after t = 3 (1 - 3^-1/2); then x = t²/2 along f+.
+    let n = visible_pair(true, true);
+    let root3 = 3.0_f64.sqrt();
+    let exact = 3.0 * (1.0 - 1.0 / root3);
+    let mut out = Trajectory::new(4);
+    let end = run(&n, vector![0.0, -1.0, -2.0], exact + 1.0, &Settings::default(), STAY, &mut out).unwrap();
+    let left = out.events.iter().find(|e| e.kind == EventKind::LeftByTangency { to: Side::Plus }).unwrap();
+    assert!((left.t - exact).abs() < 1e-11, "{} {exact}", left.t);
+    close(left.state, vector![0.0, 0.0, -root3], 1e-10);
+    close(end.x, vector![0.5, 1.0, -root3], 1e-10);
+    assert!(drift(&n, &out) <= 1e-12);
+}
+
+#[test]
+fn visible_visible_two_fold_flies_off_at_once() {
+    // On the line p = -q the sliding orbit runs into the two-fold after t = q - p = 2.
+    let n = visible_pair(true, true);
+    for side in [Side::Plus, Side::Minus] {
+        let mut out = Trajectory::new(1);
+        let end =
+            run(&n, vector![0.0, -1.0, -1.0], 3.0, &Settings::default(), ExitRule::AtOnce { side }, &mut out).unwrap();
+        let reached = out.events.iter().find(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).unwrap();
+        assert!((reached.t - 2.0).abs() < 1e-12, "{}", reached.t);
+        let expected = match side {
+            Side::Plus => vector![0.5, 1.0, 0.0],
+            Side::Minus => vector![-0.5, 0.0, 1.0],
+        };
+        close(end.x, expected, 1e-11);
+    }
+}
+
+#[test]
+fn visible_invisible_sliding_turns_towards_the_visible_fold() {
+    // v = w = 0, plus visible: p = y, q = z, p' = q, q' = -p (a rotation). From (-1, 1): p = 0 at t = 2^1/2, q = 2^1/2.
+    let root2 = 2.0_f64.sqrt();
+    let mut out = Trajectory::new(1);
+    let end =
+        run(&visible_pair(true, false), vector![0.0, -1.0, 1.0], root2 + 1.0, &Settings::default(), STAY, &mut out)
+            .unwrap();
+    let left = out.events.iter().find(|e| e.kind == EventKind::LeftByTangency { to: Side::Plus }).unwrap();
+    assert!((left.t - root2).abs() < 1e-11);
+    close(end.x, vector![0.5, 1.0, root2], 1e-10);
+    // Minus visible: p = -y, q = -z, p' = -q, q' = p. From (p, q) = (-1, 1) it is q that comes to zero.
+    let mut out = Trajectory::new(1);
+    let end =
+        run(&visible_pair(false, true), vector![0.0, 1.0, -1.0], root2 + 1.0, &Settings::default(), STAY, &mut out)
+            .unwrap();
+    let left = out.events.iter().find(|e| e.kind == EventKind::LeftByTangency { to: Side::Minus }).unwrap();
+    assert!((left.t - root2).abs() < 1e-11);
+    close(end.x, vector![-0.5, root2, 1.0], 1e-10);
+}
+
+#[test]
+fn repelling_sliding_through_an_invisible_two_fold_backwards() {
+    // vw < 1: the sliding direction has mu > 0, motion goes from the repelling to the attracting region. With v = w = 0 the
+    // field on y = z is (1/2, 1/2): from (-1, -1) the two-fold is reached at t = 2, and (1.5, 1.5) at t = 5.
+    let n = visible_pair(false, false);
+    let mut out = Trajectory::new(1);
+    let end = run(&n, vector![0.0, -1.0, -1.0], 5.0, &Settings::default(), STAY, &mut out).unwrap();
+    let reached = out.events.iter().find(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).unwrap();
+    assert!((reached.t - 2.0).abs() < 1e-12, "{}", reached.t);
+    assert_eq!(end.mode, Some(Mode::SlidingAttracting));
+    close(end.x, vector![0.0, 1.5, 1.5], 1e-11);
+}
+
+#[test]
+fn repelling_sliding_ends_at_an_invisible_fold() {
+    // v = w = 0: backwards p' = q, q' = p. From (p, q) = (1, -1/2): q = 0 at e^-s = 3^-1/2, t = 1.5 (1 - 3^-1/2),
+    // p = (3/4)^1/2; there only h > 0 is left.
+    let mut out = Trajectory::new(1);
+    run(&visible_pair(false, false), vector![0.0, -1.0, -0.5], 1.0, &Settings::default(), STAY, &mut out).unwrap();
+    let left = out
+        .events
+        .iter()
+        .find(|e| matches!(e.kind, EventKind::ExitAtBoundary { to: Side::Plus, .. }))
+        .expect("leaves at the fold of f-, to the other side");
+    assert!((left.t - 1.5 * (1.0 - 1.0 / 3.0_f64.sqrt())).abs() < 1e-11, "{}", left.t);
+    close(left.state, vector![0.0, -(0.75_f64.sqrt()), 0.0], 1e-10);
+}
+
+#[test]
+fn grazing_and_its_neighbours() {
+    // f+ = (y, 1, 0) from (x0, -1, -1): x = x0 - t + t²/2 touches at t = 1 for x0 = 1/2; there f- points up.
+    let n = visible_pair(true, true);
+    let fly = |x0: f64| {
+        let mut out = Trajectory::new(1);
+        let end = run(&n, vector![x0, -1.0, -1.0], 3.0, &Settings::default(), STAY, &mut out).unwrap();
+        (end, out.events)
+    };
+    let (end, events) = fly(0.5);
+    assert_eq!(events.len(), 1, "{events:?}");
+    assert_eq!(events[0].kind, EventKind::Grazing { side: Side::Plus });
+    assert!((events[0].t - 1.0).abs() < 1e-6);
+    close(end.x, vector![2.0, 2.0, -1.0], 1e-6);
+
+    let (end, events) = fly(0.5 + 1e-9);
+    assert!(events.is_empty(), "{events:?}");
+    close(end.x, vector![2.0 + 1e-9, 2.0, -1.0], 1e-11);
+
+    // The dip below the surface lasts 9e-5 and is 1e-9 deep: far inside one step. It lands, slides, leaves at the fold.
+    let (end, events) = fly(0.5 - 1e-9);
+    let kinds: Vec<_> = events.iter().map(|e| e.kind).collect();
+    assert_eq!(kinds, [EventKind::Landing { from: Side::Plus }, EventKind::LeftByTangency { to: Side::Plus }]);
+    assert!((events[0].t - (1.0 - 2e-9_f64.sqrt())).abs() < 1e-8, "{:?}", events[0].t);
+    close(end.x, vector![2.0, 2.0, -1.0], 1e-4);
+}
+
+#[test]
+fn rules_do_what_they_say() {
+    let n = TwoFoldNormalForm::invisible(-1.2, -1.4);
+    // The sliding speed on the weak eigenvector (1, w') of eq. (4): |(z + w y, y + v z)|/(y + z).
+    let mu = -1.3 + 1.01_f64.sqrt();
+    let (y, z) = (1.0, mu + 1.4);
+    let speed = -mu * (y * y + z * z).sqrt() / (y + z);
+    let exit = |rule: ExitRule| {
+        let mut out = Trajectory::new(1);
+        run(&n, vector![0.0, 0.3, 0.5], 20.0, &Settings::default(), rule, &mut out).unwrap();
+        let departed = out.events.iter().find(|e| e.kind == EventKind::EnteredRepelling).unwrap().t;
+        let e = *out.events.iter().find(|e| matches!(e.kind, EventKind::Exit { .. })).unwrap();
+        let EventKind::Exit { to, time, arc, rule: recorded } = e.kind else { unreachable!() };
+        assert_eq!(recorded, rule);
+        assert!((e.t - departed - time).abs() < 1e-13);
+        assert!((e.state.norm() - arc).abs() < 1e-9 * arc, "{} {arc}", e.state.norm());
+        assert!((arc - speed * time).abs() < 1e-9 * arc, "{arc} {}", speed * time);
+        (to, time, arc)
+    };
+    let (to, time, _) = exit(ExitRule::AfterTime { time: 0.7, side: Side::Minus });
+    assert!(to == Side::Minus && (time - 0.7).abs() < 1e-14, "{to:?} {time} {:e}", time - 0.7);
+    let (to, _, arc) = exit(ExitRule::AfterArc { arc: 0.25, side: Side::Plus });
+    assert!(to == Side::Plus && (arc - 0.25).abs() < 1e-10);
+    let (to, time, _) = exit(ExitRule::AtOnce { side: Side::Plus });
+    assert!(to == Side::Plus && time > 0.0);
+
+    // Random: the numbers are those of the named generator, time first, then side; another seed gives others.
+    use twofold::num::random::RandomStream;
+    let mut sides = [0, 0];
+    for seed in 0..12 {
+        let rule =
+            ExitRule::Random { law: SlidingLaw::Uniform { longest: 2.0 }, plus_probability: 0.3, seed, stream: 4 };
+        let (to, time, _) = exit(rule);
+        let mut stream = RandomStream::new(seed, 4);
+        assert!((time - 2.0 * stream.uniform()).abs() < 1e-13);
+        assert_eq!(to == Side::Plus, stream.uniform() < 0.3);
+        sides[usize::from(to == Side::Plus)] += 1;
+    }
+    assert!(sides[0] > 0 && sides[1] > 0, "{sides:?}");
+}
+
+#[test]
+fn bad_rules_are_named() {
+    let n = TwoFoldNormalForm::invisible(-1.2, -1.4);
+    let mut out = Trajectory::new(1);
+    let rule = ExitRule::AfterTime { time: -1.0, side: Side::Plus };
+    let error = run(&n, vector![0.0, 0.3, 0.5], 1.0, &Settings::default(), rule, &mut out).unwrap_err();
+    assert!(matches!(error, FilippovError::Invalid(ref m) if m.contains("time")), "{error}");
+    let json = r#"{"random":{"law":{"exponential":{"mean":0.5}},"plus_probability":0.5,"seed":1,"stream":0}}"#;
+    assert_eq!(serde_json::from_str::<ExitRule>(json).unwrap(), random(1, 0.5));
+    assert!(serde_json::from_str::<ExitRule>(r#"{"after-time":{"time":1.0}}"#).is_err());
+}
+
+#[test]
+fn stick_slip_limit_cycle() {
+    // Slip from (friction, belt): xi'' = weakening xi' - xi with xi = x - friction + weakening belt, until v = belt again.
+    let s = StickSlip { belt: 0.3, friction: 1.0, weakening: 0.2 };
+    let (k, b) = (s.weakening, s.belt);
+    let omega = (1.0 - 0.25 * k * k).sqrt();
+    let (a1, a2) = (k * b, (b - 0.5 * k * k * b) / omega);
+    let slip = |t: f64| {
+        let (sin, cos, grow) = ((omega * t).sin(), (omega * t).cos(), (0.5 * k * t).exp());
+        let xi = grow * (a1 * cos + a2 * sin);
+        let v = 0.5 * k * xi + grow * omega * (a2 * cos - a1 * sin);
+        (xi + s.friction - k * b, v)
+    };
+    // v - belt is negative during the slip and comes back through zero once before a full turn.
+    let (mut low, mut high) = (3.0, 2.0 * std::f64::consts::PI / omega);
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if slip(middle).1 < b { low = middle } else { high = middle }
+    }
+    let (x_land, _) = slip(low);
+    let period = low + (s.friction - x_land) / b;
+
+    let mut out = Trajectory::new(4);
+    run(&s, vector![0.0, 0.0], 60.0, &Settings::default(), STAY, &mut out).unwrap();
+    let slips: Vec<_> = out.events.iter().filter(|e| e.kind == EventKind::LeftByTangency { to: Side::Minus }).collect();
+    let lands: Vec<_> = out.events.iter().filter(|e| e.kind == EventKind::Landing { from: Side::Minus }).collect();
+    assert!(slips.len() >= 4);
+    for pair in slips.windows(2) {
+        assert!((pair[1].t - pair[0].t - period).abs() < 1e-10, "{} {period}", pair[1].t - pair[0].t);
+        close(pair[1].state, vector![s.friction, b], 1e-11);
+    }
+    assert!((lands.last().unwrap().state[0] - x_land).abs() < 1e-10);
+    assert!(drift(&s, &out) <= 1e-12 && wrong_side(&s, &out) <= 1e-12);
+}
+
+#[test]
+fn relay_with_linear_feedback_slides_exponentially() {
+    let r = Relay { feedback: Feedback::Linear { gain: 1.0 } };
+    let mut out = Trajectory::new(4);
+    let end = run(&r, vector![0.5, 0.0], 8.0, &Settings::default(), STAY, &mut out).unwrap();
+    // x = 1/2 - t²/2, v = -t: lands at t² + 2 t = 1; |v| < 1, so it slides with x' = -x.
+    let t1 = 2.0_f64.sqrt() - 1.0;
+    assert_eq!(out.events.len(), 1);
+    assert!((out.events[0].t - t1).abs() < 1e-12);
+    assert_eq!(out.events[0].kind, EventKind::Landing { from: Side::Plus });
+    let x = t1 * (t1 - 8.0).exp();
+    close(end.x, vector![x, -x], 1e-12);
+    assert!(drift(&r, &out) <= 1e-12);
+}
+
+#[test]
+fn relay_with_parabolic_feedback() {
+    // Gain 2: lands at t = (4/3)^1/2 with v = -t, slides with v' = 1/2.
+    let slow = Relay { feedback: Feedback::Parabolic { gain: 2.0 } };
+    let t1 = (4.0_f64 / 3.0).sqrt();
+    let mut out = Trajectory::new(4);
+    let end = run(&slow, vector![2.0, 0.0], t1 + 1.5, &Settings::default(), STAY, &mut out).unwrap();
+    let v = -t1 + 0.75;
+    close(end.x, vector![v * v, v], 1e-11);
+    assert!(drift(&slow, &out) <= 1e-12);
+    // The origin, at t1 + 2 t1, is a degenerate point: a named error there, not a hang.
+    let error = run(&slow, vector![2.0, 0.0], 10.0, &Settings::default(), STAY, &mut Trajectory::new(1)).unwrap_err();
+    assert!(matches!(error, FilippovError::NonTransversal { t, .. } if (t - 3.0 * t1).abs() < 1e-6), "{error}");
+
+    // Gain 1/2: flights accumulate at t1 + t1 (1 + r)/(1 - r), r² = (1 - k)/(1 + k), t1² = 4/(1 + k).
+    let fast = Relay { feedback: Feedback::Parabolic { gain: 0.5 } };
+    let (t1, r) = ((4.0_f64 / 1.5).sqrt(), (0.5_f64 / 1.5).sqrt());
+    let exact = t1 * (1.0 + (1.0 + r) / (1.0 - r));
+    let error = run(&fast, vector![2.0, 0.0], 100.0, &Settings::default(), STAY, &mut Trajectory::new(1)).unwrap_err();
+    let FilippovError::Zeno { accumulates, .. } = error else { panic!("{error}") };
+    assert!((accumulates - exact).abs() < 1e-8, "{accumulates} {exact}");
+
+    // Gain 1, time-optimal: the switching curve is an orbit of f-, a fold at every point.
+    let optimal = Relay { feedback: Feedback::Parabolic { gain: 1.0 } };
+    let error = run(&optimal, vector![2.0, 0.0], 9.0, &Settings::default(), STAY, &mut Trajectory::new(1)).unwrap_err();
+    assert!(matches!(error, FilippovError::NonTransversal { t, .. } if (t - 2.0_f64.sqrt()).abs() < 1e-9), "{error}");
+}
+
+#[test]
+fn the_funnel_holds_every_exit() {
+    let c = Caricature::with_reinjection(1e-1, 1e-5);
+    let grid = FunnelGrid { shortest: 0.05, longest: 1.5, times: 5, horizon: 60.0, until_two_fold: true, per_step: 2 };
+    let f = funnel(&c, vector![0.2, 0.0, -1.0], 50.0, &Settings::default(), &grid).unwrap();
+    assert!(f.point.amax() < 1e-14 && (f.t - 13.196).abs() < 1e-2, "{} {:?}", f.t, f.point);
+    assert_eq!(f.members.len(), 10);
+    for m in &f.members {
+        let first = m.trajectory.pieces[0].points[0];
+        assert_eq!(first, (f.t, f.point), "every future starts at the one point");
+        let left = m
+            .trajectory
+            .events
+            .iter()
+            .find(|e| matches!(e.kind, EventKind::Exit { .. } | EventKind::ExitAtBoundary { .. }))
+            .unwrap();
+        if let EventKind::Exit { to, time, .. } = left.kind {
+            assert!(to == m.side && (time - m.exit_time).abs() < 1e-12);
+        }
+        assert!(drift(&c, &m.trajectory) <= 1e-12);
+    }
+    let back = f.members.iter().filter(|m| m.summary.end == End::Observer).count();
+    assert!(back >= 5, "{back} of 10 came back to the two-fold");
 }

@@ -185,6 +185,9 @@ impl Zeno {
     }
 }
 
+const DEGENERATE_END: &str =
+    "sliding runs into a point where both Lie derivatives vanish and which is not a regular two-fold";
+
 /// What ended a stretch of sliding within a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum SlidingEnd {
@@ -574,9 +577,7 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
                 break Some(end);
             }
             if idle >= IDLE_STEPS {
-                return Err(self.non_transversal(
-                    "sliding runs into a point where both Lie derivatives vanish and which is not a regular two-fold",
-                ));
+                return Err(self.non_transversal(DEGENERATE_END));
             }
             if self.stopped {
                 break Some(SlidingEnd::Time);
@@ -647,6 +648,9 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
     fn leave_at_fold(&mut self, side: Side, sliding: &Sliding) -> Result<State<N>, FilippovError> {
         let l = self.lie(&self.x);
         let from = Some(sliding.mode());
+        if l.p.abs() <= l.zero_p && l.q.abs() <= l.zero_q {
+            return Err(self.non_transversal(DEGENERATE_END));
+        }
         if sliding.repelling {
             // The edge of the repelling region is an invisible fold: only the other side is left to go to.
             let to = side.other();
@@ -703,7 +707,7 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
         self.event(if repelling { EventKind::EnteredRepelling } else { EventKind::StartedOnSurface }, None, Some(mode));
         let sign = curve.rate.signum();
         let longest = curve.time(sign * limit);
-        let shortest = curve.time(sign * limit * self.settings.departure);
+        let shortest = curve.time(sign * self.settings.departure * limit.min(local.radius));
         // Arc along the curve up to a time, by chords.
         let arc_until = |t: f64| {
             let (end, mut last, mut arc) = (curve.sigma(t, limit), local.point, 0.0);
@@ -720,7 +724,12 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
             let last = excess(longest);
             planned = if last < 0.0 { f64::INFINITY } else { brent(excess, 0.0, longest, -plan.arc.max(1e-300), last) };
         }
-        let planned = if repelling { planned.max(shortest) } else { f64::INFINITY };
+        let planned = match (repelling, planned > 0.0) {
+            (false, _) => f64::INFINITY,
+            (true, false) => shortest,
+            // Closer to the two-fold than this the signs of the Lie derivatives are rounding.
+            (true, true) => planned.max(1e-6 * shortest),
+        };
         let duration = planned.min(longest);
         let whole = AlongCurve { curve, from: 0.0, to: duration, limit };
         if self.t + duration > self.t_end {

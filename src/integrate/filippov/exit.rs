@@ -76,7 +76,9 @@ pub enum ExitRule {
         /// The side to leave to.
         side: Side,
     },
-    /// After a given time of repelling sliding.
+    /// After a given time of repelling sliding; 0 is [`ExitRule::AtOnce`] without the tangent orbit. At a two-fold, times below
+    /// a millionth of the shortest departure are raised to that: nearer to it the two sides cannot be told apart.
+    /// The event records the time that was used.
     AfterTime {
         /// The time.
         time: f64,

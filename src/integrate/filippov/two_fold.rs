@@ -65,7 +65,7 @@ pub struct SlidingAtTwoFold<const N: usize> {
     pub through: Option<InvariantCurve<N>>,
     /// The same with mu > 0: motion along it goes from the repelling region into the attracting one.
     pub back: Option<InvariantCurve<N>>,
-    /// The distance over which the local description holds: the curve's radius, or 1e-3 without a curve.
+    /// The distance over which the local description holds: the curve's radius but at most 1; 1e-3 without a curve.
     pub radius: f64,
 }
 
@@ -212,7 +212,7 @@ impl<const N: usize> SlidingAtTwoFold<N> {
         };
         let (through, back) = (curve(-1.0), curve(1.0));
         let radius = [&through, &back].into_iter().flatten().map(|c| c.radius).fold(f64::INFINITY, f64::min);
-        let radius = if radius.is_finite() { radius } else { 1e-3 };
+        let radius = if radius.is_finite() { radius.min(1.0) } else { 1e-3 };
         Some(Self { point, second, directions, through, back, radius })
     }
 
