@@ -10,18 +10,18 @@ use twofold::integrate::{Schedule, StepCap, Tolerance};
 pub fn figure() -> Figure {
     Figure::in_both_readings(
         "fig4",
-        "One point, many futures, all of which return",
+        "One way in, many ways out, and back",
         View::Space { camera: Camera { axes: [1, 2, 0], azimuth: -60.0, elevation: 18.0 } },
         |_| {
-            "The orbit from (0.2, 0, −1) reaches the two-fold; from there its future is a set. Nine exit times from the repelling \
-             region, each to both sides, followed until they come back to the two-fold (or for the time given by the funnel's \
-             horizon). All of these pass through one point."
+            "The orbit from (0.2, 0, −1) reaches the two-fold; from there its future is a set. Five exit times from the repelling \
+             region, each to both sides, followed until they come back to the two-fold; the foot says how many have within the time shown. \
+             All these orbits pass through one point."
                 .into()
         },
         |reading| {
             let (longest, horizon) = match reading {
-                Reading::Printed => (6.0, 26.0),
-                Reading::Reconstructed => (1.5, 5.0),
+                Reading::Printed => (2.0, 60.0),
+                Reading::Reconstructed => (0.8, 16.0),
             };
             vec![Panel::new(
                 "i",
@@ -30,7 +30,7 @@ pub fn figure() -> Figure {
                     system: SystemSpec::Caricature(reading.caricature()),
                     switch: SwitchSpec::Filippov {
                         exit: ExitRule::All,
-                        funnel: Some(FunnelSpec { shortest: 0.1, longest, times: 9, horizon, until_two_fold: true }),
+                        funnel: Some(FunnelSpec { shortest: 0.1, longest, times: 5, horizon, until_two_fold: true }),
                     },
                     start: [0.2, 0.0, -1.0],
                     t_end: 100.0,

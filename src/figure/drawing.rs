@@ -1,6 +1,6 @@
 //! From recordings to a drawing: which points, lines and surfaces, in which colours and ranges.
 
-use super::simulate::{Data, Recording};
+use super::simulate::{Data, Future, Recording};
 use super::spec::SystemSpec;
 use super::{Camera, Panel, Picture, View, surface, wording};
 use crate::integrate::filippov::{EventKind, Mode, Side};
@@ -121,12 +121,25 @@ fn space_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording], c
         Some(Data::Motion(_)) => sheet
             .legend(LegendEntry::new(LegendKey::Line(SLIDING), "sliding"))
             .legend(LegendEntry::new(LegendKey::Marker(EXIT), "exit")),
-        Some(Data::Funnel { .. }) => sheet
+        Some(Data::Funnel { futures, .. }) => sheet
+            .footer(returns(futures))
             .legend(LegendEntry::new(LegendKey::Line(APPROACH), "the one way in"))
             .legend(LegendEntry::new(LegendKey::Line(TO_PLUS), "ways out to *h* > 0"))
             .legend(LegendEntry::new(LegendKey::Line(TO_MINUS), "ways out to *h* < 0")),
         _ => sheet,
     }
+}
+
+/// How many futures came back to the two-fold.
+fn returns(futures: &[Future]) -> String {
+    let comes_back = |f: &&Future| f.motion.events.iter().any(|e| matches!(e.kind, EventKind::TwoFoldReached { .. }));
+    let longest = futures.iter().filter_map(|f| Some(f.motion.samples().last()?.1.t - f.motion.samples().next()?.1.t));
+    format!(
+        "{} of {} futures come back to the two-fold within {} of leaving it",
+        futures.iter().filter(comes_back).count(),
+        futures.len(),
+        wording::number(longest.fold(0.0, f64::max).round())
+    )
 }
 
 /// A curve in space.
