@@ -89,6 +89,10 @@ pub fn reference<F: VectorField<3>>(
     Ok(found)
 }
 
+/// Steps of one reference orbit. The orbits of the paper's first 200 units of time take some 1e4; the stiff far attractor
+/// takes as many per unit of time and would never end.
+const MOST_STEPS: u64 = 2_000_000;
+
 /// One step; its crossings go to `found`.
 fn next_crossings<F: VectorField<3>>(
     stepper: &mut Taylor<3, DoubleDouble>,
@@ -96,6 +100,11 @@ fn next_crossings<F: VectorField<3>>(
     plane: Plane,
     mut found: impl FnMut(ExtendedCrossing),
 ) -> Result<(), Failure> {
+    if stepper.statistics().steps >= MOST_STEPS {
+        let (t, x) = stepper.state();
+        let state = Failure::state(&x.map(|c| c.to_f64()));
+        return Err(Failure::TooManySteps { t: t.to_f64(), limit: MOST_STEPS, state });
+    }
     let step = stepper.step(field)?;
     let mut before = step.x0[plane.coordinate] - plane.value;
     for theta in sign_changes(&step, |x| x[plane.coordinate] - plane.value) {
