@@ -171,6 +171,7 @@ fn select(mut figure: Figure, arguments: &Arguments) -> Result<Figure, CliError>
             known.dedup();
             return Err(CliError::NoSuchPanel { panel: only.clone(), figure: figure.id, known: known.join(", ") });
         }
+        figure.pictures.retain(|p| p.panels.iter().any(|q| q.label == label));
         figure.pictures.iter_mut().for_each(|p| p.keep_only(label));
     }
     figure.pictures.retain(|p| arguments.reading.wants(p.reading));

@@ -12,10 +12,32 @@ use crate::render::sheet::{
 };
 use crate::render::style;
 
-/// The drawing of a picture.
+/// The drawing of a picture of runs.
 pub fn sheet(picture: &Picture, recordings: &[Recording], spec: &Hash, data: &Hash) -> Sheet {
     let runs: Vec<_> = picture.panels.iter().map(|p| &p.run).collect();
-    let mut sheet = Sheet::new(ColumnWidth::Double, columns(picture), wording::plain(&picture.caption))
+    let mut sheet = dress(Sheet::new(ColumnWidth::Double, columns(picture), ""), picture, spec, data);
+    if picture.panels.iter().any(|p| matches!(p.run.system, SystemSpec::Wheel(_))) {
+        sheet = sheet.subtitle("reconstruction: the paper gives the form of the equations, not their coefficients");
+    }
+    for line in wording::small_print(picture.reading, &runs) {
+        sheet = sheet.footer(line);
+    }
+    match picture.view {
+        View::Section { horizontal, vertical } => section_panels(sheet, picture, recordings, [horizontal, vertical]),
+        View::Space { camera } => space_panels(sheet, picture, recordings, &camera),
+        View::Study(_) => sheet,
+    }
+}
+
+/// The drawing of a study: its own sheet, with the picture's heading and provenance.
+pub fn study_sheet(picture: &Picture, sheet: Sheet, spec: &Hash, data: &Hash) -> Sheet {
+    dress(sheet, picture, spec, data)
+}
+
+/// Heading, description, warnings and provenance: what every picture has.
+fn dress(mut sheet: Sheet, picture: &Picture, spec: &Hash, data: &Hash) -> Sheet {
+    sheet.description = wording::plain(&picture.caption);
+    sheet = sheet
         .title(picture.title)
         .provenance("Software", concat!("twofold ", env!("CARGO_PKG_VERSION")))
         .provenance("Picture", &picture.name)
@@ -26,19 +48,10 @@ pub fn sheet(picture: &Picture, recordings: &[Recording], spec: &Hash, data: &Ha
     if let Some(reading) = picture.reading {
         sheet = sheet.subtitle(wording::reading(reading));
     }
-    if picture.panels.iter().any(|p| matches!(p.run.system, SystemSpec::Wheel(_))) {
-        sheet = sheet.subtitle("reconstruction: the paper gives the form of the equations, not their coefficients");
-    }
-    for line in wording::small_print(picture.reading, &runs) {
-        sheet = sheet.footer(line);
-    }
     if !picture.alterations.is_empty() {
         sheet = sheet.banner(format!("NOT THE PUBLISHED PICTURE: {}", picture.alterations.join("; ")));
     }
-    match picture.view {
-        View::Section { horizontal, vertical } => section_panels(sheet, picture, recordings, [horizontal, vertical]),
-        View::Space { camera } => space_panels(sheet, picture, recordings, &camera),
-    }
+    sheet
 }
 
 /// Up to three panels stand side by side, four in a square.
@@ -53,7 +66,7 @@ fn columns(picture: &Picture) -> usize {
 fn methods(picture: &Picture) -> String {
     let mut names: Vec<&str> = picture.panels.iter().map(|p| p.run.method.name.name()).collect();
     names.dedup();
-    names.join(", ")
+    if names.is_empty() { "study".into() } else { names.join(", ") }
 }
 
 /// "(ii)"; nothing where there is only one panel.

@@ -12,6 +12,7 @@ pub mod pipeline;
 pub mod progress;
 pub mod simulate;
 pub mod spec;
+pub mod study;
 pub mod surface;
 pub mod verdict;
 pub mod wording;
@@ -21,6 +22,7 @@ use serde::{Deserialize, Serialize};
 use crate::integrate::filippov::ExitRule;
 use crate::model::Caricature;
 use spec::{Method, RunSpec, SwitchSpec};
+pub use study::Study;
 use verdict::Claim;
 
 /// A figure of the paper.
@@ -67,7 +69,7 @@ pub struct Panel {
 }
 
 /// How the panels of a picture are drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub enum View {
     /// A Poincare section in the plane of two coordinates: early half faint, late half dark.
     Section {
@@ -81,6 +83,9 @@ pub enum View {
         /// Camera and axes.
         camera: Camera,
     },
+    /// Something other than runs: a sketch computed from the model, a comparison of methods. The picture has no panels of
+    /// runs; the study makes its own.
+    Study(Study),
 }
 
 /// An orthographic view of the state space.

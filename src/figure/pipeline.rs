@@ -7,7 +7,7 @@ use super::progress::Progress;
 use super::simulate::{Recording, RunError, simulate};
 use super::spec::RunSpec;
 use super::verdict::{PanelVerdict, judge};
-use super::{Picture, Reading, drawing, encode};
+use super::{Picture, Reading, Study, View, drawing, encode};
 use crate::integrate::Statistics;
 use crate::record::hash::canonical_json;
 use crate::record::{Hash, PanelEntry, PictureEntry};
@@ -41,6 +41,9 @@ pub struct PictureRecord {
     pub panels: Vec<PanelRecord>,
     /// Verdicts on the paper's claims; empty until they are asked for.
     pub verdicts: Vec<PanelVerdict>,
+    /// What a study depends on; absent for pictures of runs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub question: Option<serde_json::Value>,
 }
 
 /// What is known about a panel.
@@ -98,6 +101,9 @@ pub fn pixel_hash(pixels: &Pixels) -> Hash {
 
 /// Computes and draws one picture. The result does not depend on the number of threads.
 pub fn compute(picture: &Picture, progress: &Progress) -> Result<Computed, PipelineError> {
+    if let View::Study(study) = &picture.view {
+        return compute_study(picture, study, progress);
+    }
     let recordings: Vec<Recording> = picture
         .panels
         .par_iter()
@@ -133,16 +139,7 @@ pub fn compute(picture: &Picture, progress: &Progress) -> Result<Computed, Pipel
 
     let sheet = drawing::sheet(picture, &recordings, &spec, &data);
     let rendered = render(&sheet).map_err(|source| PipelineError::Render { picture: picture.name.clone(), source })?;
-    let hashes = PictureEntry {
-        name: picture.name.clone(),
-        spec,
-        data,
-        pixels: pixel_hash(&rendered.pixels),
-        png: Hash::of(&rendered.png),
-        svg: Hash::of(&rendered.svg),
-        pdf: Hash::of(&rendered.pdf),
-        panels: entries,
-    };
+    let hashes = picture_entry(picture, spec, data, &rendered, entries);
     let panels = picture
         .panels
         .iter()
@@ -171,8 +168,60 @@ pub fn compute(picture: &Picture, progress: &Progress) -> Result<Computed, Pipel
         alterations: picture.alterations.clone(),
         panels,
         verdicts: Vec::new(),
+        question: None,
     };
     Ok(Computed { rendered, tables, record, recordings })
+}
+
+/// Computes and draws a study.
+fn compute_study(picture: &Picture, study: &Study, progress: &Progress) -> Result<Computed, PipelineError> {
+    let watch = progress.run(picture.name.clone(), 1.0);
+    let tables = (study.compute)().map_err(|source| PipelineError::Run {
+        picture: picture.name.clone(),
+        panel: "study".into(),
+        source,
+    })?;
+    watch.done(&format!("{} rows", tables.iter().map(|t| t.rows.len()).sum::<usize>()));
+    let question = (study.question)();
+    let spec = Hash::of_json(&question);
+    let panels: Vec<PanelEntry> = tables
+        .iter()
+        .map(|t| PanelEntry { label: t.name.clone(), spec: spec.clone(), data: Hash::of(&t.bits()) })
+        .collect();
+    let data = Hash::of(panels.iter().map(|e| e.data.as_str()).collect::<Vec<_>>().join("\n").as_bytes());
+    let sheet = drawing::study_sheet(picture, (study.draw)(&tables), &spec, &data);
+    let rendered = render(&sheet).map_err(|source| PipelineError::Render { picture: picture.name.clone(), source })?;
+    let hashes = picture_entry(picture, spec, data, &rendered, panels);
+    let record = PictureRecord {
+        hashes,
+        reading: picture.reading,
+        caption: picture.caption.clone(),
+        alterations: picture.alterations.clone(),
+        panels: Vec::new(),
+        verdicts: Vec::new(),
+        question: Some(question),
+    };
+    let tables = tables.iter().map(|t| (t.name.clone(), t.csv())).collect();
+    Ok(Computed { rendered, tables, record, recordings: Vec::new() })
+}
+
+fn picture_entry(
+    picture: &Picture,
+    spec: Hash,
+    data: Hash,
+    rendered: &Rendered,
+    panels: Vec<PanelEntry>,
+) -> PictureEntry {
+    PictureEntry {
+        name: picture.name.clone(),
+        spec,
+        data,
+        pixels: pixel_hash(&rendered.pixels),
+        png: Hash::of(&rendered.png),
+        svg: Hash::of(&rendered.svg),
+        pdf: Hash::of(&rendered.pdf),
+        panels,
+    }
 }
 
 impl Computed {
