@@ -4,8 +4,12 @@
 
 use twofold::figure::Figure;
 
+#[path = "fig1/main.rs"]
+mod fig1;
 #[path = "fig2/main.rs"]
 mod fig2;
+#[path = "fig3/main.rs"]
+mod fig3;
 #[path = "fig4/main.rs"]
 mod fig4;
 #[path = "fig5/main.rs"]
@@ -24,7 +28,9 @@ mod lottery;
 /// Every figure, in the paper's order, then our own.
 pub fn all() -> Vec<Figure> {
     vec![
+        fig1::figure(),
         fig2::figure(),
+        fig3::figure(),
         fig4::figure(),
         fig5::figure(),
         fig6::figure(),

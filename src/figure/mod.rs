@@ -11,6 +11,7 @@ pub mod encode;
 pub mod pipeline;
 pub mod progress;
 pub mod simulate;
+pub mod sketch;
 pub mod spec;
 pub mod study;
 pub mod surface;
