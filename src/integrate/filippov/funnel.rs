@@ -49,6 +49,8 @@ pub struct Funnel<const N: usize> {
     pub t: f64,
     /// The point.
     pub point: SVector<f64, N>,
+    /// Whether it is a two-fold (or else a point of the repelling region).
+    pub at_two_fold: bool,
     /// The futures: by exit time, plus before minus.
     pub members: Vec<FunnelMember<N>>,
 }
@@ -78,15 +80,36 @@ where
         });
     }
     let point = project(system, &there.x);
-    let departure = match there.mode {
-        None => Departure::TwoFold(SlidingAtTwoFold::near(system, &point)),
-        Some(_) => Departure::Repelling,
+    let mut family = Funnel { approach, t: there.t, point, at_two_fold: there.mode.is_none(), members: Vec::new() };
+    family.members = members_of(system, &family, settings, grid, None)?;
+    Ok(family)
+}
+
+/// The members on `grid` of the family that starts at the set-valued point of `family`; of one side only, if given.
+pub(super) fn members_of<P, const N: usize, const M: usize>(
+    system: &P,
+    family: &Funnel<N>,
+    settings: &Settings,
+    grid: &FunnelGrid,
+    only: Option<Side>,
+) -> Result<Vec<FunnelMember<N>>, FilippovError>
+where
+    P: PiecewiseSmooth<N>,
+    for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
+{
+    let departure = if family.at_two_fold {
+        Departure::TwoFold(SlidingAtTwoFold::near(system, &family.point))
+    } else {
+        Departure::Repelling
     };
     let mut members = Vec::with_capacity(2 * grid.times);
     for k in 0..grid.times {
         let fraction = if grid.times > 1 { k as f64 / (grid.times - 1) as f64 } else { 1.0 };
         let exit_time = grid.shortest * pow(grid.longest / grid.shortest, fraction);
         for side in [Side::Plus, Side::Minus] {
+            if only.is_some_and(|s| s != side) {
+                continue;
+            }
             let mut trajectory = Trajectory::new(grid.per_step);
             if grid.until_two_fold {
                 trajectory = trajectory.until_two_fold();
@@ -94,10 +117,10 @@ where
             let rule = ExitRule::AfterTime { time: exit_time, side };
             let summary = engine::run_from(
                 system,
-                there.t,
-                point,
+                family.t,
+                family.point,
                 departure.clone(),
-                there.t + grid.horizon,
+                family.t + grid.horizon,
                 settings,
                 rule,
                 &mut trajectory,
@@ -105,5 +128,5 @@ where
             members.push(FunnelMember { exit_time, side, trajectory, summary });
         }
     }
-    Ok(Funnel { approach, t: there.t, point, members })
+    Ok(members)
 }

@@ -46,6 +46,7 @@ mod engine;
 mod exit;
 mod flow;
 mod funnel;
+pub mod limit;
 mod trajectory;
 pub mod two_fold;
 

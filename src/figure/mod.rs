@@ -1,0 +1,3 @@
+//! Figures as plain data.
+
+pub mod sketches;
