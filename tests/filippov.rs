@@ -1,9 +1,11 @@
 //! The event-driven Filippov integrator against closed forms.
 
 use nalgebra::{SVector, vector};
+use twofold::integrate::Tolerance;
 use twofold::integrate::filippov::two_fold::SlidingAtTwoFold;
 use twofold::integrate::filippov::{
-    End, EventKind, ExitRule, FilippovError, FunnelGrid, Mode, Settings, Side, SlidingLaw, Trajectory, funnel, run,
+    End, EventKind, ExitRule, FilippovError, FunnelGrid, Mode, Settings, Side, SlidingLaw, Trajectory, funnel, history,
+    run,
 };
 use twofold::model::filippov::Visibility;
 use twofold::model::{Caricature, Feedback, PiecewiseSmooth, Relay, StickSlip, TwoFoldNormalForm, Wheel};
@@ -563,4 +565,38 @@ fn interpolants_are_in_physical_time_and_on_the_surface() {
             .unwrap();
         assert!((end.x - x).amax() < 1e-8, "t = {t}: {:e}", (end.x - x).amax());
     }
+}
+
+#[test]
+fn tolerance_buys_accuracy() {
+    // The first arrival at the two-fold after three crossings and a landing, against a run with tiny steps.
+    let c = Caricature::with_reinjection(1e-1, 1e-5);
+    let arrival = |tolerance: f64, max_step: f64| {
+        let settings =
+            Settings { tolerance: Tolerance { rtol: tolerance, atol: tolerance }, max_step, ..Settings::default() };
+        run(&c, vector![0.2, 0.0, -1.0], 50.0, &settings, ExitRule::All, &mut Trajectory::new(1)).unwrap().t
+    };
+    let exact = arrival(1e-13, 5e-3);
+    for tolerance in [1e-6, 1e-8, 1e-10, 1e-12] {
+        let error = (arrival(tolerance, f64::INFINITY) - exact).abs();
+        println!("tolerance {tolerance:e}: arrival off by {error:e}");
+        assert!(error < 100.0 * tolerance, "{tolerance:e}: {error:e}");
+    }
+}
+
+#[test]
+fn every_point_of_the_repelling_region_has_a_past_at_the_two_fold() {
+    // Normal form: int dt = (1, 1) A^-1 (y, z) is also the time since the two-fold in the repelling region.
+    let n = TwoFoldNormalForm::invisible(-1.2, -1.4);
+    for (y, z) in [(-0.3, -0.8), (-1.0, -0.05), (-0.4, -0.4)] {
+        let exact = -((1.2 * y + z) + (y + 1.4 * z)) / (1.2 * 1.4 - 1.0);
+        let past = history(&n, vector![0.0, y, z], 100.0, &Settings::default(), 4).unwrap();
+        let points: Vec<_> = past.points().collect();
+        let (first, last) = (points[0], points[points.len() - 1]);
+        assert!(first.1.amax() < 1e-12 && first.0 == 0.0);
+        close(last.1, vector![0.0, y, z], 1e-14);
+        assert!((last.0 - exact).abs() < 1e-10 * exact, "{} {exact}", last.0);
+        assert!(past.pieces.iter().all(|p| p.mode == Mode::SlidingRepelling));
+    }
+    assert!(history(&n, vector![0.0, 1.0, 1.0], 100.0, &Settings::default(), 4).is_err());
 }

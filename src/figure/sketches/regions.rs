@@ -3,8 +3,8 @@
 use nalgebra::vector;
 
 use super::{Mark3, MarkKind, Scene3};
-use crate::integrate::filippov::{ExitRule, FilippovError, Settings, Side, Trajectory, run};
-use crate::model::{Reversed, TwoFoldNormalForm};
+use crate::integrate::filippov::{ExitRule, FilippovError, Settings, Side, Trajectory, history, run};
+use crate::model::TwoFoldNormalForm;
 
 /// What fig. 3 shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,7 +65,7 @@ pub fn regions(picture: &RegionPicture) -> Result<Scene3, FilippovError> {
         orbit += 1;
     }
 
-    // Sliding orbits from points on the two outer edges of the attracting square, and the same in reversed time.
+    // Sliding orbits from points on the two outer edges of the attracting square, and the pasts of the opposite points.
     let n = picture.sliding_orbits.max(1);
     let edge = |k: usize| {
         let u = 2.0 * (k as f64 + 0.5) / n as f64;
@@ -79,9 +79,7 @@ pub fn regions(picture: &RegionPicture) -> Result<Scene3, FilippovError> {
         scene.arrow_on_last(0.4);
         orbit += 1;
 
-        let mut line = Trajectory::new(4);
-        run(&Reversed(system), vector![0.0, -y, -z], 100.0 * size, &settings, ExitRule::All, &mut line)?;
-        turn(&mut line);
+        let line = history(&system, vector![0.0, -y, -z], 100.0 * size, &settings, 4)?;
         scene.add(&line, orbit, false);
         scene.arrow_on_last(0.6);
         orbit += 1;
@@ -89,24 +87,6 @@ pub fn regions(picture: &RegionPicture) -> Result<Scene3, FilippovError> {
     scene.marks.push(Mark3 { at: [0.0; 3], kind: MarkKind::Singularity });
     scene.fit();
     Ok(scene)
-}
-
-/// Turns an orbit of the reversed system into one of the original.
-fn turn(line: &mut Trajectory<3>) {
-    use crate::integrate::filippov::Mode;
-    line.pieces.reverse();
-    for piece in &mut line.pieces {
-        piece.points.reverse();
-        for (t, _) in &mut piece.points {
-            *t = -*t;
-        }
-        piece.mode = match piece.mode {
-            Mode::SlidingAttracting => Mode::SlidingRepelling,
-            Mode::SlidingRepelling => Mode::SlidingAttracting,
-            flight => flight,
-        };
-    }
-    line.events.clear();
 }
 
 #[cfg(test)]

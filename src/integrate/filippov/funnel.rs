@@ -7,7 +7,8 @@ use super::two_fold::SlidingAtTwoFold;
 use super::{
     End, ExitRule, FilippovError, FilippovSummary, Settings, Side, SlidingFlow, Trajectory, engine, flow::project,
 };
-use crate::model::{PiecewiseSmooth, VectorField};
+use crate::model::filippov::{Region, region};
+use crate::model::{PiecewiseSmooth, Reversed, VectorField};
 use crate::num::elementary::pow;
 
 /// Which members of the funnel to compute: exit times between the shortest and the longest, both sides of each.
@@ -85,6 +86,40 @@ where
     Ok(family)
 }
 
+/// The past of a point of the repelling region, in forward time: the sliding orbit that leads from where repelling sliding
+/// began (a two-fold, if it runs back into one) to `x`, with time 0 at its beginning.
+///
+/// At a two-fold whose sliding flow is a node every point of the repelling region has such a past: the full set of futures
+/// of the two-fold has, besides exit time and side, the sliding orbit as a third index. [`funnel`] follows the analytic
+/// one; the others are reached by running on from any `x`.
+///
+/// # Errors
+/// [`FilippovError::NoSuchExit`] if `x` is not in the repelling region, or its past does not end by `longest`.
+pub fn history<P, const N: usize, const M: usize>(
+    system: &P,
+    x: SVector<f64, N>,
+    longest: f64,
+    settings: &Settings,
+    per_step: usize,
+) -> Result<Trajectory<N>, FilippovError>
+where
+    P: PiecewiseSmooth<N> + Clone,
+    for<'a> SlidingFlow<'a, Reversed<P>, N>: VectorField<M>,
+{
+    let refuse = |why| FilippovError::NoSuchExit { t: 0.0, state: x.iter().copied().collect(), why };
+    let on_surface = project(system, &x);
+    if region(system, &on_surface) != Region::Repelling {
+        return Err(refuse("it has a sliding past only in the repelling region"));
+    }
+    // Reversed, repelling sliding attracts and its past is a future. It stops at its first event after the start.
+    let mut back = Trajectory::new(per_step).until_events(2);
+    let end = super::run(&Reversed(system.clone()), on_surface, longest, settings, ExitRule::All, &mut back)?;
+    if end.end == End::Time {
+        return Err(refuse("its past is longer than the given time"));
+    }
+    Ok(back.turned(end.t))
+}
+
 /// The members on `grid` of the family that starts at the set-valued point of `family`; of one side only, if given.
 pub(super) fn members_of<P, const N: usize, const M: usize>(
     system: &P,
@@ -98,7 +133,7 @@ where
     for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
 {
     let departure = if family.at_two_fold {
-        Departure::TwoFold(SlidingAtTwoFold::near(system, &family.point))
+        Departure::TwoFold(SlidingAtTwoFold::near(system, &family.point).map(Box::new))
     } else {
         Departure::Repelling
     };

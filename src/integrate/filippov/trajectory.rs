@@ -52,6 +52,25 @@ impl<const N: usize> Trajectory<N> {
         self
     }
 
+    /// The trajectory of the reversed system ([`Reversed`](crate::model::Reversed)) as one of the original: order turned round,
+    /// time t becomes `origin` - t, attracting and repelling change places. Events are dropped: an end is not a beginning.
+    pub fn turned(mut self, origin: f64) -> Self {
+        self.events.clear();
+        self.pieces.reverse();
+        for piece in &mut self.pieces {
+            piece.points.reverse();
+            for (t, _) in &mut piece.points {
+                *t = origin - *t;
+            }
+            piece.mode = match piece.mode {
+                Mode::SlidingAttracting => Mode::SlidingRepelling,
+                Mode::SlidingRepelling => Mode::SlidingAttracting,
+                flight => flight,
+            };
+        }
+        self
+    }
+
     /// All points in order of time.
     pub fn points(&self) -> impl Iterator<Item = &(f64, SVector<f64, N>)> {
         self.pieces.iter().flat_map(|p| &p.points)
