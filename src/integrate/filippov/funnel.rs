@@ -7,7 +7,8 @@ use super::two_fold::SlidingAtTwoFold;
 use super::{
     End, ExitRule, FilippovError, FilippovSummary, Settings, Side, SlidingFlow, Trajectory, engine, flow::project,
 };
-use crate::model::{PiecewiseSmooth, VectorField};
+use crate::model::filippov::{Region, region};
+use crate::model::{PiecewiseSmooth, Reversed, VectorField};
 use crate::num::elementary::pow;
 
 /// Which members of the funnel to compute: exit times between the shortest and the longest, both sides of each.
@@ -49,6 +50,8 @@ pub struct Funnel<const N: usize> {
     pub t: f64,
     /// The point.
     pub point: SVector<f64, N>,
+    /// Whether it is a two-fold (or else a point of the repelling region).
+    pub at_two_fold: bool,
     /// The futures: by exit time, plus before minus.
     pub members: Vec<FunnelMember<N>>,
 }
@@ -78,15 +81,70 @@ where
         });
     }
     let point = project(system, &there.x);
-    let departure = match there.mode {
-        None => Departure::TwoFold(SlidingAtTwoFold::near(system, &point)),
-        Some(_) => Departure::Repelling,
+    let mut family = Funnel { approach, t: there.t, point, at_two_fold: there.mode.is_none(), members: Vec::new() };
+    family.members = members_of(system, &family, settings, grid, None)?;
+    Ok(family)
+}
+
+/// The past of a point of the repelling region, in forward time: the sliding orbit that leads from where repelling sliding
+/// began (a two-fold, if it runs back into one) to `x`, with time 0 at its beginning.
+///
+/// At a two-fold whose sliding flow is a node every point of the repelling region has such a past: the full set of futures
+/// of the two-fold has, besides exit time and side, the sliding orbit as a third index. [`funnel`] follows the analytic
+/// one; the others are reached by running on from any `x`.
+///
+/// # Errors
+/// [`FilippovError::NoSuchExit`] if `x` is not in the repelling region, or its past does not end by `longest`.
+pub fn history<P, const N: usize, const M: usize>(
+    system: &P,
+    x: SVector<f64, N>,
+    longest: f64,
+    settings: &Settings,
+    per_step: usize,
+) -> Result<Trajectory<N>, FilippovError>
+where
+    P: PiecewiseSmooth<N> + Clone,
+    for<'a> SlidingFlow<'a, Reversed<P>, N>: VectorField<M>,
+{
+    let refuse = |why| FilippovError::NoSuchExit { t: 0.0, state: x.iter().copied().collect(), why };
+    let on_surface = project(system, &x);
+    if region(system, &on_surface) != Region::Repelling {
+        return Err(refuse("it has a sliding past only in the repelling region"));
+    }
+    // Reversed, repelling sliding attracts and its past is a future. It stops at its first event after the start.
+    let mut back = Trajectory::new(per_step).until_events(2);
+    let end = super::run(&Reversed(system.clone()), on_surface, longest, settings, ExitRule::All, &mut back)?;
+    if end.end == End::Time {
+        return Err(refuse("its past is longer than the given time"));
+    }
+    Ok(back.turned(end.t))
+}
+
+/// The members on `grid` of the family that starts at the set-valued point of `family`; of one side only, if given.
+pub(super) fn members_of<P, const N: usize, const M: usize>(
+    system: &P,
+    family: &Funnel<N>,
+    settings: &Settings,
+    grid: &FunnelGrid,
+    only: Option<Side>,
+) -> Result<Vec<FunnelMember<N>>, FilippovError>
+where
+    P: PiecewiseSmooth<N>,
+    for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
+{
+    let departure = if family.at_two_fold {
+        Departure::TwoFold(SlidingAtTwoFold::near(system, &family.point).map(Box::new))
+    } else {
+        Departure::Repelling
     };
     let mut members = Vec::with_capacity(2 * grid.times);
     for k in 0..grid.times {
         let fraction = if grid.times > 1 { k as f64 / (grid.times - 1) as f64 } else { 1.0 };
         let exit_time = grid.shortest * pow(grid.longest / grid.shortest, fraction);
         for side in [Side::Plus, Side::Minus] {
+            if only.is_some_and(|s| s != side) {
+                continue;
+            }
             let mut trajectory = Trajectory::new(grid.per_step);
             if grid.until_two_fold {
                 trajectory = trajectory.until_two_fold();
@@ -94,10 +152,10 @@ where
             let rule = ExitRule::AfterTime { time: exit_time, side };
             let summary = engine::run_from(
                 system,
-                there.t,
-                point,
+                family.t,
+                family.point,
                 departure.clone(),
-                there.t + grid.horizon,
+                family.t + grid.horizon,
                 settings,
                 rule,
                 &mut trajectory,
@@ -105,5 +163,5 @@ where
             members.push(FunnelMember { exit_time, side, trajectory, summary });
         }
     }
-    Ok(Funnel { approach, t: there.t, point, members })
+    Ok(members)
 }
