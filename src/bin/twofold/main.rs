@@ -1,10 +1,11 @@
-//! `twofold`: compute any run, check and bless the published figures.
+//! `twofold`: compute any run; check, bless, inspect and report on the published figures.
 
 mod bless;
 #[allow(dead_code, missing_docs)] // each figure's `main` is for its own binary
 #[path = "../../../figures/catalogue.rs"]
 mod catalogue;
 mod check;
+mod report;
 mod run;
 
 use std::process::ExitCode;
@@ -24,6 +25,7 @@ enum Command {
     Run(Box<run::Arguments>),
     Check(check::Arguments),
     Bless(bless::Arguments),
+    Report(report::Arguments),
 }
 
 /// How a command that did not fail ended.
@@ -42,6 +44,7 @@ fn main() -> ExitCode {
         Command::Run(arguments) => run::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Bless(arguments) => bless::run(&arguments),
+        Command::Report(arguments) => report::run(&arguments),
     };
     match result {
         Ok(Outcome::Fine) => ExitCode::SUCCESS,
