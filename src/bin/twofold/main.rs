@@ -5,6 +5,8 @@ mod bless;
 #[path = "../../../figures/catalogue.rs"]
 mod catalogue;
 mod check;
+mod inspect;
+mod published;
 mod report;
 mod run;
 
@@ -26,6 +28,7 @@ enum Command {
     Check(check::Arguments),
     Bless(bless::Arguments),
     Report(report::Arguments),
+    Inspect(inspect::Arguments),
 }
 
 /// How a command that did not fail ended.
@@ -45,6 +48,7 @@ fn main() -> ExitCode {
         Command::Check(arguments) => check::run(&arguments),
         Command::Bless(arguments) => bless::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
+        Command::Inspect(arguments) => inspect::run(&arguments),
     };
     match result {
         Ok(Outcome::Fine) => ExitCode::SUCCESS,

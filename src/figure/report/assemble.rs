@@ -250,9 +250,14 @@ fn description(name: &str, title: &str, reading: Option<Reading>, caption: &str,
     text
 }
 
+/// Kind of a verdict about paths in space.
+const PATHS: &str = "paths compared";
+/// Kind of a verdict about a noisy section, as the classifier calls it.
+const NOISY: &str = "noisy";
+
 /// What was found, in a word or two, from the evidence.
 fn kind(verdict: &RecordedVerdict) -> String {
-    let Some(section) = verdict.evidence.get("section") else { return "paths compared".to_owned() };
+    let Some(section) = verdict.evidence.get("section") else { return PATHS.to_owned() };
     let name = section.get("name").and_then(Value::as_str).unwrap_or("section");
     match section.pointer("/verdict/period").and_then(Value::as_u64) {
         Some(period) => format!("{name}, period {period}"),
@@ -409,7 +414,8 @@ fn summary(figures: &[FigureReport]) -> Summary {
             continue;
         }
         let index = readings.iter().position(|r| r.reading == picture.reading).unwrap_or_else(|| {
-            let new = ReadingSummary { reading: picture.reading, claims: 0, agree: 0, found: Vec::new() };
+            let new =
+                ReadingSummary { reading: picture.reading, claims: 0, agree: 0, found: Vec::new(), all_alike: None };
             readings.push(new);
             readings.len() - 1
         });
@@ -422,6 +428,13 @@ fn summary(figures: &[FigureReport]) -> Summary {
                 None => reading.found.push(Found { kind: verdict.kind.clone(), panels: 1 }),
             }
         }
+    }
+    for reading in &mut readings {
+        let mut ways = reading.found.iter().filter(|f| f.kind != PATHS && !f.kind.starts_with(NOISY));
+        reading.all_alike = match (ways.next(), ways.next()) {
+            (Some(only), None) if only.panels > 1 => Some(only.clone()),
+            _ => None,
+        };
     }
     // In the order in which readings are always shown; figures without readings last.
     readings.sort_by_key(|r| Reading::ALL.iter().position(|known| Some(*known) == r.reading).unwrap_or(usize::MAX));

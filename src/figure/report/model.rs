@@ -85,6 +85,9 @@ pub struct ReadingSummary {
     pub agree: usize,
     /// What was found, each with its number of panels, in order of appearance.
     pub found: Vec<Found>,
+    /// Set if all noise-free sections of the reading end in the same way: then agreement with a claim of that way is no
+    /// evidence for the reading.
+    pub all_alike: Option<Found>,
 }
 
 /// A kind of finding.

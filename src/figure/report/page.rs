@@ -165,7 +165,17 @@ fn summary(html: &mut String, report: &Report) {
         for found in &reading.found {
             put!(html, "<li>{}: {}</li>", escape(&found.kind), count(found.panels, "panel", "panels"));
         }
-        put!(html, "</ul>\n</div>");
+        put!(html, "</ul>");
+        if let Some(alike) = &reading.all_alike {
+            put!(
+                html,
+                "<p>All {} noise-free sections end alike ({}): where the paper says the same of one of them, that is no evidence for this \
+                 reading.</p>",
+                alike.panels,
+                escape(&alike.kind)
+            );
+        }
+        put!(html, "</div>");
     }
     let whole = s.pictures > 0 && s.same == s.pictures && s.damaged_files == 0;
     put!(
