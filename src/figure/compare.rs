@@ -290,3 +290,137 @@ impl Limits {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grey(width: u32, height: u32, value: impl Fn(usize) -> u8) -> Pixels {
+        let rgba = (0..(width * height) as usize).flat_map(|i| [value(i), value(i), value(i), 255]).collect();
+        Pixels { width, height, rgba }
+    }
+
+    /// Noise from a generator that the reference program shares.
+    fn noise(width: u32, height: u32, seed: u64) -> Pixels {
+        let mut state = seed;
+        let values: Vec<u8> = (0..width * height)
+            .map(|_| {
+                state = (state * 1_103_515_245 + 12_345) % (1 << 31);
+                (state >> 16 & 255) as u8
+            })
+            .collect();
+        grey(width, height, |i| values[i])
+    }
+
+    fn close(a: f64, b: f64) {
+        assert!((a - b).abs() < 1e-9, "{a} is not {b}");
+    }
+
+    #[test]
+    fn a_picture_is_like_itself() {
+        let a = noise(40, 30, 1);
+        let c = compare(&a, &a).unwrap();
+        assert_eq!((c.changed_pixels, c.changed_share, c.largest_difference), (0, 0.0, 0));
+        assert_eq!((c.rms, c.worst_block_rms, c.ssim, c.worst_ssim), (0.0, 0.0, 1.0, 1.0));
+        // Not only by the short cut for equal pictures.
+        let (mean, worst) = similarity(&on_white(&a), &on_white(&a), 40, 30);
+        close(mean, 1.0);
+        close(worst, 1.0);
+    }
+
+    #[test]
+    fn flat_pictures_have_the_similarity_of_their_means() {
+        let c = compare(&grey(20, 20, |_| 100), &grey(20, 20, |_| 120)).unwrap();
+        let expected = (2.0 * 100.0 * 120.0 + C1) / (100.0 * 100.0 + 120.0 * 120.0 + C1);
+        close(c.ssim, expected);
+        close(c.worst_ssim, expected);
+        assert_eq!((c.changed_pixels, c.changed_share, c.largest_difference), (400, 1.0, 20));
+        close(c.rms, 20.0);
+        close(c.worst_block_rms, 20.0);
+    }
+
+    /// (mean, lowest) for each pair of the test below.
+    const SKIMAGE: [(f64, f64); 3] = [
+        (0.014254053047902684, -0.40541424866284276),
+        (0.9525019610369865, 0.9483863728798687),
+        (-0.04043872541475178, -0.565134386108423),
+    ];
+
+    #[test]
+    fn similarity_is_that_of_another_program() {
+        // scikit-image 0.26: structural_similarity(gaussian_weights=True, sigma=1.5, use_sample_covariance=False, data_range=255).
+        let a = noise(40, 30, 1);
+        let pixel = |i: usize| a.rgba[4 * i];
+        let paler = grey(40, 30, |i| (f64::from(pixel(i)) * 0.75 + 16.0) as u8);
+        let shifted = grey(40, 30, |i| pixel(i / 40 * 40 + (i % 40 + 39) % 40));
+        for (other, mean, worst) in [
+            (noise(40, 30, 2), SKIMAGE[0].0, SKIMAGE[0].1),
+            (paler, SKIMAGE[1].0, SKIMAGE[1].1),
+            (shifted, SKIMAGE[2].0, SKIMAGE[2].1),
+        ] {
+            let c = compare(&a, &other).unwrap();
+            close(c.ssim, mean);
+            close(c.worst_ssim, worst);
+        }
+    }
+
+    #[test]
+    fn one_wrong_dot_is_found_where_the_means_are_blind() {
+        let white = grey(400, 300, |_| 255);
+        let dotted =
+            grey(
+                400,
+                300,
+                |i| if (100..105).contains(&(i % 400)) && (100..105).contains(&(i / 400)) { 20 } else { 255 },
+            );
+        let c = compare(&white, &dotted).unwrap();
+        assert_eq!(c.changed_pixels, 25);
+        let limits = Limits::default();
+        assert!(c.rms > limits.rms && c.ssim > limits.ssim && c.changed_share < limits.changed_share);
+        assert!(c.worst_ssim < 0.1 && c.worst_block_rms > 50.0);
+        assert_eq!(limits.rung(&c), None);
+    }
+
+    #[test]
+    fn the_ladder_goes_from_strict_to_loose() {
+        let limits = Limits::default();
+        let same = compare(&noise(40, 30, 1), &noise(40, 30, 1)).unwrap();
+        assert_eq!(limits.rung(&same), Some(Rung::ChangedPixels));
+        let many = Comparison { changed_share: 0.5, rms: 1.0, worst_block_rms: 3.0, largest_difference: 9, ..same };
+        assert_eq!(limits.rung(&many), Some(Rung::Rms));
+        let lossy = Comparison { rms: 3.0, ssim: 0.99, worst_ssim: 0.8, ..many };
+        assert_eq!(limits.rung(&lossy), Some(Rung::Ssim));
+        assert_eq!(limits.rung(&Comparison { worst_ssim: 0.1, ..lossy }), None);
+        // A number that is not one holds nowhere.
+        let nan = Comparison { changed_share: f64::NAN, rms: f64::NAN, ssim: f64::NAN, ..same };
+        assert_eq!(limits.rung(&nan), None);
+        assert!(Rung::File < Rung::Pixels && Rung::Pixels < Rung::ChangedPixels && Rung::Rms < Rung::Ssim);
+    }
+
+    #[test]
+    fn other_sizes_are_refused_and_small_ones_compared() {
+        let error = compare(&grey(3, 2, |_| 0), &grey(2, 3, |_| 0)).unwrap_err();
+        assert_eq!(error.to_string(), "one picture has 3 by 2 pixels, the other 2 by 3");
+        let c = compare(&grey(2, 2, |_| 0), &grey(2, 2, |i| 255 * u8::from(i == 0))).unwrap();
+        assert_eq!(c.changed_pixels, 1);
+        assert!(c.ssim < 0.5);
+        assert_eq!(compare(&grey(0, 0, |_| 0), &grey(0, 0, |_| 0)).unwrap().changed_pixels, 0);
+    }
+
+    #[test]
+    fn transparency_is_laid_on_white() {
+        let clear = Pixels { width: 1, height: 1, rgba: vec![0, 0, 0, 0] };
+        assert_eq!(compare(&clear, &grey(1, 1, |_| 255)).unwrap().changed_pixels, 0);
+    }
+
+    #[test]
+    fn the_difference_shows_who_has_the_ink() {
+        let dot = |at: usize| grey(20, 5, move |i| if i == at { 0 } else { 255 });
+        let d = difference_image(&dot(42), &dot(52)).unwrap();
+        let pixel = |i: usize| [d.rgba[4 * i], d.rgba[4 * i + 1], d.rgba[4 * i + 2]];
+        assert_eq!((pixel(42), pixel(52), pixel(47)), (ONLY_EXPECTED, ONLY_ACTUAL, [255; 3]));
+        assert_eq!(pixel(21), ONLY_EXPECTED);
+        let shared = difference_image(&dot(42), &dot(42)).unwrap();
+        assert!(shared.rgba[4 * 42] < 255 && shared.rgba[4 * 42] > 150);
+    }
+}
