@@ -6,10 +6,12 @@
 //! paper's caption, and nothing else.
 
 pub mod cli;
+pub mod compare;
 pub mod drawing;
 pub mod encode;
 pub mod pipeline;
 pub mod progress;
+pub mod report;
 pub mod simulate;
 pub mod sketch;
 pub mod spec;
