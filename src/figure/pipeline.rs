@@ -7,7 +7,7 @@ use super::progress::Progress;
 use super::simulate::{Recording, RunError, simulate};
 use super::spec::RunSpec;
 use super::verdict::{PanelVerdict, judge};
-use super::{Picture, Reading, Study, View, drawing, encode};
+use super::{Picture, Reading, Study, View, drawing, encode, wording};
 use crate::integrate::Statistics;
 use crate::record::hash::canonical_json;
 use crate::record::{Hash, PanelEntry, PictureEntry};
@@ -149,7 +149,7 @@ pub fn compute(picture: &Picture, progress: &Progress) -> Result<Computed, Pipel
         .zip(&recordings)
         .map(|(panel, r)| PanelRecord {
             label: panel.label.clone(),
-            title: panel.title.clone(),
+            title: wording::plain(&panel.title),
             run: panel.run,
             points: r.data.len(),
             t: r.t,
