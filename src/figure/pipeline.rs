@@ -7,7 +7,7 @@ use super::progress::Progress;
 use super::simulate::{Recording, RunError, simulate};
 use super::spec::RunSpec;
 use super::verdict::{PanelVerdict, judge};
-use super::{Picture, Reading, Study, View, drawing, encode, wording};
+use super::{Picture, Reading, Study, View, drawing, encode};
 use crate::integrate::Statistics;
 use crate::record::hash::canonical_json;
 use crate::record::{Hash, PanelEntry, PictureEntry};
@@ -149,7 +149,7 @@ pub fn compute(picture: &Picture, progress: &Progress) -> Result<Computed, Pipel
         .zip(&recordings)
         .map(|(panel, r)| PanelRecord {
             label: panel.label.clone(),
-            title: wording::plain(&panel.title),
+            title: panel.title.clone(),
             run: panel.run,
             points: r.data.len(),
             t: r.t,
@@ -197,6 +197,7 @@ fn compute_study(picture: &Picture, study: &Study, progress: &Progress) -> Resul
     let rendered = render(&sheet).map_err(|source| PipelineError::Render { picture: picture.name.clone(), source })?;
     let hashes = picture_entry(picture, spec, data, &rendered, panels);
     let record = PictureRecord {
+        title: picture.title.to_owned(),
         hashes,
         reading: picture.reading,
         caption: picture.caption.clone(),

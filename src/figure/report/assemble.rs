@@ -478,7 +478,7 @@ mod tests {
             schedule: Default::default(),
             observe: crate::figure::spec::Observation::Section { coordinate: 1, value: 0.0 },
         };
-        assert_eq!(table_bits(&encode::csv(&run, &data)).unwrap(), encode::bits(&data));
+        assert_eq!(table_bits(&encode::csv(&run, &data)).unwrap(), encode::bits(&run, &data));
         assert_eq!(table_bits(b"a,b\n1,x\n"), None);
     }
 }
