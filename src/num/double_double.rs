@@ -327,6 +327,7 @@ impl Scalar for DoubleDouble {
 }
 
 #[cfg(test)]
+#[allow(clippy::approx_constant)] // constants are compared digit by digit
 mod tests {
     use super::*;
     use proptest::prelude::*;

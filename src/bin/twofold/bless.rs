@@ -89,7 +89,7 @@ const HEADER: &str = "# Why the reference pictures changed\n\nA line per `twofol
 fn tests_pass() -> Result<bool, Problem> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let status = Command::new(cargo)
-        .args(["test", "--release", "--quiet", "--", "--skip", "golden"])
+        .args(["test", "--quiet", "--", "--skip", "golden"])
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .status()

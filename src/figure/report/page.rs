@@ -153,7 +153,7 @@ fn summary(html: &mut String, report: &Report) {
     }
     put!(html, "<div class=\"cards\">");
     for reading in &s.readings {
-        let title = reading.reading.map_or("Figures with one reading".to_owned(), |r| wording::reading(r));
+        let title = reading.reading.map_or("Figures with one reading".to_owned(), wording::reading);
         put!(
             html,
             "<div class=\"card\">\n<h3>{}</h3>\n<p class=\"figure-of\">{} of {} <small>claims agree</small></p>",
