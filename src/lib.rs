@@ -1,6 +1,60 @@
 //! `twofold`: reference software for the breakdown of determinism at a two-fold singularity.
+//!
+//! The crate regenerates every figure of M. R. Jeffrey, *Singularities that induce a breakdown of determinism in mechanics*
+//! (2013), byte for byte the same on any machine, and says panel by panel whether the paper's claim holds.
+//!
+//! # The house
+//!
+//! - [`num`]: arithmetic that results depend on. Elementary functions with the same bits everywhere, the scalar trait
+//!   over which equations are written, dual numbers, random numbers.
+//! - [`model`]: the paper's equations, one file each, no time stepping.
+//! - [`integrate`]: time stepping. One file a method; a step carries its interpolant; one driver loop; restarts and kicks
+//!   are a schedule around a run.
+//! - [`observe`]: what is made of steps: paths, Poincaré sections, verdicts about attractors.
+//! - [`figure`]: figures as data, and the way from a spec to a picture.
+//! - [`render`]: the only user of plotters: one drawing, three formats.
+//! - [`record`]: the only user of files: hashes, manifests, all-or-nothing writes.
+//!
+//! A figure goes spec -> [`figure::pipeline`] -> [`figure::simulate`] -> [`figure::drawing`] -> [`mod@render`] -> [`record`].
+//!
+//! # Walls
+//!
+//! `tests/architecture.rs` holds them up: models know nothing of integration, integration nothing of observation; the
+//! renderer knows no model; only `record` touches files; only `num` names a math library; nothing but a progress display
+//! reads a clock; parallelism is over independent runs, collected in order.
+//!
+//! # Why isn't there ...?
+//!
+//! - *a platform `tanh`?* It differs by an ulp between C libraries, and an ulp near the singularity is visible in a picture.
+//! - *a time argument in the right-hand side?* Every system of the paper is autonomous; a forced one carries its phase.
+//! - *noise inside a system?* Noise and restarts happen around a run; see [`integrate::Schedule`].
+//! - *an integer for a crossing's direction?* `Up` and `Down` cannot be mixed up.
+//! - *an error when two runs differ in the last digit?* That they do is the paper's subject; what must not differ is the
+//!   same run on two machines, and that is what the hashes are for.
+//!
+//! # In five lines
+//!
+//! ```
+//! use twofold::figure::{Reading, simulate::simulate, spec::*};
+//! let run = RunSpec {
+//!     system: SystemSpec::Caricature(Reading::Reconstructed.caricature()),
+//!     switch: SwitchSpec::tanh(1e-3),
+//!     start: [0.2, 0.0, -1.0],
+//!     t_end: 20.0,
+//!     method: MethodSpec::ndsolve_defaults(Method::Dopri5),
+//!     schedule: Default::default(),
+//!     observe: Observation::Section { coordinate: 1, value: 0.0 },
+//! };
+//! let recording = simulate(&run, &())?;
+//! assert!(recording.data.len() >= 3);
+//! # Ok::<(), twofold::figure::simulate::RunError>(())
+//! ```
+#![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
 
 pub mod figure;
 pub mod integrate;
 pub mod model;
 pub mod num;
+pub mod observe;
+pub mod record;
+pub mod render;

@@ -7,11 +7,18 @@
 pub mod dopri5;
 pub mod driver;
 pub mod filippov;
+mod linear;
+pub mod lsoda;
+pub mod radau5;
 pub mod roots;
 pub mod schedule;
 pub mod step;
+pub mod taylor;
 
 pub use dopri5::Dopri5;
 pub use driver::{Ignore, Observer, Summary, Watch, drive};
+pub use lsoda::Lsoda;
+pub use radau5::Radau5;
 pub use schedule::{Kick, KickLaw, Kicker, Schedule, StepCap};
 pub use step::{Failure, Flow, Interpolant, Statistics, Step, Stepper, Tolerance};
+pub use taylor::Taylor;

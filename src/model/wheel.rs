@@ -129,6 +129,12 @@ impl Wheel {
         -self.c_w * x[1] * x[1] - self.c_h * o * o - self.side_force * s * (self.switching(x) + self.lever(x) * o)
     }
 
+    /// The wheel's speed at which wheel and disc stick, h = 0: v = O (d - r cot gamma).
+    pub fn sticking_speed(&self, r: f64, omega: f64) -> f64 {
+        let (sin, cos) = self.sin_cos();
+        (omega - self.omega0) * (self.d - r * cos / sin)
+    }
+
     fn sin_cos(&self) -> (f64, f64) {
         (Scalar::sin(self.gamma), Scalar::cos(self.gamma))
     }
@@ -164,7 +170,17 @@ mod tests {
         // SCIENCE.md section 7, computed symbolically outside this project: h, V, a1, a2, b1, b2.
         let w = Wheel::default();
         let facts = [
-            ([0.5, 1.0, -1.0], [1.4142136, 2.8284271, 6.0666667, 6.6666667, -42.178498, -59.856168]),
+            (
+                [0.5, 1.0, -1.0],
+                [
+                    std::f64::consts::SQRT_2,
+                    2.0 * std::f64::consts::SQRT_2,
+                    6.0666667,
+                    6.6666667,
+                    -42.178498,
+                    -59.856168,
+                ],
+            ),
             ([0.3, -2.0, 0.5], [-1.1667262, -0.95459415, 5.3568182, 5.6818182, 293.16222, 275.48455]),
             ([0.8, 0.1, 2.0], [-0.070710678, -1.2020815, 2.4536364, 0.86363636, 76.983936, 59.306266]),
         ];
@@ -175,6 +191,14 @@ mod tests {
             for (g, f) in got.iter().zip(want) {
                 assert!((g - f).abs() <= 5e-8 * f.abs(), "{got:?} {want:?}");
             }
+        }
+    }
+
+    #[test]
+    fn sticking_speed_lies_on_the_surface() {
+        let w = Wheel::default();
+        for (r, omega) in [(0.3, -2.0), (0.7, 3.0)] {
+            assert!(w.switching(&vector![r, w.sticking_speed(r, omega), omega]).abs() < 1e-15);
         }
     }
 

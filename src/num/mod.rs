@@ -2,14 +2,17 @@
 //!
 //! This is the only room that names a math library. Everything that ends in a published number goes through
 //! [`elementary`] (functions with the same bits on every machine), [`Scalar`] (what an equation may do with a
-//! number, so that one definition serves plain evaluation, differentiation and extended precision), and
+//! number, so that one definition serves plain evaluation, differentiation, power series and extended precision), and
 //! [`random`] (a named generator and our own map from bits to numbers).
 
+pub mod double_double;
 pub mod dual;
 pub mod elementary;
 pub mod jet;
 pub mod random;
 pub mod scalar;
+pub mod series;
 
+pub use double_double::DoubleDouble;
 pub use dual::Dual;
 pub use scalar::Scalar;

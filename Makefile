@@ -1,0 +1,37 @@
+# Everything the project does, by name. Needs Rust (rustup reads rust-toolchain.toml) and make; no network at run time.
+
+CARGO   ?= cargo
+FIGURES := fig1 fig2 fig3 fig4 fig5 fig6 fig7 fig8 fig9 lottery
+RUN     := $(CARGO) run --release --locked --quiet
+
+.DEFAULT_GOAL := help
+.PHONY: help figures check bless test lint bench ci clean
+
+help: ## this list
+	@awk -F':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+figures: ## compute every figure at full length into target/figures
+	@$(CARGO) build --release --locked --bins
+	@set -e; for f in $(FIGURES); do $(RUN) --bin $$f; done
+
+check: ## recompute and compare with figures/figN/expected.json; exit 1 on a difference
+	@$(RUN) --bin twofold -- check
+
+bless: ## make today's figures the reference: make bless REASON="why"
+	@$(RUN) --bin twofold -- bless --reason "$(REASON)"
+
+test: ## all tests, in the debug profile
+	@$(CARGO) test --locked
+
+lint: ## formatting, clippy and documentation, warnings denied
+	@$(CARGO) fmt --check
+	@$(CARGO) clippy --locked --all-targets -- -D warnings
+	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --quiet
+
+bench: ## benchmarks
+	@$(CARGO) bench --locked
+
+ci: lint test figures check ## what CI runs
+
+clean: ## remove everything that was built or computed
+	@$(CARGO) clean

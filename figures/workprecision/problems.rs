@@ -1,0 +1,129 @@
+//! The test problems of the work-precision picture and of tests/odepack.rs: the same equations, starts and ends as in
+//! scripts/odepack_reference.py.
+
+use nalgebra::{SVector, vector};
+use twofold::model::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
+use twofold::num::Scalar;
+
+/// An initial value problem with a name.
+pub struct Problem<F, const N: usize> {
+    /// Its name in tests/data/odepack/reference.json.
+    pub name: &'static str,
+    /// The equation.
+    pub field: F,
+    /// The start, at t = 0.
+    pub start: SVector<f64, N>,
+}
+
+/// Something to be done with every problem, whatever its dimension.
+pub trait Visit {
+    /// Does it with one.
+    fn visit<F: VectorField<N>, const N: usize>(&mut self, problem: &Problem<F, N>);
+}
+
+/// Robertson (1966): three reactions with rates 0.04, 3e7, 1e4. Its components sum to 1 for ever.
+pub struct Robertson;
+
+impl VectorField<3> for Robertson {
+    fn eval<S: Scalar>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+        let [a, b, c] = [x[0], x[1], x[2]];
+        let slow = a.scale(0.04);
+        let back = b.scale(1e4) * c;
+        let fast = b.scale(3e7) * b;
+        vector![back - slow, slow - back - fast, fast]
+    }
+}
+
+/// Van der Pol (1926): x'' = mu (1 - x^2) x' - x.
+pub struct VanDerPol {
+    /// Strength of the damping.
+    pub mu: f64,
+}
+
+impl VectorField<2> for VanDerPol {
+    fn eval<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        vector![x[1], (S::one() - x[0] * x[0]).scale(self.mu) * x[1] - x[0]]
+    }
+}
+
+/// The Oregonator of Field & Noyes (1974), scaled as in Hairer & Wanner (1996), eq. (IV.10.15).
+pub struct Oregonator;
+
+impl VectorField<3> for Oregonator {
+    fn eval<S: Scalar>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+        let [a, b, c] = [x[0], x[1], x[2]];
+        vector![
+            (b + a * (S::one() - a.scale(8.375e-6) - b)).scale(77.27),
+            (c - (S::one() + a) * b) / S::from_f64(77.27),
+            (a - c).scale(0.161)
+        ]
+    }
+}
+
+/// HIRES, "high irradiance response": Schafer (1975), as in Hairer & Wanner (1996), sec. IV.10.
+pub struct Hires;
+
+impl VectorField<8> for Hires {
+    fn eval<S: Scalar>(&self, y: &SVector<S, 8>) -> SVector<S, 8> {
+        let r = y[5].scale(280.0) * y[7];
+        SVector::from([
+            y[1].scale(0.43) - y[0].scale(1.71) + y[2].scale(8.32) + S::from_f64(0.0007),
+            y[0].scale(1.71) - y[1].scale(8.75),
+            y[3].scale(0.43) - y[2].scale(10.03) + y[4].scale(0.035),
+            y[1].scale(8.32) + y[2].scale(1.71) - y[3].scale(1.12),
+            y[5].scale(0.43) + y[6].scale(0.43) - y[4].scale(1.745),
+            y[3].scale(0.69) + y[4].scale(1.71) - y[5].scale(0.43) + y[6].scale(0.69) - r,
+            r - y[6].scale(1.81),
+            y[6].scale(1.81) - r,
+        ])
+    }
+}
+
+/// Lorenz (1963) with sigma = 10, rho = 28, beta = 8/3.
+pub struct Lorenz;
+
+impl VectorField<3> for Lorenz {
+    fn eval<S: Scalar>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+        vector![
+            (x[1] - x[0]).scale(10.0),
+            x[0] * (S::from_f64(28.0) - x[2]) - x[1],
+            x[0] * x[1] - x[2].scale(8.0 / 3.0)
+        ]
+    }
+}
+
+/// alpha of the two readings of the caricature's parameters.
+const READINGS: [(&str, &str, f64); 2] =
+    [("smoothed-printed", "hysteretic-printed", 1e-3), ("smoothed-reconstructed", "hysteretic-reconstructed", 1e-1)];
+
+/// The smoothed caricature, eq. (8), with beta = 1e-5 and eps = 1e-3.
+pub fn smoothed(alpha: f64) -> Smoothed<Caricature> {
+    Smoothed { system: Caricature::with_reinjection(alpha, 1e-5), transition: Transition::Tanh, eps: 1e-3 }
+}
+
+/// The hysteretic caricature, eq. (10) read literally, with beta = 1e-5, eps = 1e-3 and eps' = 1e-2.
+pub fn hysteretic(alpha: f64) -> Hysteretic<Caricature> {
+    Hysteretic {
+        system: Caricature::with_reinjection(alpha, 1e-5),
+        eps: 1e-3,
+        eps_prime: 1e-2,
+        relaxation: Relaxation::Literal,
+    }
+}
+
+/// Shows every problem to `visitor`.
+pub fn for_each(visitor: &mut impl Visit) {
+    visitor.visit(&Problem { name: "robertson", field: Robertson, start: vector![1.0, 0.0, 0.0] });
+    visitor.visit(&Problem { name: "van-der-pol-1", field: VanDerPol { mu: 1.0 }, start: vector![2.0, 0.0] });
+    visitor.visit(&Problem { name: "van-der-pol-1000", field: VanDerPol { mu: 1000.0 }, start: vector![2.0, 0.0] });
+    visitor.visit(&Problem { name: "oregonator", field: Oregonator, start: vector![1.0, 2.0, 3.0] });
+    let start = SVector::from([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0057]);
+    visitor.visit(&Problem { name: "hires", field: Hires, start });
+    visitor.visit(&Problem { name: "lorenz", field: Lorenz, start: vector![1.0, 1.0, 1.0] });
+    for (name, _, alpha) in READINGS {
+        visitor.visit(&Problem { name, field: smoothed(alpha), start: vector![0.2, 0.0, -1.0] });
+    }
+    for (_, name, alpha) in READINGS {
+        visitor.visit(&Problem { name, field: hysteretic(alpha), start: vector![0.2, 0.0, -1.0, 1.0] });
+    }
+}

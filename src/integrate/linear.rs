@@ -1,0 +1,103 @@
+//! Linear systems of a fixed small size, for the implicit methods: LU with partial pivoting.
+//!
+//! `nalgebra`'s own `LU` type asks every caller to carry its dimension bounds (`DimMin`), up to the figure that only
+//! wants a `Stepper<N>`. Its elimination step does not, so the factorisation is put together from that.
+
+use nalgebra::linalg::{gauss_step, gauss_step_swap};
+use nalgebra::{ComplexField, SMatrix, SVector};
+
+/// P A = L U.
+#[derive(Clone, Debug)]
+pub(super) struct Lu<T, const N: usize> {
+    /// L below the diagonal (its unit diagonal is not stored), U on and above it.
+    factors: SMatrix<T, N, N>,
+    /// Row exchanged with row i at elimination step i.
+    exchanged: [usize; N],
+}
+
+impl<T: ComplexField<RealField = f64> + Copy, const N: usize> Lu<T, N> {
+    /// Factorises `a`; `None` if it is singular to working precision or not finite.
+    pub fn new(a: SMatrix<T, N, N>) -> Option<Self> {
+        let mut factors = a;
+        let mut exchanged = [0; N];
+        for i in 0..N {
+            let mut pivot = i;
+            for row in i + 1..N {
+                if factors[(row, i)].norm1() > factors[(pivot, i)].norm1() {
+                    pivot = row;
+                }
+            }
+            exchanged[i] = pivot;
+            let diagonal = factors[(pivot, i)];
+            // Written so that a NaN is refused as well.
+            if !(diagonal.norm1() > 0.0 && diagonal.norm1().is_finite()) {
+                return None;
+            }
+            if pivot == i {
+                gauss_step(&mut factors, diagonal, i);
+            } else {
+                // The swap of the already eliminated columns is ours to make.
+                for column in 0..i {
+                    factors.swap((i, column), (pivot, column));
+                }
+                gauss_step_swap(&mut factors, diagonal, i, pivot);
+            }
+        }
+        Some(Self { factors, exchanged })
+    }
+
+    /// The solution of A x = b.
+    pub fn solve(&self, mut b: SVector<T, N>) -> SVector<T, N> {
+        for (i, &with) in self.exchanged.iter().enumerate() {
+            b.swap_rows(i, with);
+        }
+        for i in 1..N {
+            for j in 0..i {
+                let known = self.factors[(i, j)] * b[j];
+                b[i] -= known;
+            }
+        }
+        for i in (0..N).rev() {
+            for j in i + 1..N {
+                let known = self.factors[(i, j)] * b[j];
+                b[i] -= known;
+            }
+            b[i] /= self.factors[(i, i)];
+        }
+        b
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Complex, matrix, vector};
+    use proptest::prelude::*;
+
+    #[test]
+    fn pivots() {
+        let a = matrix![0.0, 2.0, 1.0; 1.0, 0.0, 3.0; 4.0, -1.0, 0.0];
+        let x = vector![1.0, -2.0, 3.0];
+        assert!((Lu::new(a).unwrap().solve(a * x) - x).norm() < 1e-14);
+    }
+
+    #[test]
+    fn refuses_singular_and_nan() {
+        assert!(Lu::new(matrix![1.0, 2.0; 2.0, 4.0]).is_none());
+        assert!(Lu::new(matrix![f64::NAN, 2.0; 2.0, 4.0]).is_none());
+    }
+
+    proptest! {
+        #[test]
+        fn solves_complex(entries in prop::collection::vec(-1.0..1.0_f64, 32), rhs in prop::collection::vec(-1.0..1.0_f64, 8)) {
+            let a = SMatrix::<Complex<f64>, 4, 4>::from_fn(|i, j| {
+                let k = 8 * i + 2 * j;
+                // Diagonally dominant enough to be well conditioned.
+                Complex::new(entries[k] + if i == j { 6.0 } else { 0.0 }, entries[k + 1])
+            });
+            let b = SVector::<Complex<f64>, 4>::from_fn(|i, _| Complex::new(rhs[2 * i], rhs[2 * i + 1]));
+            let x = Lu::new(a).unwrap().solve(b);
+            prop_assert!((a * x - b).iter().all(|r| r.norm1() < 1e-13));
+        }
+    }
+}

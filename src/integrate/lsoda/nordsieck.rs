@@ -1,0 +1,112 @@
+//! The Nordsieck array: x and its scaled derivatives h^j x^(j)/j!.
+
+use nalgebra::SVector;
+
+use super::coefficients::{COLUMNS, Formula};
+use crate::integrate::step::Interpolant;
+
+/// Scaled derivatives y_j = h^j x^(j)/j! at one time, j = 0..=q used.
+#[derive(Clone, Debug)]
+pub(super) struct Nordsieck<const N: usize> {
+    y: [SVector<f64, N>; COLUMNS],
+    /// The order of the step that led here: the degree of the polynomial that is its dense output.
+    degree: usize,
+}
+
+impl<const N: usize> Nordsieck<N> {
+    pub fn new(x: SVector<f64, N>, h_derivative: SVector<f64, N>) -> Self {
+        let mut y = [SVector::zeros(); COLUMNS];
+        y[0] = x;
+        y[1] = h_derivative;
+        Self { y, degree: 1 }
+    }
+
+    pub fn column(&self, j: usize) -> &SVector<f64, N> {
+        &self.y[j]
+    }
+
+    pub fn set_column(&mut self, j: usize, value: SVector<f64, N>) {
+        self.y[j] = value;
+    }
+
+    /// The state.
+    pub fn x(&self) -> &SVector<f64, N> {
+        &self.y[0]
+    }
+
+    /// Taylor's formula one step ahead: multiplication by Pascal's triangle, by additions alone.
+    pub fn predict(&mut self, order: usize) {
+        for start in (0..order).rev() {
+            for j in start..order {
+                let next = self.y[j + 1];
+                self.y[j] += next;
+            }
+        }
+    }
+
+    /// Undoes [`Nordsieck::predict`] up to rounding.
+    pub fn retract(&mut self, order: usize) {
+        for start in (0..order).rev() {
+            for j in start..order {
+                let next = self.y[j + 1];
+                self.y[j] -= next;
+            }
+        }
+    }
+
+    /// y <- y + l e.
+    pub fn correct(&mut self, order: usize, formula: &Formula, e: &SVector<f64, N>) {
+        for (y, l) in self.y[..=order].iter_mut().zip(formula.l) {
+            *y += e * l;
+        }
+        self.degree = order;
+    }
+
+    /// Goes over to the step `ratio` times as long.
+    pub fn rescale(&mut self, order: usize, ratio: f64) {
+        let mut power = 1.0;
+        for y in &mut self.y[1..=order] {
+            power *= ratio;
+            *y *= power;
+        }
+    }
+}
+
+/// The Nordsieck polynomial, over the step that was corrected last and has not been rescaled since. It misses that
+/// step's start by about the local error, as the dense output of a multistep method does: it is the new polynomial, not
+/// the one before.
+impl<const N: usize> Interpolant<N> for Nordsieck<N> {
+    fn at(&self, theta: f64) -> SVector<f64, N> {
+        let s = theta - 1.0;
+        let mut x = self.y[self.degree];
+        for y in self.y[..self.degree].iter().rev() {
+            x = x * s + y;
+        }
+        x
+    }
+    fn degree(&self) -> usize {
+        self.degree
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// x = t^3 at t = 1 with h = 0.5: exact at 1.5 after one prediction, and back.
+    #[test]
+    fn prediction_is_taylors_formula() {
+        let mut y = Nordsieck::new(SVector::from([1.0]), SVector::from([1.5]));
+        y.set_column(2, SVector::from([0.75]));
+        y.set_column(3, SVector::from([0.125]));
+        y.degree = 3;
+        assert_eq!(y.at(2.0)[0], 3.375);
+        y.predict(3);
+        assert_eq!([0, 1, 2, 3].map(|j| y.column(j)[0]), [3.375, 3.375, 1.125, 0.125]);
+        assert_eq!(y.at(0.0)[0], 1.0);
+        y.retract(3);
+        assert_eq!([0, 1, 2, 3].map(|j| y.column(j)[0]), [1.0, 1.5, 0.75, 0.125]);
+        y.rescale(3, 2.0);
+        assert_eq!(y.at(2.0)[0], 8.0);
+    }
+}

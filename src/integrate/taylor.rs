@@ -1,0 +1,359 @@
+//! Taylor series of the solution, order and step size after Jorba & Zou (2005), layer-resolved.
+//!
+//! The series come from the equation itself ([`crate::num::series`]), in `f64` or in [`DoubleDouble`].
+//!
+//! **Layers.** A smoothed switch, tanh(h/eps), is constant to working precision outside a layer |h/eps| < w. There all
+//! its derivatives vanish, so that a high-order method with long steps jumps across the layer and its own error
+//! estimate sees nothing. (Adaptive Taylor methods without a cure get the first crossing of the paper's system wrong at
+//! every tolerance.) This one knows the arguments of every tanh in the equation, because it computes their series:
+//! outside a layer, a step ends before the argument has come nearer than the layer's edge, with certainty (a bound on
+//! the argument's speed over the step, not a sample); inside, a step may change the argument by at most
+//! [`LAYER_STRIDE`], half of eps.
+
+use nalgebra::SVector;
+
+use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
+use crate::model::VectorField;
+use crate::num::elementary::{exp, ln, pow};
+use crate::num::series::{Constants, FromDecimal, Program, Solution};
+use crate::num::{DoubleDouble, Scalar};
+
+/// How far a step inside a layer may move the argument of its tanh.
+pub const LAYER_STRIDE: f64 = 0.5;
+
+/// Jorba & Zou (2005), sec. 3: the step is shortened by exp(-0.7/(p - 1)) for safety.
+const SAFETY_EXPONENT: f64 = -0.7;
+
+/// A step is planned outside a layer only from this far beyond the edge, and then lands less than this far beyond: else
+/// the last bits of the landing would decide on which side the next step begins.
+const EDGE_MARGIN: f64 = 1.0;
+
+/// Evaluations of a tanh argument's series in search of the layer's edge; then the part of the step that is known to
+/// be free is taken.
+const EDGE_SEARCH: usize = 100;
+
+/// A number type that this method can work in.
+pub trait Precision: Scalar + FromDecimal {
+    /// Relative spacing of the numbers.
+    const EPSILON: f64;
+    /// tanh is exactly +-1 beyond this argument.
+    const TANH_SATURATION: f64;
+}
+
+impl Precision for f64 {
+    const EPSILON: f64 = f64::EPSILON;
+    const TANH_SATURATION: f64 = 19.1;
+}
+
+impl Precision for DoubleDouble {
+    const EPSILON: f64 = DoubleDouble::EPSILON;
+    const TANH_SATURATION: f64 = 38.0;
+}
+
+/// The Taylor-series stepper in the arithmetic `S`.
+///
+/// As a [`Stepper`] it takes and gives `f64` states; between restarts it keeps time and state in `S`, which
+/// [`Taylor::state`] and [`Taylor::at`] give in full.
+#[derive(Clone, Debug)]
+pub struct Taylor<const N: usize, S = f64> {
+    tolerance: Tolerance,
+    statistics: Statistics,
+    constants: Constants,
+    solution: Solution<S, N>,
+    order: usize,
+    t: S,
+    x: SVector<S, N>,
+    t_end: S,
+    max_step: f64,
+    /// Length of the last step.
+    h: S,
+    /// The last step's series, rounded.
+    rounded: Polynomial<N>,
+}
+
+/// A step's series in the fraction of the step.
+#[derive(Clone, Debug)]
+struct Polynomial<const N: usize> {
+    coefficients: Vec<SVector<f64, N>>,
+}
+
+impl<const N: usize> Interpolant<N> for Polynomial<N> {
+    fn at(&self, theta: f64) -> SVector<f64, N> {
+        self.coefficients.iter().rev().fold(SVector::zeros(), |sum, c| sum * theta + c)
+    }
+    fn degree(&self) -> usize {
+        self.coefficients.len() - 1
+    }
+}
+
+impl<const N: usize> Taylor<N, f64> {
+    /// A stepper in `f64` arithmetic: the last two terms of every step's series stay below the tolerance.
+    pub fn new(tolerance: Tolerance) -> Self {
+        Self::with_tolerance(tolerance)
+    }
+}
+
+impl<const N: usize> Taylor<N, DoubleDouble> {
+    /// A stepper in double-double arithmetic; tolerances down to about 1e-32 make sense.
+    pub fn extended(tolerance: Tolerance) -> Self {
+        Self::with_tolerance(tolerance)
+    }
+
+    /// Reads the equation's constants as decimal numbers ([`Constants::Decimal`]), from the next restart on.
+    pub fn with_decimal_constants(mut self) -> Self {
+        self.constants = Constants::Decimal;
+        self
+    }
+}
+
+impl<const N: usize, S: Precision> Taylor<N, S> {
+    fn with_tolerance(tolerance: Tolerance) -> Self {
+        // Jorba & Zou (2005), sec. 3: for analytic solutions the work per unit of time is least at this order.
+        let smallest = tolerance.rtol.min(tolerance.atol).clamp(S::EPSILON / 16.0, 1e-2);
+        let order = (1.0 - 0.5 * ln(smallest)).ceil() as usize;
+        let zero = SVector::from_element(S::zero());
+        Self {
+            tolerance,
+            statistics: Statistics { highest_order: order as u64, ..Statistics::default() },
+            constants: Constants::Binary,
+            solution: Solution::new(order, Program::default(), Constants::Binary),
+            order,
+            t: S::zero(),
+            x: zero,
+            t_end: S::zero(),
+            max_step: f64::INFINITY,
+            h: S::zero(),
+            rounded: Polynomial { coefficients: vec![SVector::zeros()] },
+        }
+    }
+
+    /// The order of the method.
+    pub fn order(&self) -> usize {
+        self.order
+    }
+
+    /// Time and state reached, in full precision.
+    pub fn state(&self) -> (S, SVector<S, N>) {
+        (self.t, self.x)
+    }
+
+    /// Time and state at the fraction `theta` of the last step, in full precision.
+    pub fn at(&self, theta: S) -> (S, SVector<S, N>) {
+        // Measured from the start of the step, which time and state have left behind.
+        (self.t - self.h * (S::one() - theta), self.sum(self.h * theta))
+    }
+
+    /// [`Stepper::restart`] from a time and state in full precision.
+    pub fn restart_from<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        t: S,
+        x: SVector<S, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
+        self.t = t;
+        self.x = x;
+        self.t_end = S::from_f64(t_end);
+        self.max_step = max_step;
+        self.h = S::zero();
+        self.statistics.restarts += 1;
+        self.record(field);
+        let rounded = self.x.map(S::to_f64);
+        if !finite(&rounded) || !finite(&field.eval(&rounded)) {
+            return Err(Failure::NotFinite { t: t.to_f64(), state: Failure::state(&rounded) });
+        }
+        Ok(())
+    }
+
+    fn record<F: VectorField<N>>(&mut self, field: &F) {
+        let program = Program::record(&self.x.map(S::to_f64), |x| field.eval(x));
+        self.solution.set_program(program, self.constants);
+        self.statistics.evaluations += 1;
+    }
+
+    /// The last step's series at the time `s` after its start.
+    fn sum(&self, s: S) -> SVector<S, N> {
+        SVector::from_fn(|i, _| self.solution.component(i).iter().rev().fold(S::zero(), |sum, c| sum * s + *c))
+    }
+
+    /// The step that the series allow: the terms of degree p - 1 and p stay below atol + rtol |x|, component by
+    /// component. With p as in [`Taylor::with_tolerance`] this is Jorba & Zou's step (2005, sec. 3), a factor e^2
+    /// inside the radius of convergence that these two terms suggest.
+    fn accurate_step(&self) -> f64 {
+        let p = self.order;
+        let mut h = f64::INFINITY;
+        for degree in [p - 1, p] {
+            let mut size = 0.0_f64;
+            for i in 0..N {
+                let x = self.x[i].to_f64().abs();
+                let c = self.solution.component(i)[degree].to_f64().abs();
+                // NaN must not be lost, as it would be in f64::max.
+                let q = c / (self.tolerance.atol + self.tolerance.rtol * x);
+                size = if q > size || q.is_nan() { q } else { size };
+            }
+            if size.is_nan() || size.is_infinite() {
+                return f64::NAN;
+            }
+            if size > 0.0 {
+                h = h.min(pow(size, -1.0 / degree as f64));
+            }
+        }
+        h * exp(SAFETY_EXPONENT / (p - 1) as f64)
+    }
+
+    /// The longest step up to `h` that respects every layer.
+    fn resolved_step(&self, mut h: f64) -> f64 {
+        let mut series = Vec::with_capacity(self.order);
+        for w in self.solution.tanh_arguments() {
+            series.clear();
+            series.extend(w.iter().map(|c| c.to_f64()));
+            h = if series[0].abs() >= S::TANH_SATURATION + EDGE_MARGIN {
+                free_time(&series, S::TANH_SATURATION, h)
+            } else {
+                stride_time(&series, h)
+            };
+        }
+        h
+    }
+}
+
+/// The polynomial `c` at s.
+fn value(c: &[f64], s: f64) -> f64 {
+    c.iter().rev().fold(0.0, |sum, c| sum * s + c)
+}
+
+/// sum |c_k| s^k over k >= 1: a bound on how far the polynomial `c` moves during [0, s].
+fn travel(c: &[f64], s: f64) -> f64 {
+    c[1..].iter().rev().fold(0.0, |sum, c| (sum + c.abs()) * s)
+}
+
+/// sum k |c_k| s^(k-1): a bound on the speed of the polynomial `c` during [0, s].
+fn speed(c: &[f64], s: f64) -> f64 {
+    c.iter().enumerate().skip(1).rev().fold(0.0, |sum, (k, c)| sum * s + k as f64 * c.abs())
+}
+
+/// A time in [0, h] during which the polynomial `w`, which starts beyond `edge` + EDGE_MARGIN, certainly stays beyond
+/// `edge`; if less than `h`, it ends less than EDGE_MARGIN beyond (or the search was given up).
+fn free_time(w: &[f64], edge: f64, h: f64) -> f64 {
+    // The landing zone is the middle of the margin.
+    let fastest = speed(w, h);
+    let mut s = 0.0;
+    for _ in 0..EDGE_SEARCH {
+        let distance = value(w, s).abs() - edge - 0.25 * EDGE_MARGIN;
+        if distance < 0.5 * EDGE_MARGIN {
+            return s;
+        }
+        s += distance / fastest;
+        if s >= h {
+            return h;
+        }
+    }
+    s
+}
+
+/// A time in [0, h] during which the polynomial `w` certainly moves by LAYER_STRIDE at most; not much shorter than need
+/// be.
+fn stride_time(w: &[f64], h: f64) -> f64 {
+    if travel(w, h) <= LAYER_STRIDE {
+        return h;
+    }
+    // The travel is increasing and convex, so that Newton's method from the right converges from the right.
+    let mut s = h.min(LAYER_STRIDE / w[1].abs());
+    for _ in 0..50 {
+        let excess = travel(w, s) - LAYER_STRIDE;
+        if excess <= 1e-3 * LAYER_STRIDE {
+            break;
+        }
+        s -= excess / speed(w, s);
+    }
+    s
+}
+
+impl<const N: usize, S: Precision> Stepper<N> for Taylor<N, S> {
+    fn restart<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
+        self.restart_from(field, S::from_f64(t), x.map(S::from_f64), t_end, max_step)
+    }
+
+    fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
+        let (t0, x0) = (self.t.to_f64(), self.x.map(S::to_f64));
+        if self.solution.program().depends_on_values() {
+            self.record(field);
+        }
+        self.solution.expand(&self.x);
+        // One evaluation of the series costs about as much as one of the right-hand side per degree.
+        self.statistics.evaluations += self.order as u64;
+
+        let remaining = self.t_end - self.t;
+        let accurate = self.accurate_step();
+        if accurate.is_nan() {
+            return Err(Failure::NotFinite { t: t0, state: Failure::state(&x0) });
+        }
+        let h = self.resolved_step(accurate.min(self.max_step).min(remaining.to_f64()));
+        let last = h * 1.000_000_1 >= remaining.to_f64();
+        if h <= t0.abs() * f64::EPSILON || h < f64::MIN_POSITIVE {
+            return Err(Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) });
+        }
+        self.h = if last { remaining } else { S::from_f64(h) };
+        let x = self.sum(self.h);
+        let x1 = x.map(S::to_f64);
+        if !finite(&x1) {
+            return Err(Failure::NotFinite { t: t0, state: Failure::state(&x0) });
+        }
+        self.x = x;
+        self.t = if last { self.t_end } else { self.t + self.h };
+
+        let mut power = S::one();
+        self.rounded.coefficients.clear();
+        for k in 0..=self.order {
+            let c = SVector::from_fn(|i, _| (self.solution.component(i)[k] * power).to_f64());
+            self.rounded.coefficients.push(c);
+            power = power * self.h;
+        }
+        self.statistics.steps += 1;
+        Ok(Step { t0, t1: self.t.to_f64(), x0, x1, interpolant: &self.rounded })
+    }
+
+    fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn free_time_stops_before_the_layer() {
+        // w = 100 - 1000 s + 100 s^2: at the edge 19.1 for s = 0.0816.
+        let w = [100.0, -1000.0, 100.0];
+        let s = free_time(&w, 19.1, 1.0);
+        let landed = value(&w, s);
+        assert!((19.1..20.1).contains(&landed), "{landed}");
+        assert_eq!(free_time(&w, 19.1, 0.05), 0.05);
+        // Dips to 19.5 and comes back: stops in the margin rather than pass unseen.
+        let dip = [100.0, -322.0, 322.0];
+        let landed = value(&dip, free_time(&dip, 19.1, 1.0));
+        assert!((19.1..20.1).contains(&landed), "{landed}");
+        // From the other side.
+        let landed = value(&[-100.0, 1000.0], free_time(&[-100.0, 1000.0], 19.1, 1.0));
+        assert!((-20.1..-19.1).contains(&landed), "{landed}");
+    }
+
+    #[test]
+    fn stride_time_bounds_the_travel() {
+        for w in [vec![3.0, 1000.0, -1e5, 3e7], vec![3.0, 0.0, 1e4], vec![0.0, -2.0]] {
+            let s = stride_time(&w, 1.0);
+            let travelled = travel(&w, s);
+            assert!((0.99..=1.001).contains(&(travelled / LAYER_STRIDE)), "{travelled}");
+        }
+        assert_eq!(stride_time(&[5.0, 0.1], 1.0), 1.0);
+    }
+}

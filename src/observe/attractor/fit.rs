@@ -1,0 +1,70 @@
+//! Straight lines and means.
+
+use crate::num::elementary::sqrt;
+
+/// A least-squares line y = intercept + slope x.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Line {
+    pub slope: f64,
+    pub slope_error: f64,
+    pub intercept: f64,
+}
+
+/// The line through the points (x, y); `None` with fewer than two different x. The error of the slope comes from the scatter
+/// about the line (zero for two points).
+pub(super) fn line(points: &[(f64, f64)]) -> Option<Line> {
+    let n = points.len() as f64;
+    let (mut mx, mut my) = (0.0, 0.0);
+    for (x, y) in points {
+        mx += x / n;
+        my += y / n;
+    }
+    let (mut sxx, mut sxy) = (0.0, 0.0);
+    for (x, y) in points {
+        sxx += (x - mx) * (x - mx);
+        sxy += (x - mx) * (y - my);
+    }
+    if sxx <= 0.0 || !sxx.is_finite() || !sxy.is_finite() {
+        return None;
+    }
+    let slope = sxy / sxx;
+    let intercept = my - slope * mx;
+    let residual: f64 = points.iter().map(|(x, y)| (y - intercept - slope * x) * (y - intercept - slope * x)).sum();
+    let slope_error = if points.len() > 2 { sqrt(residual / (n - 2.0) / sxx) } else { 0.0 };
+    Some(Line { slope, slope_error, intercept })
+}
+
+/// Mean and standard error of the mean of independent values.
+pub(crate) fn mean(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    if values.len() < 2 {
+        return (mean, f64::INFINITY);
+    }
+    let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / (n - 1.0);
+    (mean, sqrt(variance / n))
+}
+
+/// The middle value (upper of two); sorts its argument.
+pub(super) fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exact_line() {
+        let l = line(&[(0.0, 1.0), (1.0, 3.0), (4.0, 9.0)]).unwrap();
+        assert!((l.slope - 2.0).abs() < 1e-15 && (l.intercept - 1.0).abs() < 1e-15 && l.slope_error < 1e-15);
+        assert!(line(&[(1.0, 1.0), (1.0, 2.0)]).is_none());
+    }
+
+    #[test]
+    fn mean_of_four() {
+        let (m, e) = mean(&[1.0, 2.0, 3.0, 4.0]);
+        assert!((m - 2.5).abs() < 1e-15 && (e - (5.0_f64 / 12.0).sqrt()).abs() < 1e-15);
+    }
+}

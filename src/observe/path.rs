@@ -1,0 +1,121 @@
+//! The path of a run as a polyline that follows the dense output.
+
+use nalgebra::SVector;
+
+use crate::integrate::{Flow, Observer, Step};
+
+/// A point of a path: time and the first three components of the state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Time.
+    pub t: f64,
+    /// State (first three components; the hysteretic phi is not part of the picture).
+    pub x: [f64; 3],
+}
+
+/// Records a path: every accepted step's ends, and between them as many points of the interpolant as it takes for the
+/// polyline to stay within `chord` of it.
+#[derive(Clone, Debug)]
+pub struct PathRecorder {
+    chord: f64,
+    samples: Vec<Sample>,
+}
+
+/// Halvings of one step: a bound against wild interpolants, far above what a tolerance of 1e-4 asks for.
+const MOST_HALVINGS: u32 = 10;
+
+impl PathRecorder {
+    /// A recorder that starts at `x0`; `chord` is the largest distance between polyline and interpolant, in the
+    /// state's units.
+    pub fn new<const N: usize>(x0: &SVector<f64, N>, chord: f64) -> Self {
+        Self::starting(0.0, x0, chord)
+    }
+
+    /// A recorder that starts at time `t`.
+    pub fn starting<const N: usize>(t: f64, x: &SVector<f64, N>, chord: f64) -> Self {
+        Self { chord, samples: vec![Sample { t, x: first_three(x) }] }
+    }
+
+    /// The path.
+    pub fn into_samples(self) -> Vec<Sample> {
+        self.samples
+    }
+
+    /// Adds interior points of `step` between the fractions `a` and `b` where the chord misses the curve.
+    fn refine<const N: usize>(&mut self, step: &Step<'_, N>, a: (f64, [f64; 3]), b: (f64, [f64; 3]), halvings: u32) {
+        if halvings == 0 {
+            return;
+        }
+        let middle = 0.5 * (a.0 + b.0);
+        let x = first_three(&step.at(middle));
+        let gap = (0..3).map(|i| (x[i] - 0.5 * (a.1[i] + b.1[i])).abs()).fold(0.0, f64::max);
+        if gap > self.chord {
+            self.refine(step, a, (middle, x), halvings - 1);
+            self.samples.push(Sample { t: step.time(middle), x });
+            self.refine(step, (middle, x), b, halvings - 1);
+        }
+    }
+}
+
+impl<const N: usize> Observer<N> for PathRecorder {
+    fn step(&mut self, step: &Step<'_, N>) -> Flow {
+        // Thirds first: one midpoint test would accept an S-shaped step whose middle lies on the chord.
+        let knots = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(|s| (s, first_three(&step.at(s))));
+        let (start, end) = (knots[0].1, knots[3].1);
+        let straight = knots[1..3]
+            .iter()
+            .all(|(s, x)| (0..3).all(|i| (x[i] - (start[i] + s * (end[i] - start[i]))).abs() <= self.chord));
+        if !straight {
+            for pair in knots.windows(2) {
+                self.refine(step, pair[0], pair[1], MOST_HALVINGS);
+                if pair[1].0 < 1.0 {
+                    self.samples.push(Sample { t: step.time(pair[1].0), x: pair[1].1 });
+                }
+            }
+        }
+        self.samples.push(Sample { t: step.t1, x: end });
+        Flow::Continue
+    }
+
+    fn kick(&mut self, t: f64, _before: &SVector<f64, N>, after: &SVector<f64, N>) {
+        self.samples.push(Sample { t, x: first_three(after) });
+    }
+}
+
+/// The first three components; missing ones (a planar system) are zero.
+pub(crate) fn first_three<const N: usize>(x: &SVector<f64, N>) -> [f64; 3] {
+    std::array::from_fn(|i| if i < N { x[i] } else { 0.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::Interpolant;
+
+    /// A half circle in one step.
+    struct HalfCircle;
+    impl Interpolant<3> for HalfCircle {
+        fn at(&self, s: f64) -> SVector<f64, 3> {
+            use crate::num::elementary::{cos, sin};
+            let a = std::f64::consts::PI * s;
+            SVector::from([cos(a), sin(a), 0.0])
+        }
+        fn degree(&self) -> usize {
+            8
+        }
+    }
+
+    #[test]
+    fn polyline_stays_near_the_curve() {
+        let step = Step { t0: 0.0, t1: 1.0, x0: HalfCircle.at(0.0), x1: HalfCircle.at(1.0), interpolant: &HalfCircle };
+        let mut r = PathRecorder::new(&step.x0, 1e-3);
+        r.step(&step);
+        let samples = r.into_samples();
+        assert!(samples.windows(2).all(|w| w[0].t < w[1].t));
+        for w in samples.windows(2) {
+            let m: Vec<f64> = (0..2).map(|i| 0.5 * (w[0].x[i] + w[1].x[i])).collect();
+            assert!(1.0 - (m[0] * m[0] + m[1] * m[1]).sqrt() < 2e-3, "{w:?}");
+        }
+        assert!(samples.len() < 200);
+    }
+}

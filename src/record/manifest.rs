@@ -1,0 +1,230 @@
+//! Manifests: which bytes a figure is made of, in layers.
+//!
+//! A picture has a hash for its spec, its data, its pixels and each of its files. The first layer that differs names
+//! the room that changed: spec (the question), data (numerics), pixels (drawing), file (encoding).
+
+use serde::{Deserialize, Serialize};
+
+use super::Hash;
+
+/// The format's version; a manifest of another version is refused, not guessed at.
+pub const VERSION: u32 = 1;
+
+/// All pictures of one figure.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// Format version.
+    pub version: u32,
+    /// The figure, "fig7".
+    pub figure: String,
+    /// The crate's version that made it.
+    pub made_by: String,
+    /// Its pictures.
+    pub pictures: Vec<PictureEntry>,
+}
+
+/// One picture: hashes of its layers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PictureEntry {
+    /// The file name without extension, "fig7-printed".
+    pub name: String,
+    /// Hash of all panels' specs.
+    pub spec: Hash,
+    /// Hash of all panels' data.
+    pub data: Hash,
+    /// Hash of the decoded pixels (width, height, RGBA).
+    pub pixels: Hash,
+    /// Hash of the PNG file.
+    pub png: Hash,
+    /// Hash of the SVG file.
+    pub svg: Hash,
+    /// Hash of the PDF file.
+    pub pdf: Hash,
+    /// Its panels.
+    pub panels: Vec<PanelEntry>,
+}
+
+/// One panel: hashes of its question and its numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PanelEntry {
+    /// The panel's label, "i".
+    pub label: String,
+    /// Hash of the spec's canonical JSON.
+    pub spec: Hash,
+    /// Hash of the data (f64, little-endian).
+    pub data: Hash,
+}
+
+/// A layer of a picture, from question to file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Layer {
+    /// What was asked.
+    Spec,
+    /// The numbers.
+    Data,
+    /// The decoded picture.
+    Pixels,
+    /// The PNG file's bytes.
+    Png,
+    /// The SVG file's bytes.
+    Svg,
+    /// The PDF file's bytes.
+    Pdf,
+}
+
+impl Layer {
+    /// The layer's name in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Layer::Spec => "spec",
+            Layer::Data => "data",
+            Layer::Pixels => "pixels",
+            Layer::Png => "PNG file",
+            Layer::Svg => "SVG file",
+            Layer::Pdf => "PDF file",
+        }
+    }
+}
+
+/// Why a manifest could not be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ManifestError {
+    /// Not JSON, or not of this shape.
+    #[error("{name} is not a manifest: {source}; make one with `twofold bless`")]
+    Syntax {
+        /// Where it came from.
+        name: String,
+        /// What the parser met.
+        source: serde_json::Error,
+    },
+    /// Another format version.
+    #[error(
+        "{name} is a manifest of version {found}, this program reads version {VERSION}; make it anew with `twofold bless`, or use the release that made it"
+    )]
+    Version {
+        /// Where it came from.
+        name: String,
+        /// Its version.
+        found: u64,
+    },
+}
+
+impl Manifest {
+    /// Reads a manifest; `name` is for messages.
+    pub fn parse(text: &str, name: &str) -> Result<Self, ManifestError> {
+        let syntax = |source| ManifestError::Syntax { name: name.to_owned(), source };
+        // The version decides how the rest is read, so it is looked at alone first.
+        let value: serde_json::Value = serde_json::from_str(text).map_err(syntax)?;
+        if let Some(found) = value.get("version").and_then(serde_json::Value::as_u64)
+            && found != u64::from(VERSION)
+        {
+            return Err(ManifestError::Version { name: name.to_owned(), found });
+        }
+        serde_json::from_value(value).map_err(syntax)
+    }
+
+    /// The manifest as indented JSON with a final newline.
+    pub fn to_json(&self) -> Vec<u8> {
+        let mut bytes = serde_json::to_vec_pretty(self).expect("a manifest is plain data");
+        bytes.push(b'\n');
+        bytes
+    }
+
+    /// The entry of a picture.
+    pub fn picture(&self, name: &str) -> Option<&PictureEntry> {
+        self.pictures.iter().find(|p| p.name == name)
+    }
+}
+
+/// A difference between an expected and an actual picture.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Difference {
+    /// The first layer that differs.
+    pub layer: Layer,
+    /// The panels whose spec or data differ.
+    pub panels: Vec<String>,
+}
+
+impl PictureEntry {
+    /// The first layer in which `actual` differs from `self`.
+    pub fn first_difference(&self, actual: &PictureEntry) -> Option<Difference> {
+        let panels_differing = |hash: fn(&PanelEntry) -> &Hash| {
+            let mut labels = Vec::new();
+            for panel in &self.panels {
+                let other = actual.panels.iter().find(|p| p.label == panel.label);
+                if other.is_none_or(|o| hash(o) != hash(panel)) {
+                    labels.push(panel.label.clone());
+                }
+            }
+            labels
+        };
+        let layer = [
+            (Layer::Spec, &self.spec, &actual.spec),
+            (Layer::Data, &self.data, &actual.data),
+            (Layer::Pixels, &self.pixels, &actual.pixels),
+            (Layer::Png, &self.png, &actual.png),
+            (Layer::Svg, &self.svg, &actual.svg),
+            (Layer::Pdf, &self.pdf, &actual.pdf),
+        ]
+        .into_iter()
+        .find(|(_, a, b)| a != b)?
+        .0;
+        let panels = match layer {
+            Layer::Spec => panels_differing(|p| &p.spec),
+            Layer::Data => panels_differing(|p| &p.data),
+            _ => Vec::new(),
+        };
+        Some(Difference { layer, panels })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry() -> PictureEntry {
+        let h = |s: &str| Hash::of(s.as_bytes());
+        let panel = |l: &str| PanelEntry { label: l.into(), spec: h("s"), data: h("d") };
+        PictureEntry {
+            name: "fig7-printed".into(),
+            spec: h("1"),
+            data: h("2"),
+            pixels: h("3"),
+            png: h("4"),
+            svg: h("5"),
+            pdf: h("6"),
+            panels: vec![panel("i"), panel("ii")],
+        }
+    }
+
+    #[test]
+    fn names_the_first_layer_and_the_panel() {
+        let expected = entry();
+        assert_eq!(expected.first_difference(&entry()), None);
+        let mut actual = entry();
+        actual.data = Hash::of(b"other");
+        actual.panels[1].data = Hash::of(b"other");
+        actual.png = Hash::of(b"other");
+        let difference = expected.first_difference(&actual).unwrap();
+        assert_eq!(difference, Difference { layer: Layer::Data, panels: vec!["ii".into()] });
+    }
+
+    #[test]
+    fn other_versions_and_other_files_are_refused() {
+        let error = Manifest::parse(r#"{"version": 7}"#, "m.json").unwrap_err().to_string();
+        assert!(error.contains("version 7") && error.contains("m.json"), "{error}");
+        let error = Manifest::parse("not json", "m.json").unwrap_err().to_string();
+        assert!(error.contains("m.json is not a manifest"), "{error}");
+        assert!(Manifest::parse("[1]", "m.json").is_err());
+    }
+
+    #[test]
+    fn round_trip() {
+        let m = Manifest { version: VERSION, figure: "fig7".into(), made_by: "0.1.0".into(), pictures: vec![entry()] };
+        assert_eq!(Manifest::parse(std::str::from_utf8(&m.to_json()).unwrap(), "m").unwrap(), m);
+    }
+}

@@ -1,0 +1,284 @@
+//! Rich text: a small markup for variables, superscripts and subscripts, set in the embedded font.
+//!
+//! `*x*` is italic; `^{...}` and `_{...}` raise and lower (one character needs no braces); a backslash
+//! takes the next character literally. A hyphen before a number or inside a superscript or subscript becomes a minus sign.
+
+use super::font::{self, Cut, Glyph, Stroke};
+use super::scene::{Position, Segment, units};
+
+/// Why a text cannot be set.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RichTextError {
+    /// Braces do not match.
+    #[error("in the text {text:?}: unbalanced braces; write \\{{ for a brace")]
+    Braces {
+        /// The text.
+        text: String,
+    },
+    /// The embedded font lacks a character.
+    #[error("in the text {text:?}: the embedded font has no glyph for {character:?}")]
+    Glyph {
+        /// The text.
+        text: String,
+        /// The character.
+        character: char,
+    },
+    /// An italic passage is not closed.
+    #[error("in the text {text:?}: an asterisk without its partner; write \\* for an asterisk")]
+    Italic {
+        /// The text.
+        text: String,
+    },
+}
+
+/// Size of superscripts and subscripts relative to the text around them.
+const SCRIPT_SIZE: f64 = 0.70;
+/// How far a superscript is raised, relative to the size of the text around it.
+const RAISE: f64 = 0.36;
+/// How far a subscript is lowered.
+const LOWER: f64 = 0.17;
+
+#[derive(Clone, Copy, Debug)]
+struct Placed {
+    glyph: Glyph,
+    x: f64,
+    y: f64,
+    scale: f64,
+}
+
+/// A line of text, set: glyphs placed relative to the start of the baseline at font size one.
+#[derive(Clone, Debug)]
+pub struct Line {
+    glyphs: Vec<Placed>,
+    /// Width as a share of the font size.
+    pub width: f64,
+    /// The text without markup.
+    pub plain: String,
+}
+
+struct Setter<'a> {
+    source: &'a str,
+    characters: Vec<char>,
+    next: usize,
+    italic: bool,
+    base: Cut,
+    pen: f64,
+    previous: Option<Glyph>,
+    line: Line,
+}
+
+/// Sets a line of rich text in the given cut.
+pub fn set(source: &str, base: Cut) -> Result<Line, RichTextError> {
+    let mut setter = Setter {
+        source,
+        characters: source.chars().collect(),
+        next: 0,
+        italic: false,
+        base,
+        pen: 0.0,
+        previous: None,
+        line: Line { glyphs: Vec::new(), width: 0.0, plain: String::new() },
+    };
+    setter.group(0, 1.0, 0.0)?;
+    if setter.italic {
+        return Err(RichTextError::Italic { text: source.to_owned() });
+    }
+    setter.line.width = setter.pen;
+    Ok(setter.line)
+}
+
+impl Setter<'_> {
+    fn group(&mut self, depth: usize, scale: f64, rise: f64) -> Result<(), RichTextError> {
+        while let Some(c) = self.characters.get(self.next).copied() {
+            self.next += 1;
+            match c {
+                '\\' => {
+                    let literal = self.characters.get(self.next).copied().unwrap_or('\\');
+                    self.next += 1;
+                    self.place(literal, scale, rise)?;
+                }
+                '*' => self.italic = !self.italic,
+                '^' => self.script(depth, scale * SCRIPT_SIZE, rise + RAISE * scale, '^')?,
+                '_' => self.script(depth, scale * SCRIPT_SIZE, rise - LOWER * scale, '_')?,
+                '{' => self.group(depth + 1, scale, rise)?,
+                '}' if depth > 0 => return Ok(()),
+                '}' => return Err(self.unbalanced()),
+                '-' if self.is_minus(depth) => self.place('\u{2212}', scale, rise)?,
+                other => self.place(other, scale, rise)?,
+            }
+        }
+        if depth == 0 { Ok(()) } else { Err(self.unbalanced()) }
+    }
+
+    fn script(&mut self, depth: usize, scale: f64, rise: f64, sign: char) -> Result<(), RichTextError> {
+        self.previous = None;
+        self.pen += 0.02 * scale;
+        self.line.plain.push(sign);
+        match self.characters.get(self.next).copied() {
+            Some('{') => {
+                self.next += 1;
+                self.group(depth + 1, scale, rise)?;
+            }
+            Some('-') => {
+                self.next += 1;
+                self.place('\u{2212}', scale, rise)?;
+            }
+            Some(c) => {
+                self.next += 1;
+                self.place(c, scale, rise)?;
+            }
+            None => return Err(self.unbalanced()),
+        }
+        self.pen += 0.04 * scale;
+        self.previous = None;
+        Ok(())
+    }
+
+    /// A hyphen is a minus sign before a digit, unless it joins words or numbers such as `2-10`; between spaces; and in scripts.
+    fn is_minus(&self, depth: usize) -> bool {
+        let before = self.next.checked_sub(2).map(|i| self.characters[i]);
+        let after = self.characters.get(self.next).copied();
+        let joins = before.is_some_and(char::is_alphanumeric);
+        depth > 0
+            || (!joins && after.is_some_and(|c| c.is_ascii_digit() || c == '.' || c == '*'))
+            || (before == Some(' ') && after == Some(' '))
+    }
+
+    fn place(&mut self, c: char, scale: f64, rise: f64) -> Result<(), RichTextError> {
+        let cut = match (self.italic, self.base) {
+            (true, Cut::Bold) => Cut::BoldItalic,
+            (true, _) => Cut::Italic,
+            (false, base) => base,
+        };
+        let glyph =
+            font::glyph(cut, c).ok_or_else(|| RichTextError::Glyph { text: self.source.to_owned(), character: c })?;
+        if let Some(previous) = self.previous {
+            self.pen += font::kern(previous, glyph) * scale;
+            let leans = |g: Glyph| matches!(g.cut, Cut::Italic | Cut::BoldItalic);
+            if leans(previous) && !leans(glyph) && !c.is_whitespace() {
+                // Italic correction: a leaning letter must not touch an upright neighbour.
+                self.pen += 0.035 * scale;
+            }
+        }
+        self.line.glyphs.push(Placed { glyph, x: self.pen, y: rise, scale });
+        self.pen += font::advance(glyph) * scale;
+        self.previous = Some(glyph);
+        self.line.plain.push(c);
+        Ok(())
+    }
+
+    fn unbalanced(&self) -> RichTextError {
+        RichTextError::Braces { text: self.source.to_owned() }
+    }
+}
+
+/// Direction in which a line runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turn {
+    /// Left to right.
+    Level,
+    /// Bottom to top.
+    Upwards,
+}
+
+impl Line {
+    /// Outlines of the line at a font size in points, its baseline starting at `origin`.
+    pub fn outlines(&self, size: f64, origin: Position, turn: Turn) -> Vec<Segment> {
+        let mut path = Vec::new();
+        for placed in &self.glyphs {
+            let at = |p: [f64; 2]| {
+                let x = units(size * (placed.x + placed.scale * p[0]));
+                let y = units(size * (placed.y + placed.scale * p[1]));
+                match turn {
+                    Turn::Level => (origin.0 + x, origin.1 - y),
+                    Turn::Upwards => (origin.0 - y, origin.1 - x),
+                }
+            };
+            path.extend(font::outline(placed.glyph).into_iter().map(|stroke| match stroke {
+                Stroke::Move(p) => Segment::Move(at(p)),
+                Stroke::Line(p) => Segment::Line(at(p)),
+                Stroke::Cubic(a, b, p) => Segment::Cubic(at(a), at(b), at(p)),
+                Stroke::Close => Segment::Close,
+            }));
+        }
+        path
+    }
+}
+
+/// Width in points of a text at a font size, or zero for a text that cannot be set (which drawing it then reports).
+pub fn width(source: &str, cut: Cut, size: f64) -> f64 {
+    set(source, cut).map_or(0.0, |line| line.width * size)
+}
+
+/// Breaks a text at spaces outside braces into lines no wider than `limit` points. A single long word stays whole. An italic passage
+/// must not contain a break; each line has to be complete markup, so a break inside one is not taken.
+pub fn wrap(source: &str, cut: Cut, size: f64, limit: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    let mut current = String::new();
+    for word in source.split(' ') {
+        let longer = if current.is_empty() { word.to_owned() } else { format!("{current} {word}") };
+        let complete = current.is_empty() || set(&current, cut).is_ok();
+        let fits = set(&longer, cut).map_or(true, |line| line.width * size <= limit);
+        if fits || !complete || current.is_empty() {
+            current = longer;
+        } else {
+            lines.push(std::mem::replace(&mut current, word.to_owned()));
+        }
+    }
+    lines.push(current);
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plain(source: &str) -> String {
+        set(source, Cut::Regular).unwrap().plain
+    }
+
+    #[test]
+    fn hyphens_become_minus_signs_only_where_a_number_is_meant() {
+        assert_eq!(plain("-3.5"), "\u{2212}3.5");
+        assert_eq!(plain("10^{-3}"), "10^\u{2212}3");
+        assert_eq!(plain("*v*_-"), "v_\u{2212}");
+        assert_eq!(plain("a - b"), "a \u{2212} b");
+        assert_eq!(plain("two-fold, 2-10"), "two-fold, 2-10");
+        assert_eq!(plain("(-1, 2)"), "(\u{2212}1, 2)");
+    }
+
+    #[test]
+    fn scripts_are_smaller_raised_and_lowered() {
+        let line = set("x^{2}y_{3}", Cut::Regular).unwrap();
+        let [x, two, y, three] = line.glyphs[..] else { panic!("{line:?}") };
+        assert_eq!((x.scale, x.y, y.y), (1.0, 0.0, 0.0));
+        assert!(two.scale < 0.8 && two.y > 0.2 && three.y < -0.1);
+        assert!(x.x < two.x && two.x < y.x && y.x < three.x);
+    }
+
+    #[test]
+    fn italics_change_the_cut_and_end_again() {
+        let line = set("*x* = 1", Cut::Regular).unwrap();
+        assert_eq!(line.glyphs[0].glyph.cut, Cut::Italic);
+        assert!(line.glyphs[1..].iter().all(|g| g.glyph.cut == Cut::Regular));
+    }
+
+    #[test]
+    fn faulty_markup_is_named() {
+        assert!(matches!(set("a_{b", Cut::Regular), Err(RichTextError::Braces { .. })));
+        assert!(matches!(set("a}", Cut::Regular), Err(RichTextError::Braces { .. })));
+        assert!(matches!(set("a^", Cut::Regular), Err(RichTextError::Braces { .. })));
+        assert!(matches!(set("*a", Cut::Regular), Err(RichTextError::Italic { .. })));
+        assert!(matches!(set("\u{4e2d}", Cut::Regular), Err(RichTextError::Glyph { character: '\u{4e2d}', .. })));
+        assert_eq!(plain("\\*\\{\\_"), "*{_");
+    }
+
+    #[test]
+    fn wrapping_keeps_every_word_and_the_limit() {
+        let text = "reading printed, *α* = 10^{-3}, *β* = 10^{-5}, *ε* = 10^{-3}, *t* = 2×10^{5}, restart every 20";
+        let lines = wrap(text, Cut::Regular, 7.0, 120.0);
+        assert!(lines.len() > 1);
+        assert_eq!(lines.join(" "), text);
+        assert!(lines.iter().all(|l| width(l, Cut::Regular, 7.0) <= 120.0));
+    }
+}

@@ -1,0 +1,374 @@
+//! Tests of whole pictures: where ink lies, that the three formats agree, that bytes repeat, and what is written into the files.
+
+use super::scene::{Item, Position, Scene, UNITS_PER_PIXEL};
+use super::sheet::*;
+use super::*;
+
+fn dot_panel(points: Vec<[f64; 2]>) -> PlanePanel {
+    let red = DotStyle { colour: Colour::rgb(255, 0, 0), diameter: Some(2.0), density: false };
+    PlanePanel::new(Axis::linear("*x*", -2.0, 3.0), Axis::linear("*z*", 10.0, 20.0)).dots(points, red)
+}
+
+fn dot_sheet(points: Vec<[f64; 2]>) -> Sheet {
+    Sheet::new(ColumnWidth::Single, 1, "A point.").title("One *x*^{2} & <two>").panel("(i)", "point", dot_panel(points))
+}
+
+fn provenance_sheet() -> Sheet {
+    dot_sheet(vec![[0.5, 12.0]])
+        .provenance("spec-sha256", "00ff")
+        .provenance("reading", "recon & <structed> \"α\" (x) \\ y)")
+        .provenance("empty", "")
+        .provenance("lines", "one\ntwo\ttab")
+}
+
+fn dots(scene: &Scene) -> Vec<Position> {
+    let red = Colour::rgb(255, 0, 0);
+    scene
+        .items
+        .iter()
+        .filter_map(|i| match i {
+            Item::Dots { paint, centres, .. } if paint.colour == red => Some(centres.clone()),
+            _ => None,
+        })
+        .flatten()
+        .collect()
+}
+
+/// The frame of the (only) plane panel: left, top, right, bottom in units.
+fn frame(scene: &Scene) -> [i32; 4] {
+    let closed = scene.items.iter().find_map(|i| match i {
+        Item::Stroke { lines, .. } => lines.iter().find(|l| l.len() == 5 && l[0] == l[4]),
+        _ => None,
+    });
+    let c = closed.expect("a frame is drawn");
+    [c[0].0, c[0].1, c[2].0, c[2].1]
+}
+
+#[test]
+fn a_point_lands_where_its_coordinates_say() {
+    let data = [[-2.0, 10.0], [3.0, 20.0], [0.5, 12.0], [-1.234, 17.7]];
+    let scene = layout::draw(&dot_sheet(data.to_vec())).unwrap();
+    let [left, top, right, bottom] = frame(&scene);
+    let centres = dots(&scene);
+    assert_eq!(centres.len(), data.len());
+    for p in data {
+        let x = f64::from(left) + f64::from(right - left) * (p[0] + 2.0) / 5.0;
+        let y = f64::from(bottom) - f64::from(bottom - top) * (p[1] - 10.0) / 10.0;
+        let nearest = centres.iter().map(|c| (f64::from(c.0) - x).abs().max((f64::from(c.1) - y).abs()));
+        // To half a unit, that is a 24th of a pixel.
+        assert!(nearest.fold(f64::INFINITY, f64::min) <= 0.5 + 1e-9, "{p:?}");
+    }
+}
+
+#[test]
+fn png_and_svg_put_the_point_at_the_same_place() {
+    for x in [0.5, 0.51, 0.523, 0.537] {
+        let sheet = dot_sheet(vec![[x, 12.345]]);
+        let centre = dots(&layout::draw(&sheet).unwrap())[0];
+        let picture = render(&sheet).unwrap();
+        let (mut sum, mut sx, mut sy) = (0.0, 0.0, 0.0);
+        let width = picture.pixels.width as usize;
+        for (i, p) in picture.pixels.rgba.chunks_exact(4).enumerate() {
+            // Only the dot is red: there red stays while green goes.
+            let weight = f64::from(p[0]) - f64::from(p[1]);
+            if weight > 8.0 {
+                sum += weight;
+                sx += weight * ((i % width) as f64 + 0.5);
+                sy += weight * ((i / width) as f64 + 0.5);
+            }
+        }
+        let unit = f64::from(UNITS_PER_PIXEL);
+        assert!((sx / sum - f64::from(centre.0) / unit).abs() < 0.02, "{} {}", sx / sum, f64::from(centre.0) / unit);
+        assert!((sy / sum - f64::from(centre.1) / unit).abs() < 0.02, "{} {}", sy / sum, f64::from(centre.1) / unit);
+        let text = String::from_utf8(picture.svg).unwrap();
+        let document = roxmltree::Document::parse(&text).unwrap();
+        let path = document.descendants().find(|n| n.attribute("stroke") == Some("#ff0000")).unwrap();
+        assert_eq!(path.attribute("d").unwrap(), format!("m{} {}h0", centre.0, centre.1));
+    }
+}
+
+#[test]
+fn the_same_sheet_gives_the_same_bytes() {
+    let (a, b) = (render(&full_sheet()).unwrap(), render(&full_sheet()).unwrap());
+    assert!(a.png == b.png && a.svg == b.svg && a.pdf == b.pdf && a.pixels == b.pixels);
+}
+
+#[test]
+fn a_changed_sheet_gives_other_pixels() {
+    let (a, b) = (render(&dot_sheet(vec![[0.5, 12.0]])).unwrap(), render(&dot_sheet(vec![[0.51, 12.0]])).unwrap());
+    assert_ne!(a.pixels, b.pixels);
+}
+
+/// Every kind of panel and layer.
+fn full_sheet() -> Sheet {
+    let wave: Vec<[f64; 2]> = (0..400).map(|i| f64::from(i) * 0.01).map(|t| [t, t * (4.0 - t) - 2.0]).collect();
+    let helix: Vec<[f64; 3]> = (0..500)
+        .map(|i| f64::from(i) * 0.004 - 1.0)
+        .map(|t| [t, 4.0 * t * t * t - 3.0 * t, 2.0 * t * t - 1.0])
+        .collect();
+    let plane = PlanePanel::new(Axis::linear("*x*", 0.0, 4.0), Axis::linear("*y*_{1}", -3.0, 3.0))
+        .grid()
+        .area(vec![[0.0, 0.0], [2.0, 0.0], [2.0, 5.0]], style::ATTRACTING)
+        .line(wave.clone(), LineStyle::default().dashed())
+        .arrow(wave, LineStyle::new(style::BLUE, 1.0))
+        .markers(vec![[1.0, 1.0]], MarkerStyle::new(MarkerShape::Star, style::MAGENTA))
+        .note([1.0, 1.0], "*σ*√*ε*", Anchor::Left)
+        .legend(LegendKey::Line(LineStyle::default()), "wave");
+    let surface = grid_surface(
+        (-1.0, 1.0, 10),
+        (-1.0, 1.0, 10),
+        |u, v| [u, v, 0.5 * u * v],
+        |u, _| {
+            if u < 0.0 { style::ATTRACTING } else { style::REPELLING }
+        },
+    );
+    let unit = |title: &str| Axis::linear(title, -1.0, 1.0);
+    let space =
+        SpacePanel::new(unit("*x*"), unit("*y*"), unit("*z*")).surface(surface).line(helix, LineStyle::default());
+    Sheet::new(ColumnWidth::Double, 2, "Everything.")
+        .title("Title")
+        .subtitle("subtitle")
+        .banner("SHORTENED")
+        .panel("(i)", "plane", plane)
+        .panel("(ii)", "space", space)
+        .panel(
+            "(iii)",
+            "sketch",
+            PlanePanel::sketch((0.0, 1.0), (0.0, 1.0)).solid(vec![[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]], style::GREEN),
+        )
+        .panel("", "", Content::Blank)
+        .legend(LegendEntry::new(LegendKey::Dots(DotStyle::early()), "early"))
+        .footer("*α* = 10^{-3}")
+        .provenance("figure", "test")
+}
+
+#[test]
+fn svg_is_well_formed_and_needs_no_font() {
+    let text = String::from_utf8(render(&full_sheet()).unwrap().svg).unwrap();
+    let document = roxmltree::Document::parse(&text).unwrap();
+    let root = document.root_element();
+    assert_eq!(root.attribute("role"), Some("img"));
+    let child = |name: &str| root.children().find(|n| n.has_tag_name(("http://www.w3.org/2000/svg", name)));
+    assert_eq!(child("title").and_then(|n| n.text()), Some("Title"));
+    assert_eq!(child("desc").and_then(|n| n.text()), Some("Everything."));
+    assert!(child("metadata").is_some());
+    for node in document.descendants().filter(|n| n.is_element()) {
+        assert!(!["text", "tspan", "font", "image", "style", "script"].contains(&node.tag_name().name()), "{node:?}");
+        assert!(node.attribute("font-family").is_none());
+    }
+}
+
+#[test]
+fn sixty_thousand_points_stay_under_two_megabytes() {
+    let mut seed = 1u64;
+    let mut next = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let points: Vec<[f64; 2]> = (0..60_000).map(|_| [next(), next()]).collect();
+    let panel =
+        PlanePanel::new(Axis::linear("*x*", 0.0, 1.0), Axis::linear("*z*", 0.0, 1.0)).dots(points, DotStyle::late());
+    let picture = render(&Sheet::new(ColumnWidth::Double, 1, "Noise.").panel("", "", panel)).unwrap();
+    assert!(picture.svg.len() < 1_000_000, "{}", picture.svg.len());
+    assert!(picture.pdf.len() < 1_000_000, "{}", picture.pdf.len());
+}
+
+#[test]
+fn the_png_states_its_printed_size_and_decodes_to_the_pixels() {
+    for (width, centimetres) in [(ColumnWidth::Single, 8.6), (ColumnWidth::Double, 17.8)] {
+        let mut sheet = full_sheet();
+        sheet.width = width;
+        let picture = render(&sheet).unwrap();
+        let reader = png::Decoder::new(std::io::Cursor::new(&picture.png)).read_info().unwrap();
+        let dims = reader.info().pixel_dims.unwrap();
+        assert_eq!((dims.xppu, dims.yppu, dims.unit), (11_811, 11_811, png::Unit::Meter));
+        let printed = f64::from(reader.info().width) / f64::from(dims.xppu) * 100.0;
+        assert!((printed - centimetres).abs() < 0.005, "{printed}");
+        assert_eq!(decode_png(&picture.png).unwrap(), picture.pixels);
+        assert!(picture.pixels.rgba.chunks_exact(4).all(|p| p[3] == 255));
+        assert_eq!(picture.pixels.rgba[..4], [255; 4]);
+    }
+}
+
+#[test]
+fn provenance_comes_back_from_all_three() {
+    let sheet = provenance_sheet();
+    let picture = render(&sheet).unwrap();
+    for (bytes, format) in [(&picture.png, Format::Png), (&picture.svg, Format::Svg), (&picture.pdf, Format::Pdf)] {
+        let found = read_provenance(bytes).unwrap();
+        assert_eq!(found.format, format);
+        assert_eq!(found.entries, sheet.provenance, "{format:?}");
+        assert!(found.intact, "{format:?}");
+        assert_eq!(found.get("spec-sha256"), Some("00ff"));
+    }
+}
+
+#[test]
+fn any_changed_byte_breaks_the_seal() {
+    let picture = render(&provenance_sheet()).unwrap();
+    for file in [&picture.png, &picture.svg, &picture.pdf] {
+        // Some hundred places over the whole file, and each of the last few.
+        let places = (0..file.len()).step_by(file.len() / 100).chain(file.len() - 8..file.len());
+        for at in places {
+            let mut changed = file.clone();
+            changed[at] ^= 0x15;
+            let intact = read_provenance(&changed).is_ok_and(|p| p.intact);
+            assert!(!intact, "byte {at} of {}", file.len());
+        }
+        let mut longer = file.clone();
+        longer.push(b'\n');
+        assert!(!read_provenance(&longer).is_ok_and(|p| p.intact));
+    }
+}
+
+#[test]
+fn the_pdf_has_no_clock_and_no_identifier() {
+    let pdf = render(&full_sheet()).unwrap().pdf;
+    let text = String::from_utf8_lossy(&pdf);
+    for word in ["/CreationDate", "/ModDate", "/ID", "xmp"] {
+        assert!(!text.contains(word), "{word}");
+    }
+    assert!(text.contains("/Title (Title)"));
+}
+
+#[test]
+fn two_distinct_late_points_are_seen_among_a_faint_transient() {
+    let early: Vec<[f64; 2]> = (0..900).map(|i| [f64::from(i % 30) / 30.0, f64::from(i / 30) / 30.0]).collect();
+    let late: Vec<[f64; 2]> = (0..5000).map(|i| if i % 2 == 0 { [0.3, 0.512] } else { [0.7, 0.49] }).collect();
+    let panel = PlanePanel::new(Axis::linear("*x*", 0.0, 1.0), Axis::linear("*z*", 0.0, 1.0))
+        .dots(early, DotStyle::early())
+        .dots(late, DotStyle::late());
+    let scene = layout::draw(&Sheet::new(ColumnWidth::Double, 3, "").panel("", "", panel)).unwrap();
+    let of = |colour: Colour| {
+        scene.items.iter().find_map(|i| match i {
+            Item::Dots { paint, diameter, centres } if paint.colour == colour => Some((*diameter, centres.len())),
+            _ => None,
+        })
+    };
+    let (faint, dark) = (of(style::FAINT).unwrap(), of(style::INK).unwrap());
+    assert_eq!((faint.1, dark.1), (900, 2));
+    assert!(dark.0 >= 3 * faint.0, "{dark:?} {faint:?}");
+}
+
+#[test]
+fn positions_that_are_no_numbers_are_left_out_and_counted() {
+    let good = render(&dot_sheet(vec![[0.5, 12.0]])).unwrap();
+    let mixed = vec![[f64::NAN, 12.0], [0.5, 12.0], [0.5, f64::INFINITY]];
+    let picture = render(&dot_sheet(mixed)).unwrap();
+    assert_eq!((good.left_out, picture.left_out), (0, 2));
+    assert_eq!(good.pixels, picture.pixels);
+}
+
+#[test]
+fn unusable_axes_and_numbers_are_named() {
+    let plane =
+        |x: Axis| Sheet::new(ColumnWidth::Single, 1, "").panel("", "", PlanePanel::new(x, Axis::linear("", 0.0, 1.0)));
+    for axis in [Axis::linear("a", 0.0, f64::NAN), Axis::log("a", 0.0, 1.0), Axis::linear("a", f64::MIN, f64::MAX)] {
+        assert!(matches!(render(&plane(axis)), Err(RenderError::Axis { panel: 1, .. })));
+    }
+    let unit = || Axis::linear("", 0.0, 1.0);
+    let space = |p: SpacePanel| Sheet::new(ColumnWidth::Single, 1, "").panel("", "", p);
+    let good = || SpacePanel::new(unit(), unit(), unit());
+    assert!(render(&space(good())).is_ok());
+    assert!(matches!(render(&space(good().camera(0.0, 91.0))), Err(RenderError::Number { .. })));
+    assert!(matches!(render(&space(good().proportions([1.0, 0.0, 1.0]))), Err(RenderError::Number { .. })));
+    let tower = (0..40).fold(Sheet::new(ColumnWidth::Double, 1, ""), |s, _| s.panel("", "", good()));
+    assert!(matches!(render(&tower), Err(RenderError::TooLarge)));
+    let faulty = Sheet::new(ColumnWidth::Single, 1, "").title("*x");
+    assert!(matches!(render(&faulty), Err(RenderError::Text(RichTextError::Italic { .. }))));
+}
+
+#[test]
+fn empty_and_degenerate_pictures_are_drawn() {
+    let unit = |t: &str| Axis::linear(t, 0.0, 1.0);
+    let sheets = [
+        Sheet::new(ColumnWidth::Single, 1, ""),
+        Sheet::new(ColumnWidth::Single, 0, "").panel("", "", PlanePanel::new(unit(""), unit(""))),
+        Sheet::new(ColumnWidth::Single, 3, "").panel(
+            "",
+            "",
+            PlanePanel::new(Axis::linear("", 2.0, 2.0), Axis::log("", 3.0, 3.0)),
+        ),
+        Sheet::new(ColumnWidth::Single, 1, "").panel(
+            "",
+            "",
+            PlanePanel::new(Axis::linear("", 1.0, -1.0), unit("")).dots(vec![[0.0, 0.5]], DotStyle::late()),
+        ),
+        Sheet::new(ColumnWidth::Single, 1, "").panel(
+            "",
+            "",
+            SpacePanel::new(unit(""), unit(""), unit("")).camera(0.0, 90.0),
+        ),
+        Sheet::new(ColumnWidth::Single, 1, "").panel(
+            "",
+            "",
+            SpacePanel::new(unit(""), unit(""), unit(""))
+                .camera(90.0, 0.0)
+                .line(vec![[0.5; 3]; 4], LineStyle::default()),
+        ),
+    ];
+    for (i, sheet) in sheets.iter().enumerate() {
+        let picture = render(sheet).unwrap_or_else(|e| panic!("sheet {i}: {e}"));
+        assert!(read_provenance(&picture.png).unwrap().intact, "{i}");
+    }
+}
+
+#[test]
+fn what_lies_behind_a_surface_is_drawn_before_it_and_the_rest_after() {
+    // A vertical line seen along the second axis, half of it behind a wall.
+    let unit = |t: &str| Axis::linear(t, -1.0, 1.0);
+    let wall = grid_surface((-1.0, 1.0, 4), (-1.0, 1.0, 4), |u, v| [u, 0.0, v], |_, _| style::ATTRACTING);
+    let green = |y: f64| (vec![[-0.5, y, 0.0], [0.5, y, 0.0]], LineStyle::new(style::GREEN, 1.0));
+    let (near, far) = (green(-0.9), green(0.9));
+    let order = |line: (Vec<[f64; 3]>, LineStyle)| {
+        let panel = SpacePanel::new(unit(""), unit(""), unit(""))
+            .camera(-90.0, 10.0)
+            .surface(wall.clone())
+            .line(line.0, line.1);
+        let scene = layout::draw(&Sheet::new(ColumnWidth::Single, 1, "").panel("", "", panel)).unwrap();
+        let wall =
+            scene.items.iter().position(|i| matches!(i, Item::Fill { paint, .. } if paint.colour == style::ATTRACTING));
+        let curve = scene.items.iter().position(|i| match i {
+            Item::Stroke { paint, .. } => paint.colour.g > paint.colour.r && paint.colour.g > paint.colour.b,
+            _ => false,
+        });
+        curve.unwrap() > wall.unwrap()
+    };
+    assert!(order(near), "a line in front of a wall is drawn after it");
+    assert!(!order(far), "a line behind a wall is drawn before it");
+}
+
+#[test]
+fn region_colours_differ_in_greyscale() {
+    // Relative luminance (IEC 61966-2-1) of each region as it appears on paper.
+    let share = f64::from(style::SURFACE_OPACITY) / 100.0;
+    let luminance = |c: Colour| {
+        let seen = c.lighten(1.0 - share);
+        let linear = |v: u8| {
+            let v = f64::from(v) / 255.0;
+            if v <= 0.04045 { v / 12.92 } else { crate::num::elementary::pow((v + 0.055) / 1.055, 2.4) }
+        };
+        0.2126 * linear(seen.r) + 0.7152 * linear(seen.g) + 0.0722 * linear(seen.b)
+    };
+    let [a, r, c] = [style::ATTRACTING, style::REPELLING, style::CROSSING].map(luminance);
+    assert!(r - a > 0.15 && c - r > 0.15, "{a} {r} {c}");
+}
+
+#[test]
+fn density_shading_never_changes_where_points_are() {
+    let points: Vec<[f64; 2]> = (0..40_000).map(|i| [f64::from(i % 211) / 211.0, f64::from(i / 211) / 190.0]).collect();
+    let places = |density: bool| {
+        let look = DotStyle { density, ..DotStyle::late() };
+        let panel = PlanePanel::new(Axis::linear("", 0.0, 1.0), Axis::linear("", 0.0, 1.0)).dots(points.clone(), look);
+        let scene = layout::draw(&Sheet::new(ColumnWidth::Double, 1, "").panel("", "", panel)).unwrap();
+        let mut all: Vec<Position> = scene
+            .items
+            .into_iter()
+            .filter_map(|i| if let Item::Dots { centres, .. } = i { Some(centres) } else { None })
+            .flatten()
+            .collect();
+        all.sort_unstable();
+        all
+    };
+    assert_eq!(places(true), places(false));
+}

@@ -1,0 +1,119 @@
+//! Golden tests: the committed hashes, recomputed. The figures that take a second are checked here, in whatever profile the tests
+//! run (they were blessed in release); `make check` recomputes all of them.
+
+#[allow(dead_code, missing_docs)] // each figure's `main` is for its own binary
+#[path = "../figures/catalogue.rs"]
+mod catalogue;
+
+use std::fs;
+use std::path::Path;
+
+use twofold::figure::cli::in_pool;
+use twofold::figure::pipeline::{Computed, compute};
+use twofold::figure::progress::Progress;
+use twofold::figure::{Alterations, Figure};
+use twofold::record::{Hash, Manifest};
+
+fn manifest(figure: &Figure) -> Manifest {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("figures").join(figure.id).join("expected.json");
+    let text = fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}; make one with bless", path.display()));
+    Manifest::parse(&text, figure.id).unwrap()
+}
+
+/// The figures that are cheap enough for every test run.
+fn quick() -> impl Iterator<Item = Figure> {
+    catalogue::all().into_iter().filter(|f| QUICK.contains(&f.id))
+}
+
+const QUICK: [&str; 2] = ["fig2", "fig6"];
+
+#[test]
+fn golden_quick_figures_have_the_committed_hashes() {
+    for figure in quick() {
+        let expected = manifest(&figure);
+        assert_eq!(expected.pictures.len(), figure.pictures.len(), "{}", figure.id);
+        for picture in &figure.pictures {
+            let actual = compute(picture, &Progress::new(true)).unwrap().record.hashes;
+            let difference = expected.picture(&picture.name).unwrap().first_difference(&actual);
+            assert_eq!(difference, None, "{} differs", picture.name);
+        }
+    }
+}
+
+#[test]
+fn golden_every_figure_has_a_reference_and_its_picture() {
+    for figure in catalogue::all() {
+        let expected = manifest(&figure);
+        for picture in &figure.pictures {
+            let entry = expected.picture(&picture.name).unwrap_or_else(|| panic!("{} is not blessed", picture.name));
+            let file = Path::new(env!("CARGO_MANIFEST_DIR"))
+                .join("figures")
+                .join(figure.id)
+                .join(format!("{}.png", picture.name));
+            assert_eq!(
+                Hash::of(&fs::read(file).unwrap()),
+                entry.png,
+                "the committed {}.png is another one",
+                picture.name
+            );
+        }
+    }
+}
+
+/// A shortened figure, so that every kind of panel is computed by these tests.
+fn short(figure: &Figure) -> Figure {
+    let mut figure = figure.clone();
+    for picture in &mut figure.pictures {
+        picture.alter(&Alterations { t_end: Some(40.0), ..Alterations::default() });
+    }
+    figure
+}
+
+fn all_hashes(threads: usize) -> Vec<String> {
+    in_pool(threads, || {
+        catalogue::all()
+            .iter()
+            .flat_map(|f| short(f).pictures)
+            .map(|p| {
+                let Computed { record, tables, .. } = compute(&p, &Progress::new(true)).unwrap();
+                let tables: Vec<Hash> = tables.iter().map(|(_, bytes)| Hash::of(bytes)).collect();
+                format!("{:?} {tables:?}", record.hashes)
+            })
+            .collect()
+    })
+    .unwrap()
+}
+
+#[test]
+fn bytes_do_not_depend_on_the_number_of_threads() {
+    let one = all_hashes(1);
+    assert_eq!(one, all_hashes(2));
+    assert_eq!(one, all_hashes(5));
+    assert!(one.len() >= 9);
+}
+
+#[test]
+fn a_changed_question_changes_every_layer_it_should() {
+    let figure = catalogue::all().into_iter().find(|f| f.id == "fig6").unwrap();
+    let base = &short(&figure).pictures[0];
+    let mut other = base.clone();
+    other.panels[0].run.start[0] += 1e-6;
+    let hashes = |p| compute(p, &Progress::new(true)).unwrap().record.hashes;
+    let (a, b) = (hashes(base), hashes(&other));
+    let difference = a.first_difference(&b).unwrap();
+    assert_eq!(difference.layer, twofold::record::Layer::Spec);
+    assert_eq!(difference.panels, ["i"]);
+    assert!(a.data != b.data && a.pixels != b.pixels && a.png != b.png && a.svg != b.svg && a.pdf != b.pdf);
+}
+
+#[test]
+fn specs_survive_json() {
+    for picture in catalogue::all().iter().flat_map(|f| &f.pictures) {
+        for panel in &picture.panels {
+            let text = serde_json::to_string(&panel.run).unwrap();
+            let back: twofold::figure::spec::RunSpec = serde_json::from_str(&text).unwrap();
+            assert_eq!(back, panel.run, "{} ({})", picture.name, panel.label);
+            panel.run.validate().unwrap();
+        }
+    }
+}
