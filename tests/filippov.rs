@@ -4,8 +4,8 @@ use nalgebra::{SVector, vector};
 use twofold::integrate::Tolerance;
 use twofold::integrate::filippov::two_fold::SlidingAtTwoFold;
 use twofold::integrate::filippov::{
-    End, EventKind, ExitRule, FilippovError, FunnelGrid, Mode, Settings, Side, SlidingLaw, Trajectory, funnel, history,
-    run,
+    End, EventKind, ExitRule, FilippovError, FunnelGrid, Mode, Settings, Side, SlidingLaw, Trajectory, connect, funnel,
+    history, run,
 };
 use twofold::model::filippov::Visibility;
 use twofold::model::{Caricature, Feedback, PiecewiseSmooth, Relay, StickSlip, TwoFoldNormalForm, Wheel};
@@ -599,4 +599,100 @@ fn every_point_of_the_repelling_region_has_a_past_at_the_two_fold() {
         assert!(past.pieces.iter().all(|p| p.mode == Mode::SlidingRepelling));
     }
     assert!(history(&n, vector![0.0, 1.0, 1.0], 100.0, &Settings::default(), 4).is_err());
+}
+
+#[test]
+fn points_of_the_chaotic_set_are_connected_through_the_singularity() {
+    let c = Caricature::with_reinjection(1e-1, 1e-5);
+    // Points of one orbit, taken from its free flight after the first visit.
+    let mut orbit = Trajectory::new(2);
+    run(&c, vector![0.2, 0.0, -1.0], 90.0, &Settings::default(), random(3, 0.8), &mut orbit).unwrap();
+    let visit = orbit.events.iter().find(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).unwrap().t;
+    let flights: Vec<_> = orbit.pieces.iter().filter(|p| !p.mode.slides() && p.points[0].0 > visit).collect();
+    let mut connected = 0;
+    let mut tried = 0;
+    for flight in flights.iter().take(12) {
+        let b = flight.points[flight.points.len() / 2].1;
+        tried += 1;
+        let Ok(path) = connect(&c, vector![0.2, 0.0, -1.0], b, 200.0, &Settings::default(), 2) else {
+            continue;
+        };
+        connected += 1;
+        let points: Vec<_> = path.points().collect();
+        assert!((points[points.len() - 1].1 - b).amax() < 1e-12, "it ends at b");
+        for pair in path.pieces.windows(2) {
+            let (end, start) = (pair[0].points.last().unwrap(), pair[1].points[0]);
+            assert!((end.0 - start.0).abs() < 1e-10 && (end.1 - start.1).amax() < 1e-9, "{end:?} {start:?}");
+        }
+        // The second part is an orbit forwards too: run on from where it leaves the surface.
+        let left = path.pieces.iter().rposition(|p| p.mode == Mode::SlidingRepelling).unwrap();
+        let (t0, from) = *path.pieces[left].points.last().unwrap();
+        let side = if path.pieces[left + 1].mode == Mode::Plus { Side::Plus } else { Side::Minus };
+        let t = points[points.len() - 1].0 - t0;
+        let end = run(&c, from, t, &Settings::default(), ExitRule::AtOnce { side }, &mut Trajectory::new(1)).unwrap();
+        assert!((end.x - b).amax() < 1e-7, "{:e}", (end.x - b).amax());
+    }
+    assert_eq!(connected, tried, "any two points of the set are connected");
+}
+
+/// y = 0 crossings of the smoothed system in 113-bit arithmetic: (t, x, z).
+fn reference(name: &str, rows: usize) -> Vec<[f64; 3]> {
+    let text = std::fs::read_to_string(format!("{}/tests/data/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+    let lines = text.lines().filter(|l| !l.starts_with('#')).skip(1);
+    lines
+        .map(|l| l.split(',').take(3).map(|v| v.parse().unwrap()).collect::<Vec<f64>>().try_into().unwrap())
+        .take(rows)
+        .collect()
+}
+
+#[test]
+fn the_smoothed_reference_lies_within_eps() {
+    // Before the first visit the smoothed orbit with eps = 1e-3 is O(eps) from the Filippov orbit.
+    use twofold::integrate::filippov::AllModes;
+    use twofold::integrate::roots::sign_changes;
+    use twofold::integrate::{Flow, Observer, Step};
+    #[derive(Default)]
+    struct Section(Vec<[f64; 3]>);
+    impl Observer<3> for Section {
+        fn step(&mut self, step: &Step<'_, 3>) -> Flow {
+            for theta in sign_changes(step, |x| x[1]) {
+                let x = step.at(theta);
+                self.0.push([step.time(theta), x[0], x[2]]);
+            }
+            Flow::Continue
+        }
+    }
+    for (name, alpha, rows) in [("crossings-printed.csv", 1e-3, 4), ("crossings-reconstructed.csv", 1e-1, 2)] {
+        let c = Caricature::with_reinjection(alpha, 1e-5);
+        let mut section = Section::default();
+        run(&c, vector![0.2, 0.0, -1.0], 50.0, &Settings::default(), ExitRule::All, &mut AllModes(&mut section))
+            .unwrap();
+        for (found, wanted) in section.0.iter().zip(reference(name, rows)) {
+            for (f, w) in found.iter().zip(wanted) {
+                assert!((f - w).abs() < 2e-3 * (1.0 + w.abs()), "{name}: {found:?} {wanted:?}");
+            }
+        }
+        assert!(section.0.len() >= rows);
+    }
+}
+
+#[test]
+fn the_discontinuous_wheel_fills_a_box_like_the_smoothed_wheels() {
+    // SCIENCE.md section 7, smoothed with eps = 1e-3, 30 < t < 230: r in [0.22, 0.79], v in [-6.2, 5.5], omega in [-8.0, 4.6].
+    let w = Wheel::default();
+    let mut out = Trajectory::new(2);
+    run(&w, vector![0.69267, 0.0, 0.0], 230.0, &Settings::default(), random(5, 0.05), &mut out).unwrap();
+    let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
+    for (_, x) in out.points().filter(|(t, _)| *t > 30.0) {
+        for (b, v) in bounds.iter_mut().zip(x.iter()) {
+            *b = [b[0].min(*v), b[1].max(*v)];
+        }
+    }
+    let visits = out.events.iter().filter(|e| e.t > 30.0 && matches!(e.kind, EventKind::TwoFoldReached { .. })).count();
+    // Exits are our choice (exponential, mean 0.05), so the sizes agree only roughly; each side is at least as long.
+    for (found, smoothed) in bounds.iter().zip([[0.22, 0.79], [-6.2, 5.5], [-8.0, 4.6]]) {
+        let ratio = (found[1] - found[0]) / (smoothed[1] - smoothed[0]);
+        assert!((0.95..1.35).contains(&ratio), "{found:?} {smoothed:?}");
+    }
+    assert!(visits >= 50, "{visits}");
 }

@@ -120,6 +120,45 @@ where
     Ok(back.turned(end.t))
 }
 
+/// A trajectory from `a` to `b` through a two-fold: the future of `a` up to the singularity, then a past of `b` from there on. That
+/// two such points are joined by a trajectory in finite time is the paper's description of non-deterministic chaos
+/// (sec. 3, fig. 4). Events are those of the first part; the second part's pieces tell its modes.
+///
+/// # Errors
+/// [`FilippovError::NoSuchExit`] if the future of `a` or the past of `b` comes to no two-fold within `longest`, or to different
+/// ones.
+pub fn connect<P, const N: usize, const M: usize>(
+    system: &P,
+    a: SVector<f64, N>,
+    b: SVector<f64, N>,
+    longest: f64,
+    settings: &Settings,
+    per_step: usize,
+) -> Result<Trajectory<N>, FilippovError>
+where
+    P: PiecewiseSmooth<N> + Clone,
+    for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
+    for<'a> SlidingFlow<'a, Reversed<P>, N>: VectorField<M>,
+{
+    let mut path = Trajectory::new(per_step);
+    let there = super::run(system, a, longest, settings, ExitRule::All, &mut path)?;
+    let mut past = Trajectory::new(per_step);
+    let back = super::run(&Reversed(system.clone()), b, longest, settings, ExitRule::All, &mut past)?;
+    let refuse =
+        |x: &SVector<f64, N>, why| FilippovError::NoSuchExit { t: there.t, state: x.iter().copied().collect(), why };
+    if there.end != End::SetValued || there.mode.is_some() {
+        return Err(refuse(&there.x, "the future of the first point comes to no two-fold in the given time"));
+    }
+    if back.end != End::SetValued || back.mode.is_some() {
+        return Err(refuse(&back.x, "the past of the second point comes from no two-fold in the given time"));
+    }
+    if (there.x - back.x).amax() > 1e-9 * (1.0 + there.x.amax()) {
+        return Err(refuse(&back.x, "the past of the second point comes from another two-fold"));
+    }
+    path.pieces.extend(past.turned(there.t + back.t).pieces);
+    Ok(path)
+}
+
 /// The members on `grid` of the family that starts at the set-valued point of `family`; of one side only, if given.
 pub(super) fn members_of<P, const N: usize, const M: usize>(
     system: &P,

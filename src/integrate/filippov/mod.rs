@@ -59,7 +59,7 @@ use super::step::{Failure, Flow, Statistics, Step, Tolerance};
 pub use engine::run;
 pub use exit::{ExitRule, Side, SlidingLaw};
 pub use flow::SlidingFlow;
-pub use funnel::{Funnel, FunnelGrid, FunnelMember, funnel, history};
+pub use funnel::{Funnel, FunnelGrid, FunnelMember, connect, funnel, history};
 pub use trajectory::{Piece, Trajectory};
 
 /// The kind of motion between two events.
