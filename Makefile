@@ -5,14 +5,18 @@ FIGURES := fig1 fig2 fig3 fig4 fig5 fig6 fig7 fig8 fig9 lottery
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help figures check bless test lint bench ci clean
+.PHONY: help figures report check bless test browser-test lint bench ci clean
 
 help: ## this list
-	@awk -F':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 figures: ## compute every figure at full length into target/figures
 	@$(CARGO) build --release --locked --bins
 	@set -e; for f in $(FIGURES); do $(RUN) --bin $$f; done
+	@$(RUN) --bin twofold -- report
+
+report: ## one page about what stands in target/figures: target/figures/index.html
+	@$(RUN) --bin twofold -- report
 
 check: ## recompute and compare with figures/figN/expected.json; exit 1 on a difference
 	@$(RUN) --bin twofold -- check
@@ -22,6 +26,10 @@ bless: ## make today's figures the reference: make bless REASON="why"
 
 test: ## all tests, in the debug profile
 	@$(CARGO) test --locked
+
+browser-test: ## the report in a headless Chromium, if there is one (needs Node)
+	@$(CARGO) build --release --locked --bins
+	@if command -v node >/dev/null; then node scripts/browser_test.mjs $(BROWSER_TEST); else echo "browser test SKIPPED: no Node found"; fi
 
 lint: ## formatting, clippy and documentation, warnings denied
 	@$(CARGO) fmt --check

@@ -113,10 +113,16 @@ fn figure(id: &str, files: &[&FileBytes], committed: &Committed<'_>, problems: &
             problems.push(format!("{id}/{}.png: not made, but the reference lists it", entry.name));
         }
     }
-    let spare: Vec<&&FileBytes> = files
-        .iter()
-        .filter(|f| f.name().ends_with(".png") && !pictures.iter().any(|p| f.name() == format!("{}.png", p.name)))
-        .collect();
+    let mut spare = Vec::new();
+    for file in files.iter().filter(|f| f.name().ends_with(".png")) {
+        if pictures.iter().any(|p| file.name() == format!("{}.png", p.name)) {
+            continue;
+        }
+        match decode_png(&file.bytes) {
+            Ok(_) => spare.push(file),
+            Err(error) => problems.push(unreadable(file, &error)),
+        }
+    }
     let title = pictures.iter().map(|p| p.title.clone()).find(|t| !t.is_empty()).unwrap_or_default();
     FigureReport {
         id: id.to_owned(),
@@ -142,9 +148,7 @@ fn picture(
         files.iter().find(|f| f.name() == wanted).copied()
     };
     let png = find(".png");
-    let pixels = png.and_then(|f| {
-        decode_png(&f.bytes).map_err(|e| problems.push(format!("{}: cannot be read as a picture ({e})", f.path))).ok()
-    });
+    let pixels = png.and_then(|f| decode_png(&f.bytes).map_err(|e| problems.push(unreadable(f, &e))).ok());
 
     let mut listed = Vec::new();
     let mut hashes = record.hashes.clone();
@@ -183,7 +187,8 @@ fn picture(
     }
     listed.push(file_report(own, Role::Record, None, None));
 
-    let mut images = Images { actual: png.map(|f| f.bytes.clone()), ..Images::default() };
+    let shown = png.filter(|_| pixels.is_some());
+    let mut images = Images { actual: shown.map(|f| f.bytes.clone()), ..Images::default() };
     let reference = reference(id, &hashes, &record, pixels.as_ref(), committed, manifest, &mut images);
     let verdicts = record
         .verdicts
@@ -221,6 +226,10 @@ fn picture(
         verdicts,
         images,
     }
+}
+
+fn unreadable(file: &FileBytes, error: &dyn std::fmt::Display) -> String {
+    format!("{}: cannot be read as a picture ({error})", file.path)
 }
 
 fn panel(p: PanelRecord) -> PanelReport {

@@ -153,11 +153,14 @@ fn summary(html: &mut String, report: &Report) {
     }
     put!(html, "<div class=\"cards\">");
     for reading in &s.readings {
-        let title = reading.reading.map_or("Figures with one reading".to_owned(), wording::reading);
+        let title = match reading.reading {
+            Some(r) => format!("{}<br/>{}", capitalised(&format!("{} reading", r.word())), rich(&parameters(r))),
+            None => "Figures with one reading".to_owned(),
+        };
         put!(
             html,
             "<div class=\"card\">\n<h3>{}</h3>\n<p class=\"figure-of\">{} of {} <small>claims agree</small></p>",
-            capitalised(&rich(&title)),
+            title,
             reading.agree,
             reading.claims
         );
@@ -287,7 +290,7 @@ fn claims(html: &mut String, report: &Report) {
                 .map(|(_, _, v)| format!("{} {}", agreement(v.agrees), escape(short(v))))
                 .collect();
             let text = if cells.is_empty() { "–".to_owned() } else { cells.join("<br/>") };
-            put!(html, "<td>{text}</td>");
+            put!(html, "<td class=\"verdict\">{text}</td>");
         }
         put!(html, "</tr>");
     }
@@ -356,7 +359,7 @@ fn picture(html: &mut String, picture: &PictureReport, links: Links) {
     put!(html, "<figure>");
     match &picture.images.actual {
         Some(bytes) => put!(html, "{}", image(bytes, "image/png", &picture.description, picture.size)),
-        None => put!(html, "<p class=\"notice\">The PNG file is not there.</p>"),
+        None => put!(html, "<p class=\"notice\">The PNG file is not there, or is none.</p>"),
     }
     put!(html, "<figcaption>{}</figcaption>\n</figure>", rich(&picture.caption));
     put!(html, "<ul class=\"links\" aria-label=\"Files of {}\">", escape(&picture.name));
