@@ -20,6 +20,8 @@ mod fig8;
 mod fig9;
 #[path = "lottery/main.rs"]
 mod lottery;
+#[path = "workprecision/main.rs"]
+mod workprecision;
 
 /// Every figure, in the paper's order, then our own.
 pub fn all() -> Vec<Figure> {
@@ -32,5 +34,6 @@ pub fn all() -> Vec<Figure> {
         fig8::figure(),
         fig9::figure(),
         lottery::figure(),
+        workprecision::figure(),
     ]
 }
