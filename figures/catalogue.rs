@@ -4,6 +4,8 @@
 
 use twofold::figure::Figure;
 
+#[path = "digits/main.rs"]
+mod digits;
 #[path = "fig2/main.rs"]
 mod fig2;
 #[path = "fig4/main.rs"]
@@ -35,5 +37,6 @@ pub fn all() -> Vec<Figure> {
         fig9::figure(),
         lottery::figure(),
         workprecision::figure(),
+        digits::figure(),
     ]
 }
