@@ -6,8 +6,12 @@ use twofold::figure::Figure;
 
 #[path = "digits/main.rs"]
 mod digits;
+#[path = "fig1/main.rs"]
+mod fig1;
 #[path = "fig2/main.rs"]
 mod fig2;
+#[path = "fig3/main.rs"]
+mod fig3;
 #[path = "fig4/main.rs"]
 mod fig4;
 #[path = "fig5/main.rs"]
@@ -28,7 +32,9 @@ mod workprecision;
 /// Every figure, in the paper's order, then our own.
 pub fn all() -> Vec<Figure> {
     vec![
+        fig1::figure(),
         fig2::figure(),
+        fig3::figure(),
         fig4::figure(),
         fig5::figure(),
         fig6::figure(),

@@ -46,7 +46,7 @@ fn run(alpha: f64, method: Method, tolerance: f64, t_end: f64) -> Vec<twofold::o
     };
     match simulate(&spec, &()).unwrap().data {
         Data::Section(crossings) => crossings,
-        Data::Path(_) => unreachable!(),
+        _ => unreachable!(),
     }
 }
 

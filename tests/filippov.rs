@@ -1,9 +1,11 @@
 //! The event-driven Filippov integrator against closed forms.
 
 use nalgebra::{SVector, vector};
+use twofold::integrate::Tolerance;
 use twofold::integrate::filippov::two_fold::SlidingAtTwoFold;
 use twofold::integrate::filippov::{
-    End, EventKind, ExitRule, FilippovError, FunnelGrid, Mode, Settings, Side, SlidingLaw, Trajectory, funnel, run,
+    End, EventKind, ExitRule, FilippovError, FunnelGrid, Mode, Settings, Side, SlidingLaw, Trajectory, connect, funnel,
+    history, run,
 };
 use twofold::model::filippov::Visibility;
 use twofold::model::{Caricature, Feedback, PiecewiseSmooth, Relay, StickSlip, TwoFoldNormalForm, Wheel};
@@ -459,4 +461,238 @@ fn the_funnel_holds_every_exit() {
     }
     let back = f.members.iter().filter(|m| m.summary.end == End::Observer).count();
     assert!(back >= 5, "{back} of 10 came back to the two-fold");
+}
+
+#[test]
+fn a_step_cap_changes_no_event() {
+    // Uncapped steps straddle whole excursions; steps of 1e-3 do not. The sequence of events must be the same.
+    fn kinds<P: PiecewiseSmooth<3>>(system: &P, max_step: f64, t_end: f64) -> Vec<(String, f64)> {
+        let settings = Settings { max_step, ..Settings::default() };
+        let mut out = Trajectory::new(1);
+        let start = vector![0.69267, 0.0, 0.0];
+        run(system, start, t_end, &settings, ExitRule::All, &mut out).unwrap();
+        out.events.iter().map(|e| (format!("{:?}", e.kind).chars().take(12).collect(), e.t)).collect()
+    }
+    let (w, n) = (Wheel::default(), TwoFoldNormalForm::invisible(-0.5, -0.5));
+    for (coarse, fine) in
+        [(kinds(&w, f64::INFINITY, 3.0), kinds(&w, 1e-3, 3.0)), (kinds(&n, f64::INFINITY, 9.0), kinds(&n, 1e-3, 9.0))]
+    {
+        assert!(!coarse.is_empty());
+        assert_eq!(coarse.len(), fine.len(), "{coarse:?} {fine:?}");
+        for (a, b) in coarse.iter().zip(&fine) {
+            assert!(a.0 == b.0 && (a.1 - b.1).abs() < 1e-9, "{a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn a_step_that_straddles_two_crossings_misses_none() {
+    // x = (t - a)(t - b) exactly, in one step of any length, for b - a down to
+    // 1e-5, with both fields equal, so that the orbit must cross down and up again.
+    struct Parabola {
+        a: f64,
+        b: f64,
+    }
+    impl PiecewiseSmooth<2> for Parabola {
+        fn switching<S: twofold::num::Scalar>(&self, x: &SVector<S, 2>) -> S {
+            x[0]
+        }
+        fn plus<S: twofold::num::Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+            vector![x[1].scale(2.0) - S::from_f64(self.a + self.b), S::one()]
+        }
+        fn minus<S: twofold::num::Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+            self.plus(x)
+        }
+    }
+    for gap in [1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5] {
+        for k in 0..20 {
+            let a = 0.05 + 0.37 * f64::from(k);
+            let p = Parabola { a, b: a + gap };
+            let mut out = Trajectory::new(1);
+            run(&p, vector![p.a * p.b, 0.0], 20.0, &Settings::default(), STAY, &mut out).unwrap();
+            assert_eq!(out.events.len(), 2, "gap {gap:e} a {a}: {:?}", out.events);
+            let error = (out.events[0].t - p.a).abs().max((out.events[1].t - p.b).abs());
+            assert!(error < 1e-13 * 20.0 / gap, "gap {gap:e} a {a}: {error:e}");
+        }
+    }
+}
+
+#[test]
+fn reversed_time_leads_back() {
+    // A repelling sliding orbit of the system is an attracting one of the reversed system, through the same points.
+    use twofold::model::Reversed;
+    let c = Caricature::with_reinjection(1e-1, 1e-5);
+    let mut forward = Trajectory::new(1);
+    let rule = ExitRule::AfterTime { time: 0.9, side: Side::Plus };
+    run(&c, vector![0.0, 0.0, 0.0], 2.0, &Settings::default(), rule, &mut forward).unwrap();
+    let exit = forward.events.iter().find(|e| matches!(e.kind, EventKind::Exit { .. })).unwrap();
+    let mut back = Trajectory::new(1);
+    let end = run(&Reversed(c), exit.state, 5.0, &Settings::default(), ExitRule::All, &mut back).unwrap();
+    assert!(end.x.amax() < 1e-12 && (end.t - 0.9).abs() < 1e-10, "{end:?}");
+}
+
+#[test]
+fn observers_of_ordinary_runs_work() {
+    use twofold::integrate::filippov::AllModes;
+    use twofold::integrate::{Flow, Observer, Step};
+    #[derive(Default)]
+    struct Joined(Vec<(f64, f64)>);
+    impl Observer<3> for Joined {
+        fn step(&mut self, step: &Step<'_, 3>) -> Flow {
+            self.0.push((step.t0, step.t1));
+            Flow::Continue
+        }
+    }
+    let c = Caricature::with_reinjection(1e-1, 1e-5);
+    let mut seen = Joined::default();
+    run(&c, vector![0.2, 0.0, -1.0], 40.0, &Settings::default(), random(3, 0.5), &mut AllModes(&mut seen)).unwrap();
+    assert_eq!((seen.0[0].0, seen.0.last().unwrap().1), (0.0, 40.0));
+    assert!(seen.0.windows(2).all(|w| w[0].1 == w[1].0 && w[0].0 < w[0].1));
+}
+
+#[test]
+fn interpolants_are_in_physical_time_and_on_the_surface() {
+    // Between the ends of a sliding step too: |h| <= 1e-12 and the state at a time is the state of a run that ends there.
+    let w = Wheel::default();
+    let mut out = Trajectory::new(16);
+    run(&w, vector![0.69267, 0.0, 0.0], 3.0, &Settings::default(), ExitRule::All, &mut out).unwrap();
+    assert!(drift(&w, &out) <= 1e-12, "{:e}", drift(&w, &out));
+    let sliding: Vec<_> =
+        out.pieces.iter().filter(|p| p.mode == Mode::SlidingAttracting).flat_map(|p| &p.points).collect();
+    assert!(sliding.len() > 100);
+    for (t, x) in sliding.iter().step_by(sliding.len() / 7) {
+        let end = run(&w, vector![0.69267, 0.0, 0.0], *t, &Settings::default(), ExitRule::All, &mut Trajectory::new(1))
+            .unwrap();
+        assert!((end.x - x).amax() < 1e-8, "t = {t}: {:e}", (end.x - x).amax());
+    }
+}
+
+#[test]
+fn tolerance_buys_accuracy() {
+    // The first arrival at the two-fold after three crossings and a landing, against a run with tiny steps.
+    let c = Caricature::with_reinjection(1e-1, 1e-5);
+    let arrival = |tolerance: f64, max_step: f64| {
+        let settings =
+            Settings { tolerance: Tolerance { rtol: tolerance, atol: tolerance }, max_step, ..Settings::default() };
+        run(&c, vector![0.2, 0.0, -1.0], 50.0, &settings, ExitRule::All, &mut Trajectory::new(1)).unwrap().t
+    };
+    let exact = arrival(1e-13, 5e-3);
+    for tolerance in [1e-6, 1e-8, 1e-10, 1e-12] {
+        let error = (arrival(tolerance, f64::INFINITY) - exact).abs();
+        println!("tolerance {tolerance:e}: arrival off by {error:e}");
+        assert!(error < 100.0 * tolerance, "{tolerance:e}: {error:e}");
+    }
+}
+
+#[test]
+fn every_point_of_the_repelling_region_has_a_past_at_the_two_fold() {
+    // Normal form: int dt = (1, 1) A^-1 (y, z) is also the time since the two-fold in the repelling region.
+    let n = TwoFoldNormalForm::invisible(-1.2, -1.4);
+    for (y, z) in [(-0.3, -0.8), (-1.0, -0.05), (-0.4, -0.4)] {
+        let exact = -((1.2 * y + z) + (y + 1.4 * z)) / (1.2 * 1.4 - 1.0);
+        let past = history(&n, vector![0.0, y, z], 100.0, &Settings::default(), 4).unwrap();
+        let points: Vec<_> = past.points().collect();
+        let (first, last) = (points[0], points[points.len() - 1]);
+        assert!(first.1.amax() < 1e-12 && first.0 == 0.0);
+        close(last.1, vector![0.0, y, z], 1e-14);
+        assert!((last.0 - exact).abs() < 1e-10 * exact, "{} {exact}", last.0);
+        assert!(past.pieces.iter().all(|p| p.mode == Mode::SlidingRepelling));
+    }
+    assert!(history(&n, vector![0.0, 1.0, 1.0], 100.0, &Settings::default(), 4).is_err());
+}
+
+#[test]
+fn points_of_the_chaotic_set_are_connected_through_the_singularity() {
+    let c = Caricature::with_reinjection(1e-1, 1e-5);
+    // Points of one orbit, taken from its free flight after the first visit.
+    let mut orbit = Trajectory::new(2);
+    run(&c, vector![0.2, 0.0, -1.0], 90.0, &Settings::default(), random(3, 0.8), &mut orbit).unwrap();
+    let visit = orbit.events.iter().find(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).unwrap().t;
+    let flights: Vec<_> = orbit.pieces.iter().filter(|p| !p.mode.slides() && p.points[0].0 > visit).collect();
+    let mut connected = 0;
+    let mut tried = 0;
+    for flight in flights.iter().take(12) {
+        let b = flight.points[flight.points.len() / 2].1;
+        tried += 1;
+        let Ok(path) = connect(&c, vector![0.2, 0.0, -1.0], b, 200.0, &Settings::default(), 2) else {
+            continue;
+        };
+        connected += 1;
+        let points: Vec<_> = path.points().collect();
+        assert!((points[points.len() - 1].1 - b).amax() < 1e-12, "it ends at b");
+        for pair in path.pieces.windows(2) {
+            let (end, start) = (pair[0].points.last().unwrap(), pair[1].points[0]);
+            assert!((end.0 - start.0).abs() < 1e-10 && (end.1 - start.1).amax() < 1e-9, "{end:?} {start:?}");
+        }
+        // The second part is an orbit forwards too: run on from where it leaves the surface.
+        let left = path.pieces.iter().rposition(|p| p.mode == Mode::SlidingRepelling).unwrap();
+        let (t0, from) = *path.pieces[left].points.last().unwrap();
+        let side = if path.pieces[left + 1].mode == Mode::Plus { Side::Plus } else { Side::Minus };
+        let t = points[points.len() - 1].0 - t0;
+        let end = run(&c, from, t, &Settings::default(), ExitRule::AtOnce { side }, &mut Trajectory::new(1)).unwrap();
+        assert!((end.x - b).amax() < 1e-7, "{:e}", (end.x - b).amax());
+    }
+    assert_eq!(connected, tried, "any two points of the set are connected");
+}
+
+/// y = 0 crossings of the smoothed system in 113-bit arithmetic: (t, x, z).
+fn reference(name: &str, rows: usize) -> Vec<[f64; 3]> {
+    let text = std::fs::read_to_string(format!("{}/tests/data/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+    let lines = text.lines().filter(|l| !l.starts_with('#')).skip(1);
+    lines
+        .map(|l| l.split(',').take(3).map(|v| v.parse().unwrap()).collect::<Vec<f64>>().try_into().unwrap())
+        .take(rows)
+        .collect()
+}
+
+#[test]
+fn the_smoothed_reference_lies_within_eps() {
+    // Before the first visit the smoothed orbit with eps = 1e-3 is O(eps) from the Filippov orbit.
+    use twofold::integrate::filippov::AllModes;
+    use twofold::integrate::roots::sign_changes;
+    use twofold::integrate::{Flow, Observer, Step};
+    #[derive(Default)]
+    struct Section(Vec<[f64; 3]>);
+    impl Observer<3> for Section {
+        fn step(&mut self, step: &Step<'_, 3>) -> Flow {
+            for theta in sign_changes(step, |x| x[1]) {
+                let x = step.at(theta);
+                self.0.push([step.time(theta), x[0], x[2]]);
+            }
+            Flow::Continue
+        }
+    }
+    for (name, alpha, rows) in [("crossings-printed.csv", 1e-3, 4), ("crossings-reconstructed.csv", 1e-1, 2)] {
+        let c = Caricature::with_reinjection(alpha, 1e-5);
+        let mut section = Section::default();
+        run(&c, vector![0.2, 0.0, -1.0], 50.0, &Settings::default(), ExitRule::All, &mut AllModes(&mut section))
+            .unwrap();
+        for (found, wanted) in section.0.iter().zip(reference(name, rows)) {
+            for (f, w) in found.iter().zip(wanted) {
+                assert!((f - w).abs() < 2e-3 * (1.0 + w.abs()), "{name}: {found:?} {wanted:?}");
+            }
+        }
+        assert!(section.0.len() >= rows);
+    }
+}
+
+#[test]
+fn the_discontinuous_wheel_fills_a_box_like_the_smoothed_wheels() {
+    // SCIENCE.md section 7, smoothed with eps = 1e-3, 30 < t < 230: r in [0.22, 0.79], v in [-6.2, 5.5], omega in [-8.0, 4.6].
+    let w = Wheel::default();
+    let mut out = Trajectory::new(2);
+    run(&w, vector![0.69267, 0.0, 0.0], 230.0, &Settings::default(), random(5, 0.05), &mut out).unwrap();
+    let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
+    for (_, x) in out.points().filter(|(t, _)| *t > 30.0) {
+        for (b, v) in bounds.iter_mut().zip(x.iter()) {
+            *b = [b[0].min(*v), b[1].max(*v)];
+        }
+    }
+    let visits = out.events.iter().filter(|e| e.t > 30.0 && matches!(e.kind, EventKind::TwoFoldReached { .. })).count();
+    // Exits are our choice (exponential, mean 0.05), so the sizes agree only roughly; each side is at least as long.
+    for (found, smoothed) in bounds.iter().zip([[0.22, 0.79], [-6.2, 5.5], [-8.0, 4.6]]) {
+        let ratio = (found[1] - found[0]) / (smoothed[1] - smoothed[0]);
+        assert!((0.95..1.35).contains(&ratio), "{found:?} {smoothed:?}");
+    }
+    assert!(visits >= 50, "{visits}");
 }

@@ -21,7 +21,7 @@ pub fn figure() -> Figure {
             let panel = |label, sigma| {
                 Panel::new(
                     label,
-                    format!("σ = {sigma}"),
+                    format!("*σ* = {sigma}"),
                     RunSpec {
                         system: SystemSpec::Caricature(reading.caricature()),
                         switch: SwitchSpec::Smoothed { eps: 1e-3, transition: Transition::PerturbedTanh { sigma } },

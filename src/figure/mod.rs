@@ -6,11 +6,14 @@
 //! paper's caption, and nothing else.
 
 pub mod cli;
+pub mod compare;
 pub mod drawing;
 pub mod encode;
 pub mod pipeline;
 pub mod progress;
+pub mod report;
 pub mod simulate;
+pub mod sketch;
 pub mod spec;
 pub mod study;
 pub mod surface;

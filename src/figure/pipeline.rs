@@ -31,6 +31,9 @@ pub struct Computed {
 pub struct PictureRecord {
     /// Hashes of every layer.
     pub hashes: PictureEntry,
+    /// The heading; empty in records of before it was kept.
+    #[serde(default)]
+    pub title: String,
     /// The parameter reading.
     pub reading: Option<Reading>,
     /// The caption.
@@ -163,6 +166,7 @@ pub fn compute(picture: &Picture, progress: &Progress) -> Result<Computed, Pipel
         .collect();
     let record = PictureRecord {
         hashes,
+        title: picture.title.to_owned(),
         reading: picture.reading,
         caption: picture.caption.clone(),
         alterations: picture.alterations.clone(),
@@ -193,6 +197,7 @@ fn compute_study(picture: &Picture, study: &Study, progress: &Progress) -> Resul
     let rendered = render(&sheet).map_err(|source| PipelineError::Render { picture: picture.name.clone(), source })?;
     let hashes = picture_entry(picture, spec, data, &rendered, panels);
     let record = PictureRecord {
+        title: picture.title.to_owned(),
         hashes,
         reading: picture.reading,
         caption: picture.caption.clone(),

@@ -2,8 +2,8 @@
 
 use super::Reading;
 use super::spec::{MethodSpec, RunSpec, SwitchSpec, SystemSpec};
-use crate::integrate::StepCap;
 use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
+use crate::integrate::{Kick, StepCap};
 use crate::model::{Relaxation, Transition};
 
 /// A number as a printer would set it: 0.13, 10^{-5}, 1.05×10^{-8}, 200 000.
@@ -129,6 +129,22 @@ pub fn control(method: &MethodSpec) -> String {
     }
 }
 
+/// The method's name and its error control.
+pub fn method(method: &MethodSpec) -> String {
+    format!("{}, {}", method.name.name(), control(method))
+}
+
+/// Restarts and kicks of a run; empty if there are none.
+pub fn schedule(run: &RunSpec) -> String {
+    let restarts = run.schedule.restart_every.map(|every| format!("restarted every {}", number(every)));
+    let kicks = run.schedule.kick.map(|k| kicks(&k));
+    restarts.into_iter().chain(kicks).collect::<Vec<_>>().join(", ")
+}
+
+fn kicks(kick: &Kick) -> String {
+    format!("kicks of {} every {} (ChaCha8, seed {})", number(kick.size), number(kick.every), kick.seed)
+}
+
 /// What all runs of a picture have in common and how they differ, one line per subject, for its foot.
 pub fn small_print(reading: Option<Reading>, runs: &[&RunSpec]) -> Vec<String> {
     let all = |say: &dyn Fn(&RunSpec) -> Option<String>, join: &str| {
@@ -154,15 +170,7 @@ pub fn small_print(reading: Option<Reading>, runs: &[&RunSpec]) -> Vec<String> {
     if !restarts.is_empty() {
         lines[2].push(format!("restarted every {restarts}"));
     }
-    let kicks = all(
-        &|r| {
-            r.schedule
-                .kick
-                .map(|k| format!("kicks of {} every {} (ChaCha8, seed {})", number(k.size), number(k.every), k.seed))
-        },
-        "; ",
-    );
-    lines[3].push(kicks);
+    lines[3].push(all(&|r| r.schedule.kick.map(|k| kicks(&k)), "; "));
     lines
         .into_iter()
         .map(|line| line.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", "))

@@ -211,9 +211,17 @@ fn first_in(q: &impl Fn(f64) -> f64, a: f64, b: f64, depth: usize) -> Option<Zer
 fn isolate(q: &impl Fn(f64) -> f64, c: &Coefficients, a: f64, b: f64, depth: usize, size: f64) -> Option<Zero> {
     let signs = c.iter().filter(|v| **v != 0.0).map(|v| *v > 0.0);
     let changes = signs.clone().zip(signs.skip(1)).filter(|(x, y)| x != y).count();
+    let rounding = 64.0 * f64::EPSILON * size;
     if changes == 0 {
-        // A zero exactly at the right end is found here; one at the left end belongs to the interval before.
-        return (c[DEGREE] == 0.0 && c.iter().any(|v| *v != 0.0)).then_some(Zero::Crossing(b));
+        // At the right end a zero is found here; one at the left end belongs to the interval before.
+        let end = c[DEGREE];
+        return if c.iter().all(|v| *v == 0.0) || end.abs() > rounding {
+            None
+        } else if end == 0.0 {
+            Some(Zero::Crossing(b))
+        } else {
+            Some(Zero::Touch(b))
+        };
     }
     if changes == 1 {
         let (fa, fb) = (q(a), q(b));
@@ -221,7 +229,6 @@ fn isolate(q: &impl Fn(f64) -> f64, c: &Coefficients, a: f64, b: f64, depth: usi
             return Some(Zero::Crossing(brent(q, a, b, fa, fb)));
         }
     }
-    let rounding = 64.0 * f64::EPSILON * size;
     if depth >= 45 || (changes > 1 && c.iter().all(|v| v.abs() <= rounding)) {
         return Some(Zero::Touch(0.5 * (a + b)));
     }

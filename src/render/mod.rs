@@ -14,6 +14,7 @@ pub mod style;
 mod backend;
 mod canvas;
 mod density;
+mod encode;
 mod font;
 mod layout;
 mod pdf;
@@ -28,6 +29,7 @@ mod space;
 mod svg;
 mod ticks;
 
+pub use encode::encode_png;
 pub use png_file::decode_png;
 pub use provenance::{Format, Provenance, ProvenanceError, read_provenance};
 pub use raster::Pixels;

@@ -1,4 +1,4 @@
-//! `twofold check`: recompute the figures and compare with the committed manifests.
+//! `twofold check`: recompute the figures and compare with the committed manifests, or with published pictures.
 
 use std::path::{Path, PathBuf};
 
@@ -7,15 +7,17 @@ use twofold::figure::pipeline::{PictureRecord, compute};
 use twofold::figure::progress::Progress;
 use twofold::record::{self, Manifest};
 
-use super::{Outcome, Problem, catalogue};
+use super::{Outcome, Problem, catalogue, published};
 
 /// Recompute figures and compare spec, data, pixels and files with the committed manifests; exit code 1 on a difference.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// Figures to check, such as fig7; all if none is named.
     figures: Vec<String>,
-    /// A manifest to check against instead of figures/figN/expected.json.
-    #[arg(long, value_name = "MANIFEST")]
+    /// What to check against instead of figures/figN/expected.json: another manifest, or a folder with published pictures (PNG, named
+    /// like ours). A picture holds by the first of these that does: same file, same pixels, few and slightly changed pixels, small RMS,
+    /// high SSIM.
+    #[arg(long, value_name = "DIR|MANIFEST")]
     against: Option<PathBuf>,
     /// Folder that holds figN/expected.json.
     #[arg(long, value_name = "DIR", default_value = "figures")]
@@ -30,6 +32,9 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
     let mut figures = chosen(&arguments.figures)?;
+    if let Some(folder) = arguments.against.as_ref().filter(|path| path.is_dir()) {
+        return published::check(folder, &figures, arguments.threads, arguments.quiet);
+    }
     let given = match &arguments.against {
         None => None,
         Some(path) => {

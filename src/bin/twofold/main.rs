@@ -1,10 +1,13 @@
-//! `twofold`: compute any run, check and bless the published figures.
+//! `twofold`: compute any run; check, bless, inspect and report on the published figures.
 
 mod bless;
 #[allow(dead_code, missing_docs)] // each figure's `main` is for its own binary
 #[path = "../../../figures/catalogue.rs"]
 mod catalogue;
 mod check;
+mod inspect;
+mod published;
+mod report;
 mod run;
 mod sweep;
 
@@ -26,6 +29,8 @@ enum Command {
     Sweep(Box<sweep::Arguments>),
     Check(check::Arguments),
     Bless(bless::Arguments),
+    Report(report::Arguments),
+    Inspect(inspect::Arguments),
 }
 
 /// How a command that did not fail ended.
@@ -45,6 +50,8 @@ fn main() -> ExitCode {
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Bless(arguments) => bless::run(&arguments),
+        Command::Report(arguments) => report::run(&arguments),
+        Command::Inspect(arguments) => inspect::run(&arguments),
     };
     match result {
         Ok(Outcome::Fine) => ExitCode::SUCCESS,

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::integrate::dopri5::Dopri5;
 use crate::integrate::roots::{Start, Zero, brent, first_zero};
-use crate::integrate::step::{Failure, Flow, Interpolant, Statistics, Step, Stepper, finite};
+use crate::integrate::step::{Failure, Flow, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
 use crate::model::filippov::{gradient, lie_derivatives};
 use crate::model::{PiecewiseSmooth, VectorField, variables};
 use crate::num::Dual;
@@ -41,7 +41,7 @@ pub(super) enum Departure<const N: usize> {
     /// Wherever the state is.
     Anywhere,
     /// At a two-fold.
-    TwoFold(Option<SlidingAtTwoFold<N>>),
+    TwoFold(Option<Box<SlidingAtTwoFold<N>>>),
     /// On the surface, in the repelling region.
     Repelling,
 }
@@ -89,7 +89,7 @@ where
     };
     let mut state = match departure {
         Departure::Anywhere => engine.start()?,
-        Departure::TwoFold(Some(local)) => State::TwoFold(Box::new(local)),
+        Departure::TwoFold(Some(local)) => State::TwoFold(local),
         Departure::TwoFold(None) => return Err(engine.non_transversal("the two-fold is degenerate")),
         Departure::Repelling => engine.enter_repelling(None)?,
     };
@@ -387,7 +387,22 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
                     }
                 }
                 Some(zero) => {
-                    let theta = zero.theta();
+                    let mut theta = zero.theta();
+                    if matches!(zero, Zero::Touch(_)) {
+                        // A touch is known only to the root of the rounding; the tangency itself is a simple zero.
+                        for _ in 0..4 {
+                            let l = self.lie(&step.at(theta));
+                            let (rate, second) = match side {
+                                Side::Plus => (l.p, l.pp),
+                                Side::Minus => (l.q, l.mm),
+                            };
+                            let moved = theta - rate / (second * length);
+                            if !((moved - theta).abs() < 1e-3 && (0.0..=1.0).contains(&moved)) {
+                                break;
+                            }
+                            theta = moved;
+                        }
+                    }
                     let (t1, x1) = (step.time(theta), project(self.system, &step.at(theta)));
                     self.take(side.into(), t1, x1, &Truncated { inner: step.interpolant, end: theta });
                     break Some(zero);
@@ -591,18 +606,21 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
             if size < 0.5 * tried_at {
                 tried_at = size;
                 // From far away Newton's method may have found another two-fold: trust only the latest answer.
-                if let Some(point) = locate(system, &self.x) {
-                    if local.as_ref().is_none_or(|l| (l.point - point).amax() > 1e-9 * (1.0 + point.amax())) {
-                        local = SlidingAtTwoFold::at(system, point);
-                    }
+                if let Some(point) = locate(system, &self.x)
+                    && local.as_ref().is_none_or(|l| (l.point - point).amax() > 1e-9 * (1.0 + point.amax()))
+                {
+                    local = SlidingAtTwoFold::at(system, point);
                 }
             }
             if let Some(fold) = &local {
                 let distance = (fold.point - self.x).norm();
-                if distance <= self.settings.leg * fold.radius {
-                    if let Some((leg, error)) = fold.time_to_arrive(system, &self.x, sliding.repelling) {
-                        break self.arrive(fold.point, leg, error, mode);
-                    }
+                // Nearer than the tolerances resolve there is nothing to integrate.
+                let Tolerance { rtol, atol } = self.settings.tolerance;
+                let blur = 300.0 * (atol + rtol * self.x.amax());
+                if distance <= (self.settings.leg * fold.radius).max(blur)
+                    && let Some((leg, error)) = fold.time_to_arrive(system, &self.x, sliding.repelling)
+                {
+                    break self.arrive(fold.point, leg, error, mode);
                 }
             }
             if drift > 1e-10_f64.max(10.0 * self.settings.tolerance.atol) {

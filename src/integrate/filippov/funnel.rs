@@ -7,7 +7,8 @@ use super::two_fold::SlidingAtTwoFold;
 use super::{
     End, ExitRule, FilippovError, FilippovSummary, Settings, Side, SlidingFlow, Trajectory, engine, flow::project,
 };
-use crate::model::{PiecewiseSmooth, VectorField};
+use crate::model::filippov::{Region, region};
+use crate::model::{PiecewiseSmooth, Reversed, VectorField};
 use crate::num::elementary::pow;
 
 /// Which members of the funnel to compute: exit times between the shortest and the longest, both sides of each.
@@ -49,6 +50,8 @@ pub struct Funnel<const N: usize> {
     pub t: f64,
     /// The point.
     pub point: SVector<f64, N>,
+    /// Whether it is a two-fold (or else a point of the repelling region).
+    pub at_two_fold: bool,
     /// The futures: by exit time, plus before minus.
     pub members: Vec<FunnelMember<N>>,
 }
@@ -78,15 +81,109 @@ where
         });
     }
     let point = project(system, &there.x);
-    let departure = match there.mode {
-        None => Departure::TwoFold(SlidingAtTwoFold::near(system, &point)),
-        Some(_) => Departure::Repelling,
+    let mut family = Funnel { approach, t: there.t, point, at_two_fold: there.mode.is_none(), members: Vec::new() };
+    family.members = members_of(system, &family, settings, grid, None)?;
+    Ok(family)
+}
+
+/// The past of a point of the repelling region, in forward time: the sliding orbit that leads from where repelling sliding
+/// began (a two-fold, if it runs back into one) to `x`, with time 0 at its beginning.
+///
+/// At a two-fold whose sliding flow is a node every point of the repelling region has such a past: the full set of futures
+/// of the two-fold has, besides exit time and side, the sliding orbit as a third index. [`funnel`] follows the analytic
+/// one; the others are reached by running on from any `x`.
+///
+/// # Errors
+/// [`FilippovError::NoSuchExit`] if `x` is not in the repelling region, or its past does not end by `longest`.
+pub fn history<P, const N: usize, const M: usize>(
+    system: &P,
+    x: SVector<f64, N>,
+    longest: f64,
+    settings: &Settings,
+    per_step: usize,
+) -> Result<Trajectory<N>, FilippovError>
+where
+    P: PiecewiseSmooth<N> + Clone,
+    for<'a> SlidingFlow<'a, Reversed<P>, N>: VectorField<M>,
+{
+    let refuse = |why| FilippovError::NoSuchExit { t: 0.0, state: x.iter().copied().collect(), why };
+    let on_surface = project(system, &x);
+    if region(system, &on_surface) != Region::Repelling {
+        return Err(refuse("it has a sliding past only in the repelling region"));
+    }
+    // Reversed, repelling sliding attracts and its past is a future. It stops at its first event after the start.
+    let mut back = Trajectory::new(per_step).until_events(2);
+    let end = super::run(&Reversed(system.clone()), on_surface, longest, settings, ExitRule::All, &mut back)?;
+    if end.end == End::Time {
+        return Err(refuse("its past is longer than the given time"));
+    }
+    Ok(back.turned(end.t))
+}
+
+/// A trajectory from `a` to `b` through a two-fold: the future of `a` up to the singularity, then a past of `b` from there on. That
+/// two such points are joined by a trajectory in finite time is the paper's description of non-deterministic chaos
+/// (sec. 3, fig. 4). Events are those of the first part; the second part's pieces tell its modes.
+///
+/// # Errors
+/// [`FilippovError::NoSuchExit`] if the future of `a` or the past of `b` comes to no two-fold within `longest`, or to different
+/// ones.
+pub fn connect<P, const N: usize, const M: usize>(
+    system: &P,
+    a: SVector<f64, N>,
+    b: SVector<f64, N>,
+    longest: f64,
+    settings: &Settings,
+    per_step: usize,
+) -> Result<Trajectory<N>, FilippovError>
+where
+    P: PiecewiseSmooth<N> + Clone,
+    for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
+    for<'a> SlidingFlow<'a, Reversed<P>, N>: VectorField<M>,
+{
+    let mut path = Trajectory::new(per_step);
+    let there = super::run(system, a, longest, settings, ExitRule::All, &mut path)?;
+    let mut past = Trajectory::new(per_step);
+    let back = super::run(&Reversed(system.clone()), b, longest, settings, ExitRule::All, &mut past)?;
+    let refuse =
+        |x: &SVector<f64, N>, why| FilippovError::NoSuchExit { t: there.t, state: x.iter().copied().collect(), why };
+    if there.end != End::SetValued || there.mode.is_some() {
+        return Err(refuse(&there.x, "the future of the first point comes to no two-fold in the given time"));
+    }
+    if back.end != End::SetValued || back.mode.is_some() {
+        return Err(refuse(&back.x, "the past of the second point comes from no two-fold in the given time"));
+    }
+    if (there.x - back.x).amax() > 1e-9 * (1.0 + there.x.amax()) {
+        return Err(refuse(&back.x, "the past of the second point comes from another two-fold"));
+    }
+    path.pieces.extend(past.turned(there.t + back.t).pieces);
+    Ok(path)
+}
+
+/// The members on `grid` of the family that starts at the set-valued point of `family`; of one side only, if given.
+pub(super) fn members_of<P, const N: usize, const M: usize>(
+    system: &P,
+    family: &Funnel<N>,
+    settings: &Settings,
+    grid: &FunnelGrid,
+    only: Option<Side>,
+) -> Result<Vec<FunnelMember<N>>, FilippovError>
+where
+    P: PiecewiseSmooth<N>,
+    for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
+{
+    let departure = if family.at_two_fold {
+        Departure::TwoFold(SlidingAtTwoFold::near(system, &family.point).map(Box::new))
+    } else {
+        Departure::Repelling
     };
     let mut members = Vec::with_capacity(2 * grid.times);
     for k in 0..grid.times {
         let fraction = if grid.times > 1 { k as f64 / (grid.times - 1) as f64 } else { 1.0 };
         let exit_time = grid.shortest * pow(grid.longest / grid.shortest, fraction);
         for side in [Side::Plus, Side::Minus] {
+            if only.is_some_and(|s| s != side) {
+                continue;
+            }
             let mut trajectory = Trajectory::new(grid.per_step);
             if grid.until_two_fold {
                 trajectory = trajectory.until_two_fold();
@@ -94,10 +191,10 @@ where
             let rule = ExitRule::AfterTime { time: exit_time, side };
             let summary = engine::run_from(
                 system,
-                there.t,
-                point,
+                family.t,
+                family.point,
                 departure.clone(),
-                there.t + grid.horizon,
+                family.t + grid.horizon,
                 settings,
                 rule,
                 &mut trajectory,
@@ -105,5 +202,5 @@ where
             members.push(FunnelMember { exit_time, side, trajectory, summary });
         }
     }
-    Ok(Funnel { approach, t: there.t, point, members })
+    Ok(members)
 }

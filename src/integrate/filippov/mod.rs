@@ -46,6 +46,7 @@ mod engine;
 mod exit;
 mod flow;
 mod funnel;
+pub mod limit;
 mod trajectory;
 pub mod two_fold;
 
@@ -58,7 +59,7 @@ use super::step::{Failure, Flow, Statistics, Step, Tolerance};
 pub use engine::run;
 pub use exit::{ExitRule, Side, SlidingLaw};
 pub use flow::SlidingFlow;
-pub use funnel::{Funnel, FunnelGrid, FunnelMember, funnel};
+pub use funnel::{Funnel, FunnelGrid, FunnelMember, connect, funnel, history};
 pub use trajectory::{Piece, Trajectory};
 
 /// The kind of motion between two events.
@@ -195,7 +196,8 @@ pub struct Settings {
     pub max_step: f64,
     /// A state with |h| at most this counts as being on the surface (at the start of a run).
     pub surface: f64,
-    /// Distance from a two-fold, as a fraction of its radius, at which the closed-form last leg begins.
+    /// Distance from a two-fold, as a fraction of its radius, at which the closed-form last leg begins; never less than 300 times
+    /// what the tolerances resolve.
     pub leg: f64,
     /// Distance of the shortest departure from a two-fold, as a fraction of its radius (see [`ExitRule::AtOnce`]).
     pub departure: f64,

@@ -24,6 +24,7 @@ pub struct Trajectory<const N: usize> {
     per_step: usize,
     new_piece: bool,
     stop_at_two_fold: bool,
+    most_events: usize,
 }
 
 impl<const N: usize> Trajectory<N> {
@@ -35,12 +36,38 @@ impl<const N: usize> Trajectory<N> {
             per_step: per_step.max(1),
             new_piece: true,
             stop_at_two_fold: false,
+            most_events: usize::MAX,
         }
     }
 
     /// Asks the run to stop when it has come to a two-fold.
     pub fn until_two_fold(mut self) -> Self {
         self.stop_at_two_fold = true;
+        self
+    }
+
+    /// Asks the run to stop at the `count`-th event.
+    pub fn until_events(mut self, count: usize) -> Self {
+        self.most_events = count;
+        self
+    }
+
+    /// The trajectory of the reversed system ([`Reversed`](crate::model::Reversed)) as one of the original: order turned round,
+    /// time t becomes `origin` - t, attracting and repelling change places. Events are dropped: an end is not a beginning.
+    pub fn turned(mut self, origin: f64) -> Self {
+        self.events.clear();
+        self.pieces.reverse();
+        for piece in &mut self.pieces {
+            piece.points.reverse();
+            for (t, _) in &mut piece.points {
+                *t = origin - *t;
+            }
+            piece.mode = match piece.mode {
+                Mode::SlidingAttracting => Mode::SlidingRepelling,
+                Mode::SlidingRepelling => Mode::SlidingAttracting,
+                flight => flight,
+            };
+        }
         self
     }
 
@@ -70,6 +97,10 @@ impl<const N: usize> FilippovObserver<N> for Trajectory<N> {
         self.events.push(*event);
         self.new_piece = true;
         let reached = matches!(event.kind, super::EventKind::TwoFoldReached { .. });
-        if self.stop_at_two_fold && reached { Flow::Stop } else { Flow::Continue }
+        if self.stop_at_two_fold && reached || self.events.len() >= self.most_events {
+            Flow::Stop
+        } else {
+            Flow::Continue
+        }
     }
 }

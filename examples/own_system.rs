@@ -1,0 +1,36 @@
+//! A piecewise-smooth system of your own, run by the event-driven integrator: a planar predator-prey model in which the
+//! predator hunts the prey only while it is plentiful: h = prey - refuge.
+//!
+//! `cargo run --example own_system`
+
+use nalgebra::{SVector, vector};
+use twofold::integrate::filippov::{ExitRule, FilippovError, Settings, Side, Trajectory, run};
+use twofold::model::PiecewiseSmooth;
+use twofold::num::Scalar;
+
+struct Refuge {
+    prey_needed: f64,
+}
+
+impl PiecewiseSmooth<2> for Refuge {
+    fn switching<S: Scalar>(&self, x: &SVector<S, 2>) -> S {
+        x[0] - S::from_f64(self.prey_needed)
+    }
+    fn plus<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        vector![x[0] - x[0] * x[1], x[0] * x[1] - x[1].scale(0.5)]
+    }
+    fn minus<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        vector![x[0], -x[1].scale(0.5)]
+    }
+}
+
+fn main() -> Result<(), FilippovError> {
+    let rule = ExitRule::AtOnce { side: Side::Plus }; // What to do where the future is not unique: must be chosen.
+    let mut record = Trajectory::new(4);
+    let end = run(&Refuge { prey_needed: 1.0 }, vector![2.0, 0.8], 40.0, &Settings::default(), rule, &mut record)?;
+    for event in &record.events {
+        println!("t = {:8.4}  prey {:.4}  predator {:.4}  {:?}", event.t, event.state[0], event.state[1], event.kind);
+    }
+    println!("t = {} in {:?}: {:?}", end.t, end.mode, end.x.as_slice());
+    Ok(())
+}

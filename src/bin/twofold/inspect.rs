@@ -1,0 +1,194 @@
+//! `twofold inspect`: what a picture says of itself, and whether that is still so.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use twofold::figure::cli::print;
+use twofold::figure::pipeline::pixel_hash;
+use twofold::record::{self, Hash, Manifest, PictureEntry, read_tree};
+use twofold::render::{Format, Provenance, ProvenanceError, decode_png, read_provenance};
+
+use super::{Outcome, Problem};
+
+/// Print the provenance inside a PNG, SVG or PDF file and say whether it is one of ours and unchanged.
+///
+/// Exit code 0: ours and unchanged. 1: not ours, or changed, or of the name of a committed picture but not its bytes. 2: the file cannot
+/// be read as a picture. The seal inside a file tells damage and editing; only the committed hash tells forgery.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The picture.
+    file: PathBuf,
+    /// Folder that holds figN/expected.json; without it the file is judged by its seal alone.
+    #[arg(long, value_name = "DIR", default_value = "figures")]
+    expected: PathBuf,
+    /// JSON on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+/// How the seal stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+enum Seal {
+    /// The file is byte for byte what was written.
+    Intact,
+    /// It is not.
+    Broken,
+    /// The provenance itself is damaged.
+    Damaged,
+    /// There is none.
+    Absent,
+}
+
+/// How the file stands to the committed manifests.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(tag = "state", rename_all = "kebab-case")]
+enum Committed {
+    /// It is this picture, byte for byte.
+    Same { picture: String },
+    /// Its pixels are this picture's; the file is not.
+    SamePixels { picture: String },
+    /// It bears this picture's name and is not it.
+    Different { picture: String },
+    /// No manifest knows it.
+    Unlisted,
+    /// There are no manifests to ask.
+    NoManifests,
+}
+
+#[derive(Debug, Serialize)]
+struct Inspection {
+    format: &'static str,
+    sha256: Hash,
+    ours_and_unchanged: bool,
+    seal: Seal,
+    committed: Committed,
+    provenance: Vec<(String, String)>,
+}
+
+pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
+    let bytes = record::files::read(&arguments.file)?;
+    let read = read_provenance(&bytes);
+    if let Err(error @ ProvenanceError::UnknownFormat) = read {
+        return Err(format!("{}: {error}", arguments.file.display()).into());
+    }
+    let manifests = manifests(&arguments.expected)?;
+    let inspection = inspect(&bytes, read, &manifests);
+    if arguments.json {
+        print(&serde_json::to_string_pretty(&inspection)?)?;
+    } else {
+        print(&describe(&inspection, &arguments.file, &arguments.expected))?;
+    }
+    Ok(if inspection.ours_and_unchanged { Outcome::Fine } else { Outcome::Differs })
+}
+
+/// All committed manifests; none if the folder is not there.
+fn manifests(folder: &Path) -> Result<Vec<Manifest>, Problem> {
+    if !folder.exists() {
+        return Ok(Vec::new());
+    }
+    let mut all = Vec::new();
+    for file in read_tree(folder, &|path| path.ends_with("/expected.json"))? {
+        let name = folder.join(&file.path).display().to_string();
+        all.push(Manifest::parse(&String::from_utf8_lossy(&file.bytes), &name)?);
+    }
+    Ok(all)
+}
+
+fn inspect(bytes: &[u8], read: Result<Provenance, ProvenanceError>, manifests: &[Manifest]) -> Inspection {
+    let sha256 = Hash::of(bytes);
+    let (seal, provenance) = match &read {
+        Ok(p) if p.intact => (Seal::Intact, p.entries.clone()),
+        Ok(p) => (Seal::Broken, p.entries.clone()),
+        Err(ProvenanceError::Damaged) => (Seal::Damaged, Vec::new()),
+        Err(_) => (Seal::Absent, Vec::new()),
+    };
+    let format = match &read {
+        Ok(p) => p.format,
+        Err(_) if bytes.starts_with(b"\x89PNG") => Format::Png,
+        Err(_) if bytes.starts_with(b"%PDF") => Format::Pdf,
+        Err(_) => Format::Svg,
+    };
+    let named = provenance.iter().find(|(k, _)| k == "Picture").map(|(_, v)| v.as_str());
+    let committed = committed(bytes, &sha256, format, named, manifests);
+    let contradicted = matches!(committed, Committed::Different { .. } | Committed::SamePixels { .. });
+    Inspection {
+        format: match format {
+            Format::Png => "PNG",
+            Format::Svg => "SVG",
+            Format::Pdf => "PDF",
+        },
+        ours_and_unchanged: seal == Seal::Intact && !contradicted,
+        sha256,
+        seal,
+        committed,
+        provenance,
+    }
+}
+
+fn committed(bytes: &[u8], hash: &Hash, format: Format, named: Option<&str>, manifests: &[Manifest]) -> Committed {
+    if manifests.is_empty() {
+        return Committed::NoManifests;
+    }
+    let all = || manifests.iter().flat_map(|m| &m.pictures);
+    let file = |e: &PictureEntry| match format {
+        Format::Png => e.png.clone(),
+        Format::Svg => e.svg.clone(),
+        Format::Pdf => e.pdf.clone(),
+    };
+    if let Some(e) = all().find(|e| file(e) == *hash) {
+        return Committed::Same { picture: e.name.clone() };
+    }
+    let pixels = (format == Format::Png).then(|| decode_png(bytes).ok()).flatten().map(|p| pixel_hash(&p));
+    if let Some(e) = all().find(|e| Some(&e.pixels) == pixels.as_ref()) {
+        return Committed::SamePixels { picture: e.name.clone() };
+    }
+    match all().find(|e| Some(e.name.as_str()) == named) {
+        Some(e) => Committed::Different { picture: e.name.clone() },
+        None => Committed::Unlisted,
+    }
+}
+
+fn describe(i: &Inspection, file: &Path, expected: &Path) -> String {
+    let mut lines = vec![format!("{}: {}, SHA-256 {}", file.display(), i.format, i.sha256.as_str())];
+    let width = i.provenance.iter().map(|(k, _)| k.chars().count()).max().unwrap_or(0);
+    for (key, value) in &i.provenance {
+        lines.push(format!("  {:width$}  {}", harmless(key), harmless(value)));
+    }
+    lines.push(match i.seal {
+        Seal::Intact => "Seal: intact, the file is byte for byte what was written".into(),
+        Seal::Broken => "Seal: BROKEN, the file was changed after it was written".into(),
+        Seal::Damaged => "Seal: DAMAGED, the provenance was cut off or overwritten".into(),
+        Seal::Absent => "Seal: none, the file carries no provenance of twofold".into(),
+    });
+    lines.push(match &i.committed {
+        Committed::Same { picture } => format!("Reference: the committed {picture}, byte for byte"),
+        Committed::SamePixels { picture } => {
+            format!("Reference: the pixels of the committed {picture}, in another file")
+        }
+        Committed::Different { picture } => {
+            format!("Reference: bears the name of {picture} and is NOT the committed file")
+        }
+        Committed::Unlisted => {
+            "Reference: no committed manifest lists it (an altered picture, or another version's)".into()
+        }
+        Committed::NoManifests => {
+            format!("Reference: no manifests in {}; judged by its seal alone", expected.display())
+        }
+    });
+    lines.push(
+        match (i.ours_and_unchanged, i.seal) {
+            (true, _) => "One of ours, and unchanged.",
+            (false, Seal::Absent) => "Not one of ours.",
+            (false, Seal::Intact) => "Ours by its seal, but not the committed picture.",
+            (false, _) => "One of ours, but changed.",
+        }
+        .into(),
+    );
+    lines.join("\n")
+}
+
+/// Text from a foreign file, without characters that steer a terminal.
+fn harmless(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+}

@@ -1,0 +1,82 @@
+//! `twofold report`: one page about everything that was made.
+
+use std::path::{Path, PathBuf};
+
+use twofold::figure::cli::print;
+use twofold::figure::report::{Links, Report, archive, assemble, names, page};
+use twofold::record::{self, FileBytes, read_tree};
+
+use super::{Outcome, Problem};
+
+/// Write a self-contained page about the figures in a folder, and beside it report.json, verdicts.json and RO-Crate metadata.
+///
+/// A difference from the reference is shown on the page; it is not a failure of this command (see `twofold check`).
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Folder with the figures; the JSON files are written to it.
+    #[arg(long, value_name = "DIR", default_value = "target/figures")]
+    figures: PathBuf,
+    /// Folder that holds figN/expected.json.
+    #[arg(long, value_name = "DIR", default_value = "figures")]
+    expected: PathBuf,
+    /// The page; index.html in the folder with the figures if not given. Elsewhere it names the files instead of linking to them.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
+    let folder = &arguments.figures;
+    let made = read_tree(folder, &|_| true)
+        .map_err(|e| format!("{e}; run `make figures` first, or name another --figures"))?;
+    let report = assemble(&made, &references(&arguments.expected)?);
+    if report.figures.is_empty() {
+        return Err(format!(
+            "{}: no figure's pictures are in this folder; run `make figures` first, or name another --figures",
+            folder.display()
+        )
+        .into());
+    }
+    let beside = folder.join(names::PAGE);
+    let out = arguments.out.as_ref().unwrap_or(&beside);
+    let html = page(&report, if stands_in(out, folder) { Links::Beside } else { Links::None });
+    let (json, verdicts) = (report.to_json(), report.verdicts_json());
+    record::write(&folder.join(names::REPORT), &json)?;
+    record::write(&folder.join(names::VERDICTS), &verdicts)?;
+    let mut added: Vec<(&str, &[u8])> = vec![(names::REPORT, &json), (names::VERDICTS, &verdicts)];
+    // A page that stands elsewhere is not part of the folder.
+    if stands_in(out, folder) && out.file_name() == Path::new(names::PAGE).file_name() {
+        added.push((names::PAGE, &html));
+    }
+    record::write(&folder.join(names::ARCHIVE), &archive(&report, &made, &added))?;
+    record::write(out, &html)?;
+    print(&said(&report, out))?;
+    Ok(Outcome::Fine)
+}
+
+/// The committed manifests and pictures; none if the folder is not there.
+pub fn references(folder: &Path) -> Result<Vec<FileBytes>, Problem> {
+    if !folder.exists() {
+        return Ok(Vec::new());
+    }
+    Ok(read_tree(folder, &|path| path.ends_with(".json") || path.ends_with(".png"))?)
+}
+
+fn stands_in(page: &Path, folder: &Path) -> bool {
+    let parent = page.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match (parent.canonicalize(), folder.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    }
+}
+
+fn said(report: &Report, out: &Path) -> String {
+    let s = &report.summary;
+    let mut lines = vec![format!("wrote {}", out.display())];
+    lines.push(format!("{} of {} pictures match the reference", s.same, s.pictures));
+    for r in &s.readings {
+        let name = r.reading.map_or("no reading", |r| r.word());
+        lines.push(format!("{name}: {} of {} claims agree", r.agree, r.claims));
+    }
+    lines.extend(report.problems.iter().map(|p| format!("problem: {p}")));
+    lines.join("\n")
+}

@@ -1,0 +1,426 @@
+//! Two pictures held against each other: how many pixels differ, how much, and whether the structure is the same.
+//!
+//! Hashes say *whether* two pictures differ; this says *how*. A picture of ours is mostly white, and what matters may be two dots:
+//! means over the whole picture would call a picture with both dots in the wrong place nearly perfect. So every mean is
+//! accompanied by the worst place.
+
+use serde::Serialize;
+
+use crate::num::elementary::{exp, sqrt};
+use crate::render::Pixels;
+
+/// How two pictures of the same size differ.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Pixels of which any channel differs.
+    pub changed_pixels: u64,
+    /// Their share of all pixels, in [0, 1].
+    pub changed_share: f64,
+    /// The largest difference of a channel, in levels of 0 to 255.
+    pub largest_difference: u8,
+    /// Root mean square difference over all pixels and the three channels, in levels of 0 to 255.
+    pub rms: f64,
+    /// The root mean square difference of the worst block of [`BLOCK`] by [`BLOCK`] pixels.
+    pub worst_block_rms: f64,
+    /// Mean structural similarity of the luminance (Wang, Bovik, Sheikh & Simoncelli 2004), 1 for equal pictures.
+    pub ssim: f64,
+    /// The structural similarity of the worst window.
+    pub worst_ssim: f64,
+}
+
+/// Two pictures that cannot be held against each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("one picture has {} by {} pixels, the other {} by {}", .expected.0, .expected.1, .actual.0, .actual.1)]
+pub struct SizesDiffer {
+    /// Width and height of the first.
+    pub expected: (u32, u32),
+    /// Width and height of the second.
+    pub actual: (u32, u32),
+}
+
+/// Side of the blocks of [`Comparison::worst_block_rms`]: about two dots of a section wide.
+pub const BLOCK: usize = 16;
+
+/// Side of the SSIM window and the standard deviation of its Gaussian weights (Wang et al. 2004, sec. III.C).
+const WINDOW: usize = 11;
+const SIGMA: f64 = 1.5;
+/// (K1 L)^2 and (K2 L)^2 with K1 = 0.01, K2 = 0.03, L = 255 (Wang et al. 2004, eq. (7) and (12)).
+const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
+const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
+
+/// Compares pixel by pixel. Transparent pixels are laid on white first.
+pub fn compare(expected: &Pixels, actual: &Pixels) -> Result<Comparison, SizesDiffer> {
+    same_size(expected, actual)?;
+    let (width, height) = (expected.width as usize, expected.height as usize);
+    let (a, b) = (on_white(expected), on_white(actual));
+    let mut changed = 0_u64;
+    let mut largest = 0;
+    let mut total = 0_u64;
+    let columns = width.div_ceil(BLOCK);
+    let mut blocks = vec![(0_u64, 0_u64); columns * height.div_ceil(BLOCK)];
+    for (i, (p, q)) in a.iter().zip(&b).enumerate() {
+        let block = &mut blocks[(i / width) / BLOCK * columns + (i % width) / BLOCK];
+        block.1 += 3;
+        if p == q {
+            continue;
+        }
+        changed += 1;
+        for (u, v) in p.iter().zip(q) {
+            let d = u.abs_diff(*v);
+            largest = largest.max(d);
+            let square = u64::from(d) * u64::from(d);
+            total += square;
+            block.0 += square;
+        }
+    }
+    let pixels = (width * height).max(1) as f64;
+    let rms = |(sum, count): (u64, u64)| sqrt(sum as f64 / (count as f64).max(1.0));
+    let (ssim, worst_ssim) = if changed == 0 { (1.0, 1.0) } else { similarity(&a, &b, width, height) };
+    Ok(Comparison {
+        width: expected.width,
+        height: expected.height,
+        changed_pixels: changed,
+        changed_share: changed as f64 / pixels,
+        largest_difference: largest,
+        rms: rms((total, 3 * (width * height) as u64)),
+        worst_block_rms: blocks.into_iter().map(rms).fold(0.0, f64::max),
+        ssim,
+        worst_ssim,
+    })
+}
+
+fn same_size(expected: &Pixels, actual: &Pixels) -> Result<(), SizesDiffer> {
+    let sizes = SizesDiffer { expected: (expected.width, expected.height), actual: (actual.width, actual.height) };
+    if sizes.expected == sizes.actual { Ok(()) } else { Err(sizes) }
+}
+
+fn on_white(pixels: &Pixels) -> Vec<[u8; 3]> {
+    pixels
+        .rgba
+        .chunks_exact(4)
+        .map(|p| {
+            let over = |c: u8| ((u32::from(c) * u32::from(p[3]) + 255 * (255 - u32::from(p[3])) + 127) / 255) as u8;
+            [over(p[0]), over(p[1]), over(p[2])]
+        })
+        .collect()
+}
+
+/// Luminance of ITU-R BT.601.
+fn luminance(p: &[u8; 3]) -> f64 {
+    0.299 * f64::from(p[0]) + 0.587 * f64::from(p[1]) + 0.114 * f64::from(p[2])
+}
+
+/// Mean and lowest SSIM over all windows inside the picture, at full resolution. A picture smaller than a window is one window
+/// with equal weights.
+fn similarity(a: &[[u8; 3]], b: &[[u8; 3]], width: usize, height: usize) -> (f64, f64) {
+    let a: Vec<f64> = a.iter().map(luminance).collect();
+    let b: Vec<f64> = b.iter().map(luminance).collect();
+    if width < WINDOW || height < WINDOW {
+        let mean = |f: &dyn Fn(usize) -> f64| (0..a.len()).map(f).sum::<f64>() / a.len().max(1) as f64;
+        let s = ssim([
+            mean(&|i| a[i]),
+            mean(&|i| b[i]),
+            mean(&|i| a[i] * a[i]),
+            mean(&|i| b[i] * b[i]),
+            mean(&|i| a[i] * b[i]),
+        ]);
+        return (s, s);
+    }
+    let weights = gaussian();
+    let (wide, high) = (width - WINDOW + 1, height - WINDOW + 1);
+    // A ring of WINDOW rows already averaged along x, then averaged along y: five moments at once.
+    let mut ring = vec![[0.0; 5]; WINDOW * wide];
+    let (mut sum, mut lowest) = (0.0, f64::INFINITY);
+    for y in 0..height {
+        let row = y * width;
+        for x in 0..wide {
+            let mut m = [0.0; 5];
+            for (k, w) in weights.iter().enumerate() {
+                let (p, q) = (a[row + x + k], b[row + x + k]);
+                m[0] += w * p;
+                m[1] += w * q;
+                m[2] += w * p * p;
+                m[3] += w * q * q;
+                m[4] += w * p * q;
+            }
+            ring[(y % WINDOW) * wide + x] = m;
+        }
+        if y + 1 < WINDOW {
+            continue;
+        }
+        for x in 0..wide {
+            let mut m = [0.0; 5];
+            for (k, w) in weights.iter().enumerate() {
+                let line = &ring[((y + 1 - WINDOW + k) % WINDOW) * wide + x];
+                m.iter_mut().zip(line).for_each(|(m, v)| *m += w * v);
+            }
+            let s = ssim(m);
+            sum += s;
+            lowest = f64::min(lowest, s);
+        }
+    }
+    (sum / (wide * high) as f64, lowest)
+}
+
+/// Eq. (13) of Wang et al. (2004) from the means of a, b, a^2, b^2 and ab.
+fn ssim([mean_a, mean_b, aa, bb, ab]: [f64; 5]) -> f64 {
+    let (variance_a, variance_b) = ((aa - mean_a * mean_a).max(0.0), (bb - mean_b * mean_b).max(0.0));
+    let covariance = ab - mean_a * mean_b;
+    (2.0 * mean_a * mean_b + C1) * (2.0 * covariance + C2)
+        / ((mean_a * mean_a + mean_b * mean_b + C1) * (variance_a + variance_b + C2))
+}
+
+fn gaussian() -> [f64; WINDOW] {
+    let weights: [f64; WINDOW] = std::array::from_fn(|i| {
+        let d = i as f64 - (WINDOW / 2) as f64;
+        exp(-d * d / (2.0 * SIGMA * SIGMA))
+    });
+    let total: f64 = weights.iter().sum();
+    weights.map(|w| w / total)
+}
+
+/// Colour of what only the expected picture shows, and of what only the actual one shows: told apart with any colour vision.
+const ONLY_EXPECTED: [u8; 3] = [213, 94, 0];
+const ONLY_ACTUAL: [u8; 3] = [0, 114, 178];
+
+/// The difference as a picture: what both share faintly in grey, ink that only `expected` has in orange, ink that only `actual` has in
+/// blue. Changed pixels are drawn one pixel wider on each side, so that a single one is seen.
+pub fn difference_image(expected: &Pixels, actual: &Pixels) -> Result<Pixels, SizesDiffer> {
+    same_size(expected, actual)?;
+    let (width, height) = (expected.width as usize, expected.height as usize);
+    let (a, b) = (on_white(expected), on_white(actual));
+    let mut rgba: Vec<u8> = a
+        .iter()
+        .flat_map(|p| {
+            let faint = 255 - ((255.0 - luminance(p)) * 0.22) as u8;
+            [faint, faint, faint, 255]
+        })
+        .collect();
+    for (i, (p, q)) in a.iter().zip(&b).enumerate().filter(|(_, (p, q))| p != q) {
+        let colour = if luminance(p) < luminance(q) { ONLY_EXPECTED } else { ONLY_ACTUAL };
+        let (x, y) = (i % width, i / width);
+        for v in y.saturating_sub(1)..(y + 2).min(height) {
+            for u in x.saturating_sub(1)..(x + 2).min(width) {
+                rgba[4 * (v * width + u)..][..3].copy_from_slice(&colour);
+            }
+        }
+    }
+    Ok(Pixels { width: expected.width, height: expected.height, rgba })
+}
+
+/// A rung of the tolerance ladder, the strictest first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rung {
+    /// The file is byte for byte the same.
+    File,
+    /// Every pixel is the same; only the file's encoding or its metadata differ.
+    Pixels,
+    /// Few pixels differ and none by much: another rasteriser's rounding.
+    ChangedPixels,
+    /// Many pixels differ, none by much: another colour depth, a careful lossy copy.
+    Rms,
+    /// The structure is the same everywhere: a lossy copy.
+    Ssim,
+}
+
+/// The limits of the ladder's inexact rungs. Each bounds the whole picture and its worst place.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Limits {
+    /// Largest share of changed pixels.
+    pub changed_share: f64,
+    /// Largest difference of a channel that goes with it, in levels.
+    pub largest_difference: u8,
+    /// Largest root mean square difference, in levels.
+    pub rms: f64,
+    /// Largest such difference in any block.
+    pub worst_block_rms: f64,
+    /// Smallest mean structural similarity.
+    pub ssim: f64,
+    /// Smallest structural similarity of any window.
+    pub worst_ssim: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            changed_share: 0.01,
+            largest_difference: 32,
+            rms: 2.0,
+            worst_block_rms: 8.0,
+            ssim: 0.98,
+            worst_ssim: 0.5,
+        }
+    }
+}
+
+impl Limits {
+    /// The limits in words.
+    pub fn describe(&self, rung: Rung) -> String {
+        match rung {
+            Rung::File => "file: SHA-256 equal".into(),
+            Rung::Pixels => "pixels: SHA-256 of the decoded pixels equal".into(),
+            Rung::ChangedPixels => format!(
+                "changed pixels: at most {} % changed, none by more than {} levels of 255",
+                100.0 * self.changed_share,
+                self.largest_difference
+            ),
+            Rung::Rms => format!(
+                "RMS: at most {} levels of 255, at most {} in any block of {BLOCK} by {BLOCK} pixels",
+                self.rms, self.worst_block_rms
+            ),
+            Rung::Ssim => format!("SSIM: at least {}, at least {} in any window", self.ssim, self.worst_ssim),
+        }
+    }
+
+    /// The strictest inexact rung that holds, if any does. Exact rungs are decided by hashes.
+    pub fn rung(&self, c: &Comparison) -> Option<Rung> {
+        if c.changed_share <= self.changed_share && c.largest_difference <= self.largest_difference {
+            Some(Rung::ChangedPixels)
+        } else if c.rms <= self.rms && c.worst_block_rms <= self.worst_block_rms {
+            Some(Rung::Rms)
+        } else if c.ssim >= self.ssim && c.worst_ssim >= self.worst_ssim {
+            Some(Rung::Ssim)
+        } else {
+            None
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grey(width: u32, height: u32, value: impl Fn(usize) -> u8) -> Pixels {
+        let rgba = (0..(width * height) as usize).flat_map(|i| [value(i), value(i), value(i), 255]).collect();
+        Pixels { width, height, rgba }
+    }
+
+    /// Noise from a generator that the reference program shares.
+    fn noise(width: u32, height: u32, seed: u64) -> Pixels {
+        let mut state = seed;
+        let values: Vec<u8> = (0..width * height)
+            .map(|_| {
+                state = (state * 1_103_515_245 + 12_345) % (1 << 31);
+                (state >> 16 & 255) as u8
+            })
+            .collect();
+        grey(width, height, |i| values[i])
+    }
+
+    fn close(a: f64, b: f64) {
+        assert!((a - b).abs() < 1e-9, "{a} is not {b}");
+    }
+
+    #[test]
+    fn a_picture_is_like_itself() {
+        let a = noise(40, 30, 1);
+        let c = compare(&a, &a).unwrap();
+        assert_eq!((c.changed_pixels, c.changed_share, c.largest_difference), (0, 0.0, 0));
+        assert_eq!((c.rms, c.worst_block_rms, c.ssim, c.worst_ssim), (0.0, 0.0, 1.0, 1.0));
+        // Not only by the short cut for equal pictures.
+        let (mean, worst) = similarity(&on_white(&a), &on_white(&a), 40, 30);
+        close(mean, 1.0);
+        close(worst, 1.0);
+    }
+
+    #[test]
+    fn flat_pictures_have_the_similarity_of_their_means() {
+        let c = compare(&grey(20, 20, |_| 100), &grey(20, 20, |_| 120)).unwrap();
+        let expected = (2.0 * 100.0 * 120.0 + C1) / (100.0 * 100.0 + 120.0 * 120.0 + C1);
+        close(c.ssim, expected);
+        close(c.worst_ssim, expected);
+        assert_eq!((c.changed_pixels, c.changed_share, c.largest_difference), (400, 1.0, 20));
+        close(c.rms, 20.0);
+        close(c.worst_block_rms, 20.0);
+    }
+
+    /// (mean, lowest) for each pair of the test below.
+    const SKIMAGE: [(f64, f64); 3] = [
+        (0.014254053047902684, -0.40541424866284276),
+        (0.9525019610369865, 0.9483863728798687),
+        (-0.04043872541475178, -0.565134386108423),
+    ];
+
+    #[test]
+    fn similarity_is_that_of_another_program() {
+        // scikit-image 0.26: structural_similarity(gaussian_weights=True, sigma=1.5, use_sample_covariance=False, data_range=255).
+        let a = noise(40, 30, 1);
+        let pixel = |i: usize| a.rgba[4 * i];
+        let paler = grey(40, 30, |i| (f64::from(pixel(i)) * 0.75 + 16.0) as u8);
+        let shifted = grey(40, 30, |i| pixel(i / 40 * 40 + (i % 40 + 39) % 40));
+        for (other, mean, worst) in [
+            (noise(40, 30, 2), SKIMAGE[0].0, SKIMAGE[0].1),
+            (paler, SKIMAGE[1].0, SKIMAGE[1].1),
+            (shifted, SKIMAGE[2].0, SKIMAGE[2].1),
+        ] {
+            let c = compare(&a, &other).unwrap();
+            close(c.ssim, mean);
+            close(c.worst_ssim, worst);
+        }
+    }
+
+    #[test]
+    fn one_wrong_dot_is_found_where_the_means_are_blind() {
+        let white = grey(400, 300, |_| 255);
+        let dotted =
+            grey(
+                400,
+                300,
+                |i| if (100..105).contains(&(i % 400)) && (100..105).contains(&(i / 400)) { 20 } else { 255 },
+            );
+        let c = compare(&white, &dotted).unwrap();
+        assert_eq!(c.changed_pixels, 25);
+        let limits = Limits::default();
+        assert!(c.rms > limits.rms && c.ssim > limits.ssim && c.changed_share < limits.changed_share);
+        assert!(c.worst_ssim < 0.1 && c.worst_block_rms > 50.0);
+        assert_eq!(limits.rung(&c), None);
+    }
+
+    #[test]
+    fn the_ladder_goes_from_strict_to_loose() {
+        let limits = Limits::default();
+        let same = compare(&noise(40, 30, 1), &noise(40, 30, 1)).unwrap();
+        assert_eq!(limits.rung(&same), Some(Rung::ChangedPixels));
+        let many = Comparison { changed_share: 0.5, rms: 1.0, worst_block_rms: 3.0, largest_difference: 9, ..same };
+        assert_eq!(limits.rung(&many), Some(Rung::Rms));
+        let lossy = Comparison { rms: 3.0, ssim: 0.99, worst_ssim: 0.8, ..many };
+        assert_eq!(limits.rung(&lossy), Some(Rung::Ssim));
+        assert_eq!(limits.rung(&Comparison { worst_ssim: 0.1, ..lossy }), None);
+        // A number that is not one holds nowhere.
+        let nan = Comparison { changed_share: f64::NAN, rms: f64::NAN, ssim: f64::NAN, ..same };
+        assert_eq!(limits.rung(&nan), None);
+        assert!(Rung::File < Rung::Pixels && Rung::Pixels < Rung::ChangedPixels && Rung::Rms < Rung::Ssim);
+    }
+
+    #[test]
+    fn other_sizes_are_refused_and_small_ones_compared() {
+        let error = compare(&grey(3, 2, |_| 0), &grey(2, 3, |_| 0)).unwrap_err();
+        assert_eq!(error.to_string(), "one picture has 3 by 2 pixels, the other 2 by 3");
+        let c = compare(&grey(2, 2, |_| 0), &grey(2, 2, |i| 255 * u8::from(i == 0))).unwrap();
+        assert_eq!(c.changed_pixels, 1);
+        assert!(c.ssim < 0.5);
+        assert_eq!(compare(&grey(0, 0, |_| 0), &grey(0, 0, |_| 0)).unwrap().changed_pixels, 0);
+    }
+
+    #[test]
+    fn transparency_is_laid_on_white() {
+        let clear = Pixels { width: 1, height: 1, rgba: vec![0, 0, 0, 0] };
+        assert_eq!(compare(&clear, &grey(1, 1, |_| 255)).unwrap().changed_pixels, 0);
+    }
+
+    #[test]
+    fn the_difference_shows_who_has_the_ink() {
+        let dot = |at: usize| grey(20, 5, move |i| if i == at { 0 } else { 255 });
+        let d = difference_image(&dot(42), &dot(52)).unwrap();
+        let pixel = |i: usize| [d.rgba[4 * i], d.rgba[4 * i + 1], d.rgba[4 * i + 2]];
+        assert_eq!((pixel(42), pixel(52), pixel(47)), (ONLY_EXPECTED, ONLY_ACTUAL, [255; 3]));
+        assert_eq!(pixel(21), ONLY_EXPECTED);
+        let shared = difference_image(&dot(42), &dot(42)).unwrap();
+        assert!(shared.rgba[4 * 42] < 255 && shared.rgba[4 * 42] > 150);
+    }
+}

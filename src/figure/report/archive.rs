@@ -1,0 +1,143 @@
+//! RO-Crate 1.1 metadata: what an archive needs to take the folder as it is.
+
+use serde_json::{Value, json};
+
+use super::assemble::media_type;
+use super::html::address;
+use super::model::{Report, indented};
+use super::names;
+use crate::record::{FileBytes, Hash};
+use crate::render::read_provenance;
+
+/// Date of the release, as CITATION.cff has it. RO-Crate asks for a date of publication; a clock would make the bytes of this file
+/// differ from run to run.
+pub const RELEASE_DATE: &str = "2026-11-21";
+
+/// The licence of program and pictures: either of two.
+const LICENCES: [(&str, &str); 2] =
+    [("https://spdx.org/licenses/MIT", "MIT License"), ("https://spdx.org/licenses/Apache-2.0", "Apache License 2.0")];
+
+/// The metadata of a folder that holds `made` and what the report adds to it (`added`: name and bytes).
+pub fn archive(report: &Report, made: &[FileBytes], added: &[(&str, &[u8])]) -> Vec<u8> {
+    let own = [names::PAGE, names::REPORT, names::VERDICTS, names::ARCHIVE];
+    let mut files: Vec<(&str, &[u8])> =
+        made.iter().map(|f| (f.path.as_str(), f.bytes.as_slice())).filter(|(path, _)| !own.contains(path)).collect();
+    files.extend(added);
+    files.sort_by_key(|(path, _)| *path);
+
+    let mut graph = vec![
+        json!({
+            "@id": names::ARCHIVE,
+            "@type": "CreativeWork",
+            "about": { "@id": "./" },
+            "conformsTo": { "@id": "https://w3id.org/ro/crate/1.1" },
+        }),
+        json!({
+            "@id": "./",
+            "@type": "Dataset",
+            "name": format!("Figures of {} ({}), recomputed", report.article.author, report.article.year),
+            "description": format!(
+                "Pictures, numbers, hashes and verdicts for \"{}\", computed by {}. Every file is the same byte for byte \
+                 on any machine.",
+                report.article.title, report.made_by
+            ),
+            "datePublished": RELEASE_DATE,
+            "license": { "@id": LICENCES[0].0 },
+            "author": { "@id": "#authors" },
+            "citation": { "@id": "#article" },
+            "mainEntity": { "@id": names::PAGE },
+            "mentions": report.figures.iter().map(|f| json!({ "@id": action(&f.id) })).collect::<Vec<_>>(),
+            "hasPart": files.iter().map(|(path, _)| json!({ "@id": address(path) })).collect::<Vec<_>>(),
+        }),
+        json!({
+            "@id": "#authors",
+            "@type": "Organization",
+            "name": "The twofold authors",
+        }),
+        json!({
+            "@id": "#software",
+            "@type": ["SoftwareApplication", "SoftwareSourceCode"],
+            "name": "twofold",
+            "version": env!("CARGO_PKG_VERSION"),
+            "softwareVersion": env!("CARGO_PKG_VERSION"),
+            "description": env!("CARGO_PKG_DESCRIPTION"),
+            "programmingLanguage": "Rust",
+            "author": { "@id": "#authors" },
+            "license": LICENCES.map(|(id, _)| json!({ "@id": id })),
+        }),
+        json!({
+            "@id": "#article",
+            "@type": "ScholarlyArticle",
+            "name": report.article.title,
+            "author": { "@id": "#article-author" },
+            "datePublished": report.article.year.to_string(),
+        }),
+        json!({ "@id": "#article-author", "@type": "Person", "name": report.article.author }),
+    ];
+    graph.extend(
+        LICENCES.map(|(id, name)| json!({ "@id": id, "@type": "CreativeWork", "name": name, "identifier": id })),
+    );
+    for figure in &report.figures {
+        let within = format!("{}/", figure.id);
+        let made: Vec<Value> = files
+            .iter()
+            .filter(|(path, _)| path.starts_with(&within))
+            .map(|(path, _)| json!({ "@id": address(path) }))
+            .collect();
+        graph.push(json!({
+            "@id": action(&figure.id),
+            "@type": "CreateAction",
+            "name": format!("Computation of {}", figure.id),
+            "instrument": { "@id": "#software" },
+            "result": made,
+        }));
+    }
+    graph.extend(files.iter().map(|(path, bytes)| file(report, path, bytes)));
+    indented(&json!({ "@context": "https://w3id.org/ro/crate/1.1/context", "@graph": graph }))
+}
+
+fn action(figure: &str) -> String {
+    format!("#compute-{}", address(figure))
+}
+
+fn file(report: &Report, path: &str, bytes: &[u8]) -> Value {
+    let mut entity = json!({
+        "@id": address(path),
+        "@type": "File",
+        "name": name(report, path),
+        "encodingFormat": media_type(path),
+        "contentSize": bytes.len().to_string(),
+        "sha256": Hash::of(bytes).as_str(),
+    });
+    // A picture's own provenance names the question and the numbers behind it.
+    if let Ok(provenance) = read_provenance(bytes) {
+        let text: Vec<String> = provenance.entries.iter().map(|(key, value)| format!("{key}: {value}")).collect();
+        entity["description"] = json!(text.join("; "));
+    }
+    entity
+}
+
+fn name(report: &Report, path: &str) -> String {
+    let known = match path {
+        names::PAGE => "The report, for people",
+        names::REPORT => "The report, for programs",
+        names::VERDICTS => "All verdicts with their evidence",
+        _ => "",
+    };
+    if !known.is_empty() {
+        return known.to_owned();
+    }
+    let picture = report
+        .figures
+        .iter()
+        .flat_map(|f| &f.pictures)
+        .find_map(|p| p.files.iter().find(|f| f.path == path).map(|f| (p, f)));
+    match picture {
+        None => path.to_owned(),
+        Some((p, f)) => match &f.panel {
+            Some(panel) => format!("{}: numbers of panel ({panel})", p.name),
+            None if f.role == super::Role::Record => format!("{}: hashes, runs, statistics and verdicts", p.name),
+            None => format!("{}: {}", p.name, p.title),
+        },
+    }
+}

@@ -1,0 +1,147 @@
+//! Text, rich text and files inside a page. Everything that comes from data passes through here.
+
+/// Text that is safe in HTML and XML, inside elements and inside quoted attributes. Control characters that XML does not allow
+/// become a replacement character.
+pub fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&#39;"),
+            '\n' | '\t' | '\r' => out.push(c),
+            c if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') => out.push('\u{fffd}'),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+/// The renderer's rich text (`*x*`, `_{+}`, `10^{-5}`) as HTML; text whose markup is not balanced is shown as it stands.
+pub fn rich(text: &str) -> String {
+    try_rich(text).unwrap_or_else(|| escape(text))
+}
+
+fn try_rich(text: &str) -> Option<String> {
+    let mut out = String::new();
+    let mut italic = false;
+    // Elements that a closing brace ends; an italic passage may not straddle them.
+    let mut open: Vec<(&str, bool)> = Vec::new();
+    let mut characters = text.chars().peekable();
+    while let Some(c) = characters.next() {
+        match c {
+            '\\' => out.push_str(&escape(&characters.next()?.to_string())),
+            '*' => {
+                out.push_str(if italic { "</i>" } else { "<i>" });
+                italic = !italic;
+            }
+            '^' | '_' => {
+                let element = if c == '^' { "sup" } else { "sub" };
+                out.push_str(&format!("<{element}>"));
+                if characters.peek() == Some(&'{') {
+                    characters.next();
+                    open.push((element, italic));
+                } else {
+                    out.push_str(&script(&characters.next()?.to_string()));
+                    out.push_str(&format!("</{element}>"));
+                }
+            }
+            '}' => {
+                let (element, was_italic) = open.pop()?;
+                if was_italic != italic {
+                    return None;
+                }
+                out.push_str(&format!("</{element}>"));
+            }
+            '{' => return None,
+            c if open.is_empty() => out.push_str(&escape(&c.to_string())),
+            c => out.push_str(&script(&c.to_string())),
+        }
+    }
+    (open.is_empty() && !italic).then_some(out)
+}
+
+/// Inside superscripts and subscripts a hyphen is a minus sign.
+fn script(text: &str) -> String {
+    if text == "-" { "−".to_owned() } else { escape(text) }
+}
+
+/// A file as a data address.
+pub fn data_address(media_type: &str, bytes: &[u8]) -> String {
+    format!("data:{media_type};base64,{}", base64(bytes))
+}
+
+/// RFC 4648, section 4.
+pub fn base64(bytes: &[u8]) -> String {
+    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for group in bytes.chunks(3) {
+        let word = group.iter().enumerate().fold(0_u32, |w, (i, b)| w | u32::from(*b) << (16 - 8 * i));
+        for i in 0..4 {
+            let digit = ALPHABET[(word >> (18 - 6 * i) & 63) as usize];
+            out.push(if i > group.len() { '=' } else { char::from(digit) });
+        }
+    }
+    out
+}
+
+/// A link's target from a path inside the folder: everything but unreserved characters and slashes as %XX.
+pub fn address(path: &str) -> String {
+    path.bytes()
+        .map(|b| match b {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'.' | b'_' | b'~' | b'/' => char::from(b).to_string(),
+            _ => format!("%{b:02X}"),
+        })
+        .collect()
+}
+
+/// An identifier for an element: letters, digits, hyphens.
+pub fn identifier(text: &str) -> String {
+    text.bytes()
+        .map(|b| {
+            if b.is_ascii_alphanumeric() { char::from(b).to_string() } else { format!("-{b:x}-").replace("-2d-", "-") }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn base64_of_the_rfc() {
+        for (text, code) in [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foob", "Zm9vYg=="),
+            ("fooba", "Zm9vYmE="),
+            ("foobar", "Zm9vYmFy"),
+        ] {
+            assert_eq!(base64(text.as_bytes()), code);
+        }
+        assert_eq!(base64(&[0xff, 0xef, 0xbe]), "/+++");
+    }
+
+    #[test]
+    fn rich_text() {
+        assert_eq!(rich("*α* = 10^{-5}, *v*_{+} < 1"), "<i>α</i> = 10<sup>−5</sup>, <i>v</i><sub>+</sub> &lt; 1");
+        assert_eq!(rich("x^2"), "x<sup>2</sup>");
+        for broken in ["*a", "a}", "^{b", "{", "^", "*a_{b*}"] {
+            assert_eq!(rich(broken), broken);
+        }
+        assert_eq!(rich("*<b>"), "*&lt;b&gt;");
+        assert_eq!(rich("\\*<"), "*&lt;");
+    }
+
+    #[test]
+    fn nothing_breaks_out() {
+        assert_eq!(escape("<script>\"'&\u{0}"), "&lt;script&gt;&quot;&#39;&amp;\u{fffd}");
+        assert_eq!(address("a/b c\"<.png"), "a/b%20c%22%3C.png");
+        assert_eq!(identifier("fig7-printed"), "fig7-printed");
+        assert_ne!(identifier("a b"), identifier("a.b"));
+    }
+}

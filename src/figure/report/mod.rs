@@ -1,0 +1,29 @@
+//! The report: everything that was made, held against the paper and against the committed reference.
+//!
+//! [`assemble`] reads records, files and manifests (as bytes: nothing here touches a file) into a [`Report`]; [`page()`] writes it for
+//! people, [`Report::to_json`] for programs, [`archive`] as RO-Crate metadata. Which figures there are is read from the
+//! records, not known here. Same input, same bytes: no clock, no path of the machine.
+
+mod archive;
+mod assemble;
+mod html;
+mod model;
+mod page;
+
+pub use archive::{RELEASE_DATE, archive};
+pub use assemble::assemble;
+pub use html::escape;
+pub use model::*;
+pub use page::{Links, page};
+
+/// File names of what the report writes, in the folder of the figures.
+pub mod names {
+    /// The page.
+    pub const PAGE: &str = "index.html";
+    /// Its twin for programs.
+    pub const REPORT: &str = "report.json";
+    /// All verdicts with their evidence.
+    pub const VERDICTS: &str = "verdicts.json";
+    /// RO-Crate metadata.
+    pub const ARCHIVE: &str = "ro-crate-metadata.json";
+}
