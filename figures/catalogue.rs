@@ -4,6 +4,8 @@
 
 use twofold::figure::Figure;
 
+#[path = "digits/main.rs"]
+mod digits;
 #[path = "fig1/main.rs"]
 mod fig1;
 #[path = "fig2/main.rs"]
@@ -24,6 +26,8 @@ mod fig8;
 mod fig9;
 #[path = "lottery/main.rs"]
 mod lottery;
+#[path = "workprecision/main.rs"]
+mod workprecision;
 
 /// Every figure, in the paper's order, then our own.
 pub fn all() -> Vec<Figure> {
@@ -38,5 +42,7 @@ pub fn all() -> Vec<Figure> {
         fig8::figure(),
         fig9::figure(),
         lottery::figure(),
+        workprecision::figure(),
+        digits::figure(),
     ]
 }

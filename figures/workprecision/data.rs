@@ -139,7 +139,7 @@ pub fn integrate<F: VectorField<N>, M: Stepper<N>, const N: usize>(
 }
 
 /// Steps after which a method is said not to manage a problem (Dormand-Prince on the stiff ones).
-const MOST_STEPS: u64 = 200_000;
+pub const MOST_STEPS: u64 = 200_000;
 
 /// Every row: ODEPACK's, then ours, problem by problem. A method that fails or takes too long has no row.
 pub fn rows() -> Vec<Row> {
