@@ -1,7 +1,5 @@
 //! How repelling sliding ends: the choice that the equations do not make.
 
-use std::fmt;
-
 use serde::{Deserialize, Serialize};
 
 use crate::num::elementary::ln;
@@ -65,7 +63,9 @@ impl SlidingLaw {
 /// In the repelling region sliding may end at any moment, to either side: Filippov's equation has all these solutions
 /// (Filippov 1988, sec. 10), and a passage through a two-fold puts every orbit there. The rule says which one is
 /// followed. It has no default: a caller must choose, and each departure is an event that names the rule with the
-/// time and the side it gave. Whatever the rule says, an orbit that comes to the edge of the repelling region (an
+/// time and the side it gave. Out of a two-fold the orbit slides along the analytic invariant curve, the smooth
+/// continuation of the way in (see [`two_fold`](super::two_fold)); every point of the repelling region lies on some other
+/// sliding orbit out of the same two-fold, which [`history`](super::history) finds. Whatever the rule says, an orbit that comes to the edge of the repelling region (an
 /// invisible fold) leaves there, to the one side on which the field points away.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
@@ -141,71 +141,6 @@ impl ExitRule {
     }
 }
 
-impl fmt::Display for Side {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Side::Plus => "plus",
-            Side::Minus => "minus",
-        })
-    }
-}
-
-/// As [`ExitRule::parse`] reads it.
-impl fmt::Display for ExitRule {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            ExitRule::AtOnce { side } => write!(f, "at-once,{side}"),
-            ExitRule::AfterTime { time, side } => write!(f, "after-time,{time},{side}"),
-            ExitRule::AfterArc { arc, side } => write!(f, "after-arc,{arc},{side}"),
-            ExitRule::Random { law: SlidingLaw::Uniform { longest }, plus_probability, .. } => {
-                write!(f, "random,uniform,{longest},{plus_probability}")
-            }
-            ExitRule::Random { law: SlidingLaw::Exponential { mean }, plus_probability, .. } => {
-                write!(f, "random,exponential,{mean},{plus_probability}")
-            }
-            ExitRule::All => f.write_str("all"),
-        }
-    }
-}
-
-impl ExitRule {
-    /// The forms that [`ExitRule::parse`] knows.
-    pub const FORMS: &'static str = "at-once,SIDE | after-time,TIME,SIDE | after-arc,LENGTH,SIDE | \
-        random,uniform,LONGEST,P | random,exponential,MEAN,P | all   (SIDE: plus or minus; P: probability of plus)";
-
-    /// A rule from a command line's text; `seed` and `stream` are for a random one.
-    ///
-    /// # Errors
-    /// A message that names what could not be read, and the forms.
-    pub fn parse(text: &str, seed: u64, stream: u64) -> Result<Self, String> {
-        let fail = |what: &str| format!("the exit rule '{text}' {what}; it must be one of: {}", Self::FORMS);
-        let number = |s: &str| s.parse::<f64>().map_err(|_| fail(&format!("has '{s}' where a number is needed")));
-        let side = |s: &str| match s {
-            "plus" => Ok(Side::Plus),
-            "minus" => Ok(Side::Minus),
-            _ => Err(fail(&format!("has '{s}' where a side is needed"))),
-        };
-        let parts: Vec<&str> = text.split(',').map(str::trim).collect();
-        let rule = match parts[..] {
-            ["all"] => ExitRule::All,
-            ["at-once", s] => ExitRule::AtOnce { side: side(s)? },
-            ["after-time", t, s] => ExitRule::AfterTime { time: number(t)?, side: side(s)? },
-            ["after-arc", a, s] => ExitRule::AfterArc { arc: number(a)?, side: side(s)? },
-            ["random", law, size, p] => {
-                let law = match law {
-                    "uniform" => SlidingLaw::Uniform { longest: number(size)? },
-                    "exponential" => SlidingLaw::Exponential { mean: number(size)? },
-                    _ => return Err(fail(&format!("has '{law}' where a law is needed"))),
-                };
-                ExitRule::Random { law, plus_probability: number(p)?, seed, stream }
-            }
-            _ => return Err(fail("is not understood")),
-        };
-        rule.validate()?;
-        Ok(rule)
-    }
-}
-
 /// What a rule says about one stretch of repelling sliding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Plan {
@@ -252,35 +187,6 @@ impl Chooser {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn rules_read_what_they_write() {
-        for text in [
-            "at-once,plus",
-            "after-time,0.3,minus",
-            "after-arc,0.25,plus",
-            "random,uniform,2,0.5",
-            "random,exponential,0.5,0.25",
-            "all",
-        ] {
-            let rule = ExitRule::parse(text, 7, 3).unwrap();
-            assert_eq!(rule.to_string(), text);
-            let json = serde_json::to_string(&rule).unwrap();
-            assert_eq!(serde_json::from_str::<ExitRule>(&json).unwrap(), rule);
-        }
-        for bad in [
-            "",
-            "at-once",
-            "at-once,up",
-            "after-time,x,plus",
-            "after-time,-1,plus",
-            "random,normal,1,0.5",
-            "random,uniform,1,2",
-        ] {
-            let message = ExitRule::parse(bad, 0, 0).unwrap_err();
-            assert!(message.contains("exit rule"), "{message}");
-        }
-    }
 
     #[test]
     fn laws_have_their_means() {
