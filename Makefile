@@ -1,7 +1,7 @@
 # Everything the project does, by name. Needs Rust (rustup reads rust-toolchain.toml) and make; no network at run time.
 
 CARGO   ?= cargo
-FIGURES := fig1 fig2 fig3 fig4 fig5 fig6 fig7 fig8 fig9 lottery workprecision digits
+FIGURES := fig1 fig2 fig3 fig4 fig5 fig6 fig7 fig8 fig9 lottery workprecision digits convergence
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help

@@ -4,6 +4,8 @@
 
 use twofold::figure::Figure;
 
+#[path = "convergence/main.rs"]
+mod convergence;
 #[path = "digits/main.rs"]
 mod digits;
 #[path = "fig1/main.rs"]
@@ -44,5 +46,6 @@ pub fn all() -> Vec<Figure> {
         lottery::figure(),
         workprecision::figure(),
         digits::figure(),
+        convergence::figure(),
     ]
 }
