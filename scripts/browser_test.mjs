@@ -1,10 +1,11 @@
 // The report in a real browser: loads, no errors, nothing from the network, pictures there, sorting by keyboard, a forced mismatch
 // shows its triptych, no sideways scrolling on a phone, dark mode, contrast, works without script.
 //
-//   node scripts/browser_test.mjs [--screenshots DIR] [--require]
+//   node scripts/browser_test.mjs [--bins DIR] [--screenshots DIR] [--require]
 //
 // Needs Node 18 or later and a Chromium or Chrome (found on PATH, or named by $CHROMIUM); no npm packages: the browser is spoken to
-// over a pipe. Without a browser it says so and exits with 0, with --require with 1.
+// over a pipe. Without a browser that starts it says so and exits with 0, with --require with 1. --bins: where twofold, fig2 and fig6
+// are, target/release if not given.
 import { spawn, spawnSync, execFileSync } from 'node:child_process';
 import { cpSync, existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -63,7 +64,8 @@ function squarePng(width, height) {
 }
 
 function prepare(folder) {
-  const binary = (name) => join(root, 'target', 'release', name);
+  const bins = argument('--bins') ?? join(root, 'target', 'release');
+  const binary = (name) => join(bins, name);
   for (const name of ['fig2', 'fig6', 'twofold']) {
     if (!existsSync(binary(name))) throw new Error(`${name} is not built; run: cargo build --release --bins`);
   }
@@ -112,7 +114,10 @@ class Browser {
         rest = rest.subarray(end + 1);
       }
     });
-    this.child.on('exit', () => this.waiting.forEach(({ reject }) => reject(new Error('the browser ended'))));
+    const ended = () => this.waiting.forEach(({ reject }) => reject(new Error('the browser ended')));
+    this.child.on('exit', ended);
+    this.child.on('error', ended);
+    this.child.stdio[3].on('error', ended);
   }
 
   receive(message) {
@@ -367,23 +372,30 @@ async function test(browser, { page, forced }) {
   }
 }
 
-const found = findBrowser();
-if (!found) {
-  console.log('browser test SKIPPED: no Chromium or Chrome found. Install one (Debian: apt-get install chromium) or set CHROMIUM to its path.');
+function skip(why) {
+  console.log(`browser test SKIPPED: ${why}. Install one (Debian: apt-get install chromium) or set CHROMIUM to its path.`);
   process.exit(process.argv.includes('--require') ? 1 : 0);
 }
+
+const found = findBrowser();
+if (!found) skip('no Chromium or Chrome found');
 console.log(found.version);
 const folder = mkdtempSync(join(tmpdir(), 'twofold-browser-'));
-let browser = null;
+const browser = new Browser(found.name, join(folder, 'profile'));
 try {
-  const prepared = prepare(folder);
-  browser = new Browser(found.name, join(folder, 'profile'));
   await browser.open();
-  await test(browser, prepared);
+} catch (error) {
+  // A browser that cannot start (no shared memory, no sandbox) says nothing about the page.
+  browser.child.kill('SIGKILL');
+  rmSync(folder, { recursive: true, force: true, maxRetries: 5 });
+  skip(`the browser found does not start (${error.message})`);
+}
+try {
+  await test(browser, prepare(folder));
 } catch (error) {
   check('the test ran to its end', false, error.stack ?? String(error));
 } finally {
-  await browser?.close().catch(() => {});
+  await browser.close().catch(() => {});
   rmSync(folder, { recursive: true, force: true, maxRetries: 5 });
 }
 console.log(failures === 0 ? 'browser test passed' : `browser test: ${failures} failed`);

@@ -346,6 +346,7 @@ fn other_files_in_the_folder_do_no_harm() {
         fs::write(path, text).unwrap();
     };
     write("fig7/notes.json", "{\"runs\": 40}");
+    write("fig7/fig7-printed-lottery.csv", "run,end\n1,periodic\n");
     write("fig7/broken.json", "{");
     write("fig7/future.json", "{\"hashes\": 7}");
     write("lottery/numbers.csv", "a,b\n1,2\n");
@@ -359,6 +360,9 @@ fn other_files_in_the_folder_do_no_harm() {
     assert_eq!(ids, ["fig7", "lottery"]);
     assert_eq!(report.figures[1].unrecorded.len(), 1);
     assert_eq!(report.problems.len(), 2, "{:?}", report.problems);
+    let extra = report.figures[0].pictures[0].files.iter().find(|f| f.path == "fig7/fig7-printed-lottery.csv").unwrap();
+    assert_eq!((extra.integrity.words(), extra.panel.as_deref()), ("no hash recorded", None));
+    assert_eq!(report.summary.damaged_files, 0);
     let html = String::from_utf8(page(&report, Links::None)).unwrap();
     sound(&html);
     assert!(html.contains("Figure 7") && html.contains("Lottery"));

@@ -92,7 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
         Ok(Outcome::Fine)
     } else {
         print(&format!(
-            "{failures} differ. If the change is meant, look at the pictures, then: twofold bless --reason \"why\""
+            "{failures} differ. If the change is meant, look at the pictures (twofold report), then: twofold bless --reason \"why\""
         ))?;
         Ok(Outcome::Differs)
     }

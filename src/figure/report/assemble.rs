@@ -90,18 +90,27 @@ impl Committed<'_> {
 
 fn figure(id: &str, files: &[&FileBytes], committed: &Committed<'_>, problems: &mut Vec<String>) -> FigureReport {
     let manifest = committed.manifest(id);
-    let mut pictures = Vec::new();
+    let mut records = Vec::new();
     for file in files.iter().filter(|f| f.name().ends_with(".json")) {
         match serde_json::from_slice::<Value>(&file.bytes) {
             // Other JSON files may stand beside the pictures: a record is what has hashes and panels.
             Ok(value) if value.get("hashes").is_none() => {}
             Ok(value) => match serde_json::from_value::<Record>(value) {
-                Ok(record) => pictures.push(picture(id, file, record, files, committed, &manifest, problems)),
+                Ok(record) => records.push((file, record)),
                 Err(error) => problems.push(format!("{}: not a record of this version ({error})", file.path)),
             },
             Err(error) => problems.push(format!("{}: not JSON ({error})", file.path)),
         }
     }
+    let names: Vec<String> = records.iter().map(|(_, r)| r.hashes.name.clone()).collect();
+    let mut pictures: Vec<PictureReport> = records
+        .into_iter()
+        .map(|(file, record)| {
+            let own: Vec<&FileBytes> =
+                files.iter().filter(|f| owner(f.name(), &names) == Some(&record.hashes.name)).copied().collect();
+            picture(id, file, record, &own, committed, &manifest, problems)
+        })
+        .collect();
     pictures.sort_by_key(|p| (natural(&p.name), p.name.clone()));
     for picture in &pictures {
         for missing in picture.files.iter().filter(|f| f.integrity == Integrity::Missing) {
@@ -133,6 +142,15 @@ fn figure(id: &str, files: &[&FileBytes], committed: &Committed<'_>, problems: &
     }
 }
 
+/// The picture that a file belongs to: the longest name that the file's name goes on from with a hyphen or a dot.
+fn owner<'a>(file: &str, names: &'a [String]) -> Option<&'a String> {
+    names
+        .iter()
+        .filter(|n| file.strip_prefix(n.as_str()).is_some_and(|rest| rest.starts_with(['-', '.'])))
+        .max_by_key(|n| n.len())
+}
+
+/// One picture from its record and its `files`.
 fn picture(
     id: &str,
     own: &FileBytes,
@@ -184,6 +202,11 @@ fn picture(
             report.integrity = if Hash::of(&bits) == recorded.data { Integrity::Unchanged } else { Integrity::Changed };
         }
         listed.push(report);
+    }
+    for table in files.iter().filter(|f| f.name().ends_with(".csv")) {
+        if !listed.iter().any(|l| l.path == table.path) {
+            listed.push(file_report(table, Role::Data, None, None));
+        }
     }
     listed.push(file_report(own, Role::Record, None, None));
 
@@ -307,7 +330,7 @@ fn reference(
     Reference::Different {
         layer: difference.layer,
         panels: difference.panels,
-        expected: expected.clone(),
+        expected: Box::new(expected.clone()),
         comparison,
         note,
     }
@@ -470,6 +493,15 @@ mod tests {
         let mut names = ["fig10", "lottery", "fig9", "fig2", "fig7-printed", "fig7"];
         names.sort_by_key(|n| natural(n));
         assert_eq!(names, ["fig2", "fig7", "fig7-printed", "fig9", "fig10", "lottery"]);
+    }
+
+    #[test]
+    fn files_belong_to_the_longest_name() {
+        let names = ["fig7-printed", "fig7-printed-shortened"].map(str::to_owned);
+        assert_eq!(owner("fig7-printed-i.csv", &names), Some(&names[0]));
+        assert_eq!(owner("fig7-printed-shortened-i.csv", &names), Some(&names[1]));
+        assert_eq!(owner("fig7-printed.png", &names), Some(&names[0]));
+        assert_eq!(owner("fig7-printedx.png", &names), None);
     }
 
     #[test]

@@ -12,7 +12,6 @@ mod page;
 
 pub use archive::{RELEASE_DATE, archive};
 pub use assemble::assemble;
-pub use html::escape;
 pub use model::*;
 pub use page::{Links, page};
 

@@ -171,7 +171,7 @@ pub enum Reference {
         /// Panels whose spec or data differ, if that is the layer.
         panels: Vec<String>,
         /// The committed hashes.
-        expected: PictureEntry,
+        expected: Box<PictureEntry>,
         /// How the pixels differ, if both pictures are there and have the same size.
         comparison: Option<Comparison>,
         /// Why there is no comparison, or what is to be known about it.

@@ -366,6 +366,7 @@ fn picture(html: &mut String, picture: &PictureReport, links: Links) {
     for file in picture.files.iter().filter(|f| f.integrity != Integrity::Missing) {
         let text = match (file.role, &file.panel) {
             (Role::Data, Some(panel)) => format!("CSV ({panel})"),
+            (Role::Data, None) => file.path.rsplit('/').next().unwrap_or(&file.path).to_owned(),
             (Role::Png, _) => "PNG".to_owned(),
             (Role::Svg, _) => "SVG".to_owned(),
             (Role::Pdf, _) => "PDF".to_owned(),
@@ -527,9 +528,15 @@ fn verdicts(html: &mut String, picture: &PictureReport, id: &str) {
     put!(html, "</tbody>\n</table>\n</div>");
 }
 
-/// What was found, and why that agrees or not where the reason is another sentence.
+/// What was found, and why that agrees or not; one of them where it says the other too.
 fn reason(v: &VerdictReport) -> String {
-    if v.because == v.found { escape(&v.found) } else { format!("{}; {}", escape(&v.found), escape(&v.because)) }
+    if v.because.contains(&v.found) {
+        escape(&v.because)
+    } else if v.found.contains(&v.because) {
+        escape(&v.found)
+    } else {
+        format!("{}; {}", escape(&v.found), escape(&v.because))
+    }
 }
 
 fn runs(html: &mut String, picture: &PictureReport, id: &str) {
@@ -608,7 +615,7 @@ fn runs(html: &mut String, picture: &PictureReport, id: &str) {
 
 fn hashes(html: &mut String, picture: &PictureReport, id: &str) {
     let expected = match &picture.reference {
-        Reference::Different { expected, .. } => Some(expected),
+        Reference::Different { expected, .. } => Some(&**expected),
         Reference::Same => Some(&picture.hashes),
         _ => None,
     };
