@@ -1,4 +1,5 @@
 //! Verdicts, exponents and multipliers on systems whose answers are known.
+#![allow(clippy::disallowed_methods)] // exact solutions are compared to tolerances, not hashed
 
 use nalgebra::{SVector, vector};
 use twofold::integrate::{Dopri5, Flow, Ignore, Observer, Schedule, Step, StepCap, Tolerance, drive, roots};

@@ -25,7 +25,7 @@ fn quick() -> impl Iterator<Item = Figure> {
     catalogue::all().into_iter().filter(|f| QUICK.contains(&f.id))
 }
 
-const QUICK: [&str; 2] = ["fig2", "fig6"];
+const QUICK: [&str; 7] = ["fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "workprecision"];
 
 #[test]
 fn golden_quick_figures_have_the_committed_hashes() {
@@ -60,10 +60,10 @@ fn golden_every_figure_has_a_reference_and_its_picture() {
     }
 }
 
-/// A shortened figure, so that every kind of panel is computed by these tests.
+/// A figure with its long runs shortened, so that every kind of panel is computed by these tests.
 fn short(figure: &Figure) -> Figure {
     let mut figure = figure.clone();
-    for picture in &mut figure.pictures {
+    for picture in figure.pictures.iter_mut().filter(|p| p.panels.iter().any(|q| q.run.t_end > 1e3)) {
         picture.alter(&Alterations { t_end: Some(40.0), ..Alterations::default() });
     }
     figure
@@ -87,8 +87,7 @@ fn all_hashes(threads: usize) -> Vec<String> {
 #[test]
 fn bytes_do_not_depend_on_the_number_of_threads() {
     let one = all_hashes(1);
-    assert_eq!(one, all_hashes(2));
-    assert_eq!(one, all_hashes(5));
+    assert_eq!(one, all_hashes(3));
     assert!(one.len() >= 9);
 }
 
