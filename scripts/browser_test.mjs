@@ -365,7 +365,8 @@ async function test(browser, { page, forced }) {
       await browser.size(width, height, mobile);
       await browser.scheme(scheme);
       await browser.shot(`${name}.png`, true);
-      await browser.run((n) => document.querySelector(`[data-mismatch="${n}"]`).scrollIntoView(), forced);
+      await browser.run((n) => document.querySelector(`[data-mismatch="${n}"]`).scrollIntoView({ behavior: 'instant' }), forced);
+      await browser.run(openAll);
       await browser.shot(`${name}-mismatch.png`);
       await browser.run(() => window.scrollTo(0, 0));
     }
