@@ -4,7 +4,7 @@
 //! differential equation and has one, but near the singularity it amplifies whatever disturbs it. Two measurements
 //! put numbers on that: how many digits of each crossing a method gets right ([`agreement`]), and how much larger a
 //! small disturbance is after a visit, as a function of when it was made ([`amplification`]). Both are measured
-//! against an orbit in double-double arithmetic ([`reference`]).
+//! against an orbit in double-double arithmetic ([`reference()`]).
 //!
 //! Measured with this module, first visit, reconstructed reading (alpha = 1e-1), growth of a disturbance between 0.1 before
 //! and 0.1 after the passage, by its direction:

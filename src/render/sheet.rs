@@ -1,7 +1,7 @@
 //! A picture as plain data: what is drawn, with no knowledge of models and none of file formats.
 //!
 //! A [`Sheet`] is a grid of panels at the printed width of a journal column. Every text is rich text (see
-//! [`rich_text`](super::rich_text)): `*x*` is italic, `10^{-3}` a superscript, `v_{+}` a subscript.
+//! `rich_text`): `*x*` is italic, `10^{-3}` a superscript, `v_{+}` a subscript.
 
 use super::style;
 

@@ -4,7 +4,7 @@
 //! shifts the orbit by the time spent in the layer, O(eps); in attracting sliding the smoothed orbit follows a slow
 //! manifold at the distance O(eps) of the surface with a slow flow O(eps) from the sliding flow (Fenichel 1979; Teixeira
 //! & da Silva 2012). So the expected rate is 1. After the visit the motion is a set and a smoothed orbit tends to no
-//! single Filippov orbit, but it must come near some member of the [`funnel`](super::funnel).
+//! single Filippov orbit, but it must come near some member of the [`funnel`](super::funnel()).
 
 use nalgebra::SVector;
 
