@@ -283,8 +283,13 @@ impl RunSpec {
         }
         positive("rtol", self.method.tolerance.rtol)?;
         positive("atol", self.method.tolerance.atol)?;
-        if self.method.tolerance.rtol < 1e-15 {
-            return error("rtol", self.method.tolerance.rtol, "f64 carries 16 digits; give 1e-15 or more");
+        let (finest, rule) = match self.method.name {
+            Method::TaylorExtended => (1e-32, "double-double arithmetic carries 32 digits; give 1e-32 or more"),
+            Method::Taylor => (1e-17, "f64 carries 16 digits; give 1e-17 or more"),
+            _ => (1e-15, "f64 carries 16 digits; give 1e-15 or more"),
+        };
+        if self.method.tolerance.rtol < finest {
+            return error("rtol", self.method.tolerance.rtol, rule);
         }
         match self.method.step_cap {
             StepCap::None => {}

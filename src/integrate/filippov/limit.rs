@@ -12,11 +12,13 @@ use super::{
     EventKind, ExitRule, FilippovError, FilippovObserver, FunnelGrid, Mode, ModeEvent, Settings, Side, SlidingFlow,
     funnel, run,
 };
+use crate::integrate::Taylor;
 use crate::integrate::dopri5::Dopri5;
 use crate::integrate::roots::sign_changes;
 use crate::integrate::step::{Failure, Flow, Step, Stepper, Tolerance};
 use crate::model::filippov::{Region, region};
 use crate::model::{PiecewiseSmooth, Smoothed, Transition, VectorField};
+use crate::num::DoubleDouble;
 use crate::num::elementary::ln;
 
 /// One comparison of a smoothed orbit with the Filippov orbit.
@@ -179,9 +181,10 @@ where
     let mut rows = Vec::with_capacity(eps.len());
     for &eps in eps {
         let field = smooth(system, eps);
-        let mut method = Dopri5::<N>::new(Tolerance { rtol: 1e-13, atol: 1e-13 });
+        // A visit multiplies local errors by up to 10^20 (figures/digits): only extended precision says where the exit is.
+        let mut method = Taylor::<N, DoubleDouble>::extended(Tolerance { rtol: 1e-28, atol: 1e-28 });
         let (mut t, mut x) = (0.0, x0);
-        method.restart(&field, t, x, t_end, layer_cap(eps))?;
+        method.restart(&field, t, x, t_end, f64::INFINITY)?;
         let crossing = 'flight: loop {
             if t >= t_end {
                 return Err(missing(t, &x));
