@@ -31,14 +31,14 @@ struct Record {
 /// (figN/expected.json and figN/NAME.png).
 pub fn assemble(made: &[FileBytes], committed: &[FileBytes]) -> Report {
     let mut problems = Vec::new();
-    let mut folders: BTreeMap<(Vec<Piece>, &str), Vec<&FileBytes>> = BTreeMap::new();
+    let mut folders: BTreeMap<(bool, Vec<Piece>, &str), Vec<&FileBytes>> = BTreeMap::new();
     for file in made.iter().filter(|f| !f.folder().is_empty() && !f.folder().contains('/')) {
-        folders.entry((natural(file.folder()), file.folder())).or_default().push(file);
+        folders.entry((!of_the_paper(file.folder()), natural(file.folder()), file.folder())).or_default().push(file);
     }
     let committed = Committed(committed);
     let figures: Vec<FigureReport> = folders
         .into_iter()
-        .map(|((_, id), files)| figure(id, &files, &committed, &mut problems))
+        .map(|((_, _, id), files)| figure(id, &files, &committed, &mut problems))
         .filter(|f| !f.pictures.is_empty() || !f.unrecorded.is_empty())
         .collect();
     Report {
@@ -50,6 +50,11 @@ pub fn assemble(made: &[FileBytes], committed: &[FileBytes]) -> Report {
         figures,
         problems,
     }
+}
+
+/// Whether a figure is one of the paper's; ours have names, not numbers, and come after them.
+fn of_the_paper(id: &str) -> bool {
+    id.strip_prefix("fig").is_some_and(|number| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// A name cut into words and numbers, so that fig10 comes after fig9.
@@ -443,7 +448,7 @@ fn summary(figures: &[FigureReport]) -> Summary {
         s.panels += picture.panels.len();
         s.panels_beyond_ndsolve_limit += picture.panels.iter().filter(|p| !p.within_ndsolve_limit).count();
         // The paper's claims are about the paper's figures; our own pictures repeat some of them under other methods.
-        if picture.verdicts.is_empty() || !figure.id.starts_with("fig") {
+        if picture.verdicts.is_empty() || !of_the_paper(&figure.id) {
             continue;
         }
         let index = readings.iter().position(|r| r.reading == picture.reading).unwrap_or_else(|| {
