@@ -486,6 +486,10 @@ fn closed_orbits_of_the_paper() {
     for o in [&one, &three] {
         assert!(o.rate > 1e-5 && o.rate < 1e-4, "{o:?}");
     }
+    // The numbers that README quotes, to the digits it quotes.
+    let modulus = |o: &floquet::ClosedOrbit| o.multipliers.iter().map(|m| m[0].hypot(m[1])).fold(0.0, f64::max);
+    assert!((printed.period - 20.248).abs() < 5e-4 && (modulus(&printed) - 0.969).abs() < 5e-4, "{printed:?}");
+    assert!((one.rate - 2.6e-5).abs() < 5e-7 && (three.rate - 2.6e-5).abs() < 5e-7, "{one:?} {three:?}");
     // The dissipation is beta's: ten times beta, ten times the rate.
     for (returns, x, o) in [(1, 0.81, &one), (3, 1.21, &three)] {
         let strong = find(1e-1, 1e-4, returns, x, 0.0);

@@ -37,9 +37,16 @@ fn returns_to_the_singularity_and_stays_bounded() {
         let tenth = 0.1 * (high - low);
         assert!((a - low).abs() < tenth && (b - high).abs() < tenth, "component {i}: {a} {b}");
     }
-    // Distance scaled by the extents; a return: within 0.1 after more than 0.4 away.
-    let distance =
-        |x: &[f64; 3]| (0..3).map(|i| (x[i] - fold[i]) / (known[i].1 - known[i].0)).map(|d| d * d).sum::<f64>().sqrt();
+    // Distance scaled by each component's standard deviation over time (the notes do not say which scale they used; this one
+    // gives their count, the extents give 211). A return: within 0.1 after more than 0.4 away.
+    let moment = |f: &dyn Fn(&[f64; 3]) -> f64| {
+        late.windows(2).map(|w| (w[1].t - w[0].t) * f(&w[1].x)).sum::<f64>() / (late[late.len() - 1].t - late[0].t)
+    };
+    let scale: [f64; 3] = std::array::from_fn(|i| {
+        let mean = moment(&|x| x[i]);
+        moment(&|x| (x[i] - mean) * (x[i] - mean)).sqrt()
+    });
+    let distance = |x: &[f64; 3]| (0..3).map(|i| (x[i] - fold[i]) / scale[i]).map(|d| d * d).sum::<f64>().sqrt();
     let (mut away, mut returns, mut closest) = (false, 0, f64::INFINITY);
     for s in &late {
         let d = distance(&s.x);
@@ -52,7 +59,7 @@ fn returns_to_the_singularity_and_stays_bounded() {
         }
     }
     println!("{returns} returns, closest {closest:e}");
-    // About 178 in 200 time units with one program's scaling; the count depends on the scaling.
-    assert!((140..=215).contains(&returns), "{returns} returns");
-    assert!(closest < 3e-3, "{closest}");
+    // About 178 in 200 time units, closest about 1e-4. It is chaotic: 15 % is two standard errors of such a count.
+    assert!((151..=205).contains(&returns), "{returns} returns");
+    assert!(closest < 1e-3, "{closest}");
 }

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use twofold::figure::simulate::RunError;
 use twofold::figure::study::{Entry, Table};
 use twofold::figure::wording::number;
-use twofold::figure::{Figure, Picture, Reading, Study, View, cli};
+use twofold::figure::{Figure, Reading, Study, cli};
 use twofold::integrate::Failure;
 use twofold::integrate::filippov::limit::{ConvergenceRow, convergence, observed_rate};
 use twofold::integrate::filippov::{EventKind, FilippovError, FunnelGrid, Mode, Settings, Side, funnel};
@@ -302,30 +302,18 @@ fn draw(tables: &[Table]) -> Sheet {
 
 /// The figure's specification.
 pub fn figure() -> Figure {
-    let title = "Smoothed orbits and the Filippov motion as the switch steepens";
-    let picture = |reading: Reading, study| {
-        Picture {
-        name: format!("convergence-{}", reading.word()),
-        reading: Some(reading),
-        title,
-        caption: "(a) Distance between smoothed orbit and Filippov orbit at four times before the first visit to the singularity, \
+    Figure::studied_in_both_readings(
+        "convergence",
+        "Smoothed orbits and the Filippov motion as the switch steepens",
+        "(a) Distance between smoothed orbit and Filippov orbit at four times before the first visit to the singularity, \
                   against ε, with lines proportional to ε. (b) After the visit the Filippov motion is a set: where its members next cross \
                   the surface x = 0 far from the singularity, and where smoothed orbits cross it, in the plane of y and z. (c) Distance of \
-                  each smoothed crossing to the nearest member, beside the width of the set."
-            .into(),
-        view: View::Study(study),
-        panels: Vec::new(),
-        alterations: Vec::new(),
-    }
-    };
-    let printed = Study { question: || question(Reading::Printed), compute: || compute(Reading::Printed), draw };
-    let reconstructed =
-        Study { question: || question(Reading::Reconstructed), compute: || compute(Reading::Reconstructed), draw };
-    Figure {
-        id: "convergence",
-        title,
-        pictures: vec![picture(Reading::Printed, printed), picture(Reading::Reconstructed, reconstructed)],
-    }
+                  each smoothed crossing to the nearest member, beside the width of the set.",
+        [
+            Study { question: || question(Reading::Printed), compute: || compute(Reading::Printed), draw },
+            Study { question: || question(Reading::Reconstructed), compute: || compute(Reading::Reconstructed), draw },
+        ],
+    )
 }
 
 /// Makes the figure.

@@ -10,7 +10,7 @@ use twofold::figure::simulate::RunError;
 use twofold::figure::spec::Method;
 use twofold::figure::study::{Entry, Table};
 use twofold::figure::wording::number;
-use twofold::figure::{Figure, Picture, Reading, Study, View, cli};
+use twofold::figure::{Figure, Reading, Study, cli};
 use twofold::integrate::{Dopri5, Failure, Lsoda, Radau5, StepCap, Taylor, Tolerance};
 use twofold::model::{Caricature, Smoothed, Transition};
 use twofold::num::elementary::{exp10, log10};
@@ -338,29 +338,17 @@ fn footer(rows: &Table, visits: &Table, series: &[Series; 3]) -> Vec<String> {
 
 /// The figure's specification.
 pub fn figure() -> Figure {
-    let title = "The breakdown of determinism, in digits";
-    let picture = |reading: Reading, study| {
-        Picture {
-        name: format!("digits-{}", reading.word()),
-        reading: Some(reading),
-        title,
-        caption: "(a) Digits of each passage through y = 0 that a method gets right, against time; dashed lines mark visits to the \
+    Figure::studied_in_both_readings(
+        "digits",
+        "The breakdown of determinism, in digits",
+        "(a) Digits of each passage through y = 0 that a method gets right, against time; dashed lines mark visits to the \
                   singularity. (b) Growth of a small disturbance until the exit from the first visit, against ε, for disturbances made \
-                  near the singularity across and along the switching layer and for disturbances made at the start."
-            .into(),
-        view: View::Study(study),
-        panels: Vec::new(),
-        alterations: Vec::new(),
-    }
-    };
-    let printed = Study { question: || question(Reading::Printed), compute: || compute(Reading::Printed), draw };
-    let reconstructed =
-        Study { question: || question(Reading::Reconstructed), compute: || compute(Reading::Reconstructed), draw };
-    Figure {
-        id: "digits",
-        title,
-        pictures: vec![picture(Reading::Printed, printed), picture(Reading::Reconstructed, reconstructed)],
-    }
+                  near the singularity across and along the switching layer and for disturbances made at the start.",
+        [
+            Study { question: || question(Reading::Printed), compute: || compute(Reading::Printed), draw },
+            Study { question: || question(Reading::Reconstructed), compute: || compute(Reading::Reconstructed), draw },
+        ],
+    )
 }
 
 /// Makes the figure.

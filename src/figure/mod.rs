@@ -134,7 +134,25 @@ impl Reading {
 }
 
 impl Figure {
-    /// A figure with one picture per reading.
+    /// A figure with one study per reading, printed first.
+    pub fn studied_in_both_readings(id: &'static str, title: &'static str, caption: &str, studies: [Study; 2]) -> Self {
+        let pictures = Reading::ALL
+            .into_iter()
+            .zip(studies)
+            .map(|(reading, study)| Picture {
+                name: format!("{id}-{}", reading.word()),
+                reading: Some(reading),
+                title,
+                caption: caption.to_owned(),
+                view: View::Study(study),
+                panels: Vec::new(),
+                alterations: Vec::new(),
+            })
+            .collect();
+        Figure { id, title, pictures }
+    }
+
+    /// A figure with one picture of runs per reading.
     pub fn in_both_readings(
         id: &'static str,
         title: &'static str,
