@@ -10,8 +10,8 @@ use nalgebra::{SVector, vector};
 use twofold::integrate::{
     Dopri5, Failure, Flow, Lsoda, Observer, Radau5, Schedule, Statistics, Step, StepCap, Stepper, Tolerance, drive,
 };
-use twofold::model::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
 use twofold::num::elementary::exp10;
+use twofold::system::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
 
 const READINGS: [(&str, f64); 2] = [("printed", 1e-3), ("reconstructed", 1e-1)];
 

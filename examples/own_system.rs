@@ -5,21 +5,21 @@
 
 use nalgebra::{SVector, vector};
 use twofold::integrate::filippov::{ExitRule, FilippovError, Settings, Side, Trajectory, run};
-use twofold::model::PiecewiseSmooth;
-use twofold::num::Scalar;
+use twofold::num::Elementary;
+use twofold::system::PiecewiseSmooth;
 
 struct Refuge {
     prey_needed: f64,
 }
 
 impl PiecewiseSmooth<2> for Refuge {
-    fn switching<S: Scalar>(&self, x: &SVector<S, 2>) -> S {
+    fn switching<S: Elementary>(&self, x: &SVector<S, 2>) -> S {
         x[0] - S::from_f64(self.prey_needed)
     }
-    fn plus<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+    fn plus<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
         vector![x[0] - x[0] * x[1], x[0] * x[1] - x[1].scale(0.5)]
     }
-    fn minus<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+    fn minus<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
         vector![x[0], -x[1].scale(0.5)]
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Each `figN/main.rs` is both a binary of its own and a module here, so that a figure's numbers stand in one place.
 
-use twofold::figure::Figure;
+use twofold::paper::Figure;
 
 #[path = "convergence/main.rs"]
 mod convergence;

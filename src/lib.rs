@@ -7,15 +7,18 @@
 //!
 //! - [`num`]: arithmetic that results depend on. Elementary functions with the same bits everywhere, the scalar trait
 //!   over which equations are written, dual numbers, random numbers.
-//! - [`model`]: the paper's equations, one file each, no time stepping.
+//! - [`system`]: the equations, one file each, no time stepping.
 //! - [`integrate`]: time stepping. One file a method; a step carries its interpolant; one driver loop; restarts and kicks
 //!   are a schedule around a run.
-//! - [`observe`]: what is made of steps: paths, Poincaré sections, verdicts about attractors.
-//! - [`figure`]: figures as data, and the way from a spec to a picture.
+//! - [`analyse`]: what is made of steps: paths, Poincaré sections, exponents, closed orbits.
+//! - [`job`]: a question as data, its computation, its answer.
+//! - [`paper`]: what speaks of this paper: readings, claims, figures as data.
+//! - [`draw`]: drawings from answers. [`compare`]: two pictures, point by point. [`report`]: the page about everything.
+//! - [`cli`]: flags, progress, errors in words.
 //! - [`render`]: the only user of plotters: one drawing, three formats.
 //! - [`record`]: the only user of files: hashes, manifests, all-or-nothing writes.
 //!
-//! A figure goes spec -> [`figure::pipeline`] -> [`figure::simulate`] -> [`figure::drawing`] -> [`mod@render`] -> [`record`].
+//! A figure goes spec -> [`paper::pipeline`] -> [`mod@job::simulate`] -> [`paper::drawing`] -> [`mod@render`] -> [`record`].
 //!
 //! # Walls
 //!
@@ -35,7 +38,8 @@
 //! # In five lines
 //!
 //! ```
-//! use twofold::figure::{Reading, simulate::simulate, spec::*};
+//! use twofold::job::{simulate::simulate, spec::*};
+//! use twofold::paper::Reading;
 //! let run = RunSpec {
 //!     system: SystemSpec::Caricature(Reading::Reconstructed.caricature()),
 //!     switch: SwitchSpec::tanh(1e-3),
@@ -47,14 +51,19 @@
 //! };
 //! let recording = simulate(&run, &())?;
 //! assert!(recording.data.len() >= 3);
-//! # Ok::<(), twofold::figure::simulate::RunError>(())
+//! # Ok::<(), twofold::job::simulate::RunError>(())
 //! ```
 #![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
 
-pub mod figure;
+pub mod analyse;
+pub mod cli;
+pub mod compare;
+pub mod draw;
 pub mod integrate;
-pub mod model;
+pub mod job;
 pub mod num;
-pub mod observe;
+pub mod paper;
 pub mod record;
 pub mod render;
+pub mod report;
+pub mod system;

@@ -34,7 +34,8 @@ fn room(name: &str) -> Vec<(String, String)> {
         .collect()
 }
 
-const ROOMS: [&str; 7] = ["num", "model", "integrate", "observe", "figure", "render", "record"];
+const ROOMS: [&str; 12] =
+    ["num", "system", "integrate", "analyse", "record", "job", "render", "compare", "draw", "paper", "report", "cli"];
 
 /// Whether `code` names the library `name` as the head of a path.
 fn names(code: &str, name: &str) -> bool {
@@ -60,12 +61,15 @@ fn forbid(from: &str, rooms: &[&str]) {
 
 #[test]
 fn rooms_import_only_what_they_may() {
-    forbid("num", &["model", "integrate", "observe", "figure", "render", "record"]);
-    forbid("model", &["integrate", "observe", "figure", "render", "record"]);
-    forbid("integrate", &["observe", "figure", "render", "record"]);
-    forbid("observe", &["figure", "render", "record"]);
-    forbid("render", &["model", "integrate", "observe", "figure", "record"]);
-    forbid("record", &["model", "integrate", "observe", "figure", "render"]);
+    forbid(
+        "num",
+        &["system", "integrate", "analyse", "record", "job", "render", "compare", "draw", "paper", "report", "cli"],
+    );
+    forbid("system", &["integrate", "analyse", "record", "job", "render", "compare", "draw", "paper", "report", "cli"]);
+    forbid("integrate", &["analyse", "record", "job", "render", "compare", "draw", "paper", "report", "cli"]);
+    forbid("analyse", &["record", "job", "render", "compare", "draw", "paper", "report", "cli"]);
+    forbid("render", &["system", "integrate", "analyse", "record", "job", "compare", "draw", "paper", "report", "cli"]);
+    forbid("record", &["system", "integrate", "analyse", "job", "render", "compare", "draw", "paper", "report", "cli"]);
 }
 
 #[test]
@@ -114,8 +118,8 @@ fn no_clock_but_for_progress() {
 #[test]
 fn the_detector_detects() {
     // A wall test that cannot see an import would pass for ever.
-    assert!(imports("use crate::figure::spec::RunSpec;", "figure"));
+    assert!(imports("use crate::job::spec::RunSpec;", "job"));
     assert!(names("let x = libm::exp(1.0);", "libm"));
     assert!(!names("let x = my_libm::exp(1.0);", "libm"));
-    assert!(room("figure").iter().any(|(_, code)| imports(code, "integrate")));
+    assert!(room("job").iter().any(|(_, code)| imports(code, "integrate")));
 }

@@ -2,18 +2,18 @@
 #![allow(clippy::disallowed_methods)] // exact solutions are compared to tolerances, not hashed
 
 use nalgebra::{SVector, vector};
+use twofold::analyse::attractor::{Claim, Evidence, Question, SectionPoint, Thresholds, Verdict, classify};
+use twofold::analyse::floquet::{self, Plane, closed_orbit};
+use twofold::analyse::lyapunov::{self, largest};
 use twofold::integrate::{Dopri5, Flow, Ignore, Observer, Schedule, Step, StepCap, Tolerance, drive, roots};
-use twofold::model::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
-use twofold::num::Scalar;
+use twofold::num::Elementary;
 use twofold::num::random::RandomStream;
-use twofold::observe::attractor::{Claim, Evidence, Question, SectionPoint, Thresholds, Verdict, classify};
-use twofold::observe::floquet::{self, Plane, closed_orbit};
-use twofold::observe::lyapunov::{self, largest};
+use twofold::system::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
 
 /// Lorenz (1963) at sigma = 10, rho = 28, beta = 8/3.
 struct Lorenz;
 impl VectorField<3> for Lorenz {
-    fn eval<S: Scalar>(&self, s: &SVector<S, 3>) -> SVector<S, 3> {
+    fn eval<S: Elementary>(&self, s: &SVector<S, 3>) -> SVector<S, 3> {
         let [x, y, z] = [s[0], s[1], s[2]];
         vector![(y - x).scale(10.0), x * (S::from_f64(28.0) - z) - y, x * y - z.scale(8.0 / 3.0)]
     }
@@ -22,7 +22,7 @@ impl VectorField<3> for Lorenz {
 /// Rossler (1976) at a = b = 0.2 and the given c.
 struct Rossler(f64);
 impl VectorField<3> for Rossler {
-    fn eval<S: Scalar>(&self, s: &SVector<S, 3>) -> SVector<S, 3> {
+    fn eval<S: Elementary>(&self, s: &SVector<S, 3>) -> SVector<S, 3> {
         let [x, y, z] = [s[0], s[1], s[2]];
         vector![-y - z, x + y.scale(0.2), S::from_f64(0.2) + z * (x - S::from_f64(self.0))]
     }
@@ -31,7 +31,7 @@ impl VectorField<3> for Rossler {
 /// van der Pol (1926) at mu = 1.
 struct VanDerPol;
 impl VectorField<2> for VanDerPol {
-    fn eval<S: Scalar>(&self, s: &SVector<S, 2>) -> SVector<S, 2> {
+    fn eval<S: Elementary>(&self, s: &SVector<S, 2>) -> SVector<S, 2> {
         vector![s[1], (S::one() - s[0] * s[0]) * s[1] - s[0]]
     }
 }
@@ -44,7 +44,7 @@ struct Torus {
     gamma: f64,
 }
 impl VectorField<3> for Torus {
-    fn eval<S: Scalar>(&self, s: &SVector<S, 3>) -> SVector<S, 3> {
+    fn eval<S: Elementary>(&self, s: &SVector<S, 3>) -> SVector<S, 3> {
         let [x, y, z] = [s[0], s[1], s[2]];
         let r = (x * x + y * y).sqrt();
         let d = r - S::from_f64(2.0);
@@ -188,7 +188,7 @@ fn van_der_pol() {
     // equation beside the orbit.
     struct WithDivergence;
     impl VectorField<3> for WithDivergence {
-        fn eval<S: Scalar>(&self, s: &SVector<S, 3>) -> SVector<S, 3> {
+        fn eval<S: Elementary>(&self, s: &SVector<S, 3>) -> SVector<S, 3> {
             let f = VanDerPol.eval(&vector![s[0], s[1]]);
             vector![f[0], f[1], S::one() - s[0] * s[0]]
         }

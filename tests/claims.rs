@@ -4,9 +4,9 @@
 #[path = "../figures/catalogue.rs"]
 mod catalogue;
 
-use twofold::figure::Reading;
-use twofold::figure::simulate::{Data, simulate};
-use twofold::observe::{Crossing, Direction};
+use twofold::analyse::{Crossing, Direction};
+use twofold::job::simulate::{Data, simulate};
+use twofold::paper::Reading;
 
 /// The late half of every panel of fig. 7 in a reading.
 fn late_halves(reading: Reading) -> Vec<Vec<Crossing>> {

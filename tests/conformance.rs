@@ -4,13 +4,13 @@
 use nalgebra::{SVector, vector};
 use proptest::prelude::*;
 use twofold::integrate::*;
-use twofold::model::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
-use twofold::num::Scalar;
+use twofold::num::Elementary;
+use twofold::system::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
 
 /// x' = y, y' = -x.
 struct Oscillator;
 impl VectorField<2> for Oscillator {
-    fn eval<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+    fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
         vector![x[1], -x[0]]
     }
 }
@@ -18,7 +18,7 @@ impl VectorField<2> for Oscillator {
 /// x' = x^2: leaves every bound at t = 1/x(0).
 struct Explosion;
 impl VectorField<1> for Explosion {
-    fn eval<S: Scalar>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
+    fn eval<S: Elementary>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
         vector![x[0] * x[0]]
     }
 }

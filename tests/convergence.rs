@@ -6,8 +6,8 @@
 use nalgebra::{Matrix3, SVector, matrix, vector};
 use proptest::prelude::*;
 use twofold::integrate::{Dopri5, Failure, Lsoda, Radau5, Statistics, Stepper, Tolerance};
-use twofold::model::{Caricature, Hysteretic, Relaxation, VectorField};
-use twofold::num::Scalar;
+use twofold::num::Elementary;
+use twofold::system::{Caricature, Hysteretic, Relaxation, VectorField};
 
 /// x' = S diag(-rates) S^-1 x, with a well-conditioned S.
 struct Linear {
@@ -24,7 +24,7 @@ impl Linear {
 }
 
 impl VectorField<3> for Linear {
-    fn eval<T: Scalar>(&self, x: &SVector<T, 3>) -> SVector<T, 3> {
+    fn eval<T: Elementary>(&self, x: &SVector<T, 3>) -> SVector<T, 3> {
         SVector::from_fn(|i, _| {
             let m = |j: usize| x[j].scale(self.matrix[(i, j)]);
             m(0) + m(1) + m(2)
@@ -79,7 +79,7 @@ proptest! {
 fn oscillations_stay_with_adams() {
     struct Oscillator;
     impl VectorField<2> for Oscillator {
-        fn eval<T: Scalar>(&self, x: &SVector<T, 2>) -> SVector<T, 2> {
+        fn eval<T: Elementary>(&self, x: &SVector<T, 2>) -> SVector<T, 2> {
             vector![x[1].scale(50.0), x[0].scale(-50.0)]
         }
     }
@@ -101,7 +101,7 @@ fn oscillations_stay_with_adams() {
 fn leaving_the_domain_is_named() {
     struct Draining;
     impl VectorField<1> for Draining {
-        fn eval<T: Scalar>(&self, x: &SVector<T, 1>) -> SVector<T, 1> {
+        fn eval<T: Elementary>(&self, x: &SVector<T, 1>) -> SVector<T, 1> {
             vector![-x[0].sqrt()]
         }
     }
@@ -160,7 +160,7 @@ fn hysteretic_chatter_is_the_solution() {
 fn known_bits() {
     struct Lorenz;
     impl VectorField<3> for Lorenz {
-        fn eval<T: Scalar>(&self, x: &SVector<T, 3>) -> SVector<T, 3> {
+        fn eval<T: Elementary>(&self, x: &SVector<T, 3>) -> SVector<T, 3> {
             vector![
                 (x[1] - x[0]).scale(10.0),
                 x[0] * (T::from_f64(28.0) - x[2]) - x[1],

@@ -1,10 +1,10 @@
 //! Cross-validation against crossings computed in 113-bit arithmetic outside this project (tests/data/crossings-*.csv).
 
-use twofold::figure::simulate::{Data, simulate};
-use twofold::figure::spec::*;
+use twofold::analyse::Direction;
 use twofold::integrate::{Schedule, StepCap, Tolerance};
-use twofold::model::Caricature;
-use twofold::observe::Direction;
+use twofold::job::simulate::{Data, simulate};
+use twofold::job::spec::*;
+use twofold::system::Caricature;
 
 struct Reference {
     t: f64,
@@ -29,7 +29,7 @@ fn reference(text: &str) -> Vec<Reference> {
         .collect()
 }
 
-fn run(alpha: f64, method: Method, tolerance: f64, t_end: f64) -> Vec<twofold::observe::Crossing> {
+fn run(alpha: f64, method: Method, tolerance: f64, t_end: f64) -> Vec<twofold::analyse::Crossing> {
     let spec = RunSpec {
         system: SystemSpec::Caricature(Caricature::with_reinjection(alpha, 1e-5)),
         switch: SwitchSpec::tanh(1e-3),

@@ -3,13 +3,13 @@
 
 use nalgebra::{SVector, vector};
 use twofold::integrate::{Dopri5, Stepper, Tolerance};
-use twofold::model::VectorField;
-use twofold::num::Scalar;
+use twofold::num::Elementary;
+use twofold::system::VectorField;
 
 /// x' = -2 s x, s' = 1: x = exp(-s^2).
 struct Bell;
 impl VectorField<2> for Bell {
-    fn eval<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+    fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
         vector![(-x[1] * x[0]).scale(2.0), S::one()]
     }
 }

@@ -8,8 +8,8 @@ use twofold::integrate::filippov::{
     End, EventKind, ExitRule, FilippovError, FunnelGrid, Mode, Settings, Side, SlidingLaw, Trajectory, connect, funnel,
     history, run,
 };
-use twofold::model::filippov::Visibility;
-use twofold::model::{Caricature, Feedback, PiecewiseSmooth, Relay, StickSlip, TwoFoldNormalForm, Wheel};
+use twofold::system::filippov::Visibility;
+use twofold::system::{Caricature, Feedback, PiecewiseSmooth, Relay, StickSlip, TwoFoldNormalForm, Wheel};
 
 const STAY: ExitRule = ExitRule::AfterTime { time: 1e9, side: Side::Plus };
 
@@ -109,7 +109,7 @@ fn caricature_passes_the_two_fold_several_times() {
 #[test]
 fn the_misprinted_sign_never_returns() {
     // SCIENCE.md section 1: with -z the orbit sticks to a point and never returns.
-    use twofold::model::caricature::MinusSign;
+    use twofold::system::caricature::MinusSign;
     let c = Caricature {
         first_component_of_minus: MinusSign::PrintedInEquation5,
         ..Caricature::with_reinjection(1e-3, 1e-5)
@@ -495,13 +495,13 @@ fn a_step_that_straddles_two_crossings_misses_none() {
         b: f64,
     }
     impl PiecewiseSmooth<2> for Parabola {
-        fn switching<S: twofold::num::Scalar>(&self, x: &SVector<S, 2>) -> S {
+        fn switching<S: twofold::num::Elementary>(&self, x: &SVector<S, 2>) -> S {
             x[0]
         }
-        fn plus<S: twofold::num::Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        fn plus<S: twofold::num::Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
             vector![x[1].scale(2.0) - S::from_f64(self.a + self.b), S::one()]
         }
-        fn minus<S: twofold::num::Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        fn minus<S: twofold::num::Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
             self.plus(x)
         }
     }
@@ -521,7 +521,7 @@ fn a_step_that_straddles_two_crossings_misses_none() {
 #[test]
 fn reversed_time_leads_back() {
     // A repelling sliding orbit of the system is an attracting one of the reversed system, through the same points.
-    use twofold::model::Reversed;
+    use twofold::system::Reversed;
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     let mut forward = Trajectory::new(1);
     let rule = ExitRule::AfterTime { time: 0.9, side: Side::Plus };

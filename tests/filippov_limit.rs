@@ -3,7 +3,7 @@
 use nalgebra::vector;
 use twofold::integrate::filippov::limit::{after_visit, convergence, observed_rate};
 use twofold::integrate::filippov::{FilippovError, FunnelGrid, Mode, Settings};
-use twofold::model::Caricature;
+use twofold::system::Caricature;
 
 #[test]
 fn smoothed_orbits_converge_at_first_order_before_the_first_visit() {

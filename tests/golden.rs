@@ -8,10 +8,10 @@ mod catalogue;
 use std::fs;
 use std::path::Path;
 
-use twofold::figure::cli::in_pool;
-use twofold::figure::pipeline::{Computed, compute};
-use twofold::figure::progress::Progress;
-use twofold::figure::{Alterations, Figure};
+use twofold::cli::in_pool;
+use twofold::cli::progress::Progress;
+use twofold::paper::pipeline::{Computed, compute};
+use twofold::paper::{Alterations, Figure};
 use twofold::record::{Hash, Manifest};
 
 fn manifest(figure: &Figure) -> Manifest {
@@ -110,7 +110,7 @@ fn specs_survive_json() {
     for picture in catalogue::all().iter().flat_map(|f| &f.pictures) {
         for panel in &picture.panels {
             let text = serde_json::to_string(&panel.run).unwrap();
-            let back: twofold::figure::spec::RunSpec = serde_json::from_str(&text).unwrap();
+            let back: twofold::job::spec::RunSpec = serde_json::from_str(&text).unwrap();
             assert_eq!(back, panel.run, "{} ({})", picture.name, panel.label);
             panel.run.validate().unwrap();
         }

@@ -9,8 +9,8 @@ use std::process::Output;
 use assert_cmd::Command;
 use common::{copy, figures, small_figure, write_references};
 use serde_json::Value;
-use twofold::figure::cli;
-use twofold::figure::progress::Progress;
+use twofold::cli;
+use twofold::cli::progress::Progress;
 use twofold::render::{decode_png, encode_png};
 
 fn twofold(arguments: &[&str]) -> Output {

@@ -1,12 +1,12 @@
 //! Eq. (5) prints f- = (-z, ...), eq. (4) prints (z, ...). Only +z makes the origin the two-fold that the paper describes.
 
 use nalgebra::vector;
-use twofold::figure::Reading;
-use twofold::figure::simulate::{Data, simulate};
-use twofold::figure::spec::*;
 use twofold::integrate::{Schedule, StepCap, Tolerance};
-use twofold::model::caricature::MinusSign;
-use twofold::model::filippov::{Visibility, sliding_field, two_fold};
+use twofold::job::simulate::{Data, simulate};
+use twofold::job::spec::*;
+use twofold::paper::Reading;
+use twofold::system::caricature::MinusSign;
+use twofold::system::filippov::{Visibility, sliding_field, two_fold};
 
 fn run(sign: MinusSign, t_end: f64) -> ([f64; 3], usize) {
     let mut system = Reading::Printed.caricature();

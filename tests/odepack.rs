@@ -15,7 +15,7 @@ use data::{Reference, ReferenceProblem, ReferenceRun, reference};
 use problems::{Problem, Visit, for_each};
 use twofold::integrate::lsoda::{Family, Lsoda, Switch};
 use twofold::integrate::{Radau5, Statistics, Stepper, Tolerance};
-use twofold::model::VectorField;
+use twofold::system::VectorField;
 
 /// What our LSODA did.
 struct Ours {

@@ -10,9 +10,9 @@ use std::process::Output;
 use assert_cmd::Command;
 use common::{copy, figures, schema, write_references};
 use serde_json::Value;
-use twofold::figure::report::{Links, Reference, Report, assemble, page};
 use twofold::record::{Hash, read_tree};
 use twofold::render::{Pixels, decode_png, encode_png};
+use twofold::report::{Links, Reference, Report, assemble, page};
 
 fn twofold(arguments: &[&str]) -> Output {
     Command::cargo_bin("twofold").unwrap().args(arguments).output().unwrap()
@@ -446,7 +446,7 @@ fn the_citation_file_agrees_with_the_crate() {
     for line in [
         "cff-version: 1.2.0".to_owned(),
         format!("version: {}", env!("CARGO_PKG_VERSION")),
-        format!("date-released: {}", twofold::figure::report::RELEASE_DATE),
+        format!("date-released: {}", twofold::report::RELEASE_DATE),
     ] {
         assert!(text.lines().any(|l| l == line), "CITATION.cff has no line \"{line}\"");
     }

@@ -2,11 +2,11 @@
 //! arithmetic outside this project (tests/data/crossings-*.csv).
 
 use nalgebra::{SVector, vector};
+use twofold::analyse::Direction;
+use twofold::analyse::digits::{Agreement, ExtendedCrossing, Plane, agreement, amplification, reference};
 use twofold::integrate::*;
-use twofold::model::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField, Wheel};
-use twofold::num::{DoubleDouble, Scalar};
-use twofold::observe::Direction;
-use twofold::observe::digits::{Agreement, ExtendedCrossing, Plane, agreement, amplification, reference};
+use twofold::num::{Arithmetic, DoubleDouble, Scalar};
+use twofold::system::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField, Wheel};
 
 struct Row {
     t: f64,

@@ -1,11 +1,11 @@
 //! The reconstructed wheel at full length, against the statistics measured outside this project. It is chaotic: statistics are
 //! compared, never points.
 
-use twofold::figure::simulate::{Data, simulate};
-use twofold::figure::spec::*;
 use twofold::integrate::{Schedule, StepCap, Tolerance};
-use twofold::model::Wheel;
-use twofold::model::filippov::two_fold;
+use twofold::job::simulate::{Data, simulate};
+use twofold::job::spec::*;
+use twofold::system::Wheel;
+use twofold::system::filippov::two_fold;
 
 #[test]
 fn returns_to_the_singularity_and_stays_bounded() {

@@ -4,20 +4,21 @@
 use nalgebra::SVector;
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use twofold::figure::simulate::RunError;
-use twofold::figure::study::{Entry, Table};
-use twofold::figure::wording::number;
-use twofold::figure::{Figure, Reading, Study, cli};
+use twofold::analyse::digits::{Plane, reference};
+use twofold::cli;
 use twofold::integrate::Failure;
 use twofold::integrate::filippov::limit::{ConvergenceRow, convergence, observed_rate};
 use twofold::integrate::filippov::{EventKind, FilippovError, FunnelGrid, Mode, Settings, Side, funnel};
-use twofold::model::filippov::{Region, region};
-use twofold::model::{Smoothed, Transition};
+use twofold::job::simulate::RunError;
+use twofold::job::table::{Entry, Table};
 use twofold::num::elementary::pow;
-use twofold::num::{DoubleDouble, Scalar};
-use twofold::observe::digits::{Plane, reference};
+use twofold::num::{Arithmetic, DoubleDouble, Scalar};
+use twofold::paper::wording::number;
+use twofold::paper::{Figure, Reading, Study};
 use twofold::render::sheet::*;
 use twofold::render::style;
+use twofold::system::filippov::{Region, region};
+use twofold::system::{Smoothed, Transition};
 
 /// The start of the paper's runs.
 const START: [f64; 3] = [0.2, 0.0, -1.0];

@@ -6,20 +6,21 @@
 use nalgebra::SVector;
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use twofold::figure::simulate::RunError;
-use twofold::figure::spec::Method;
-use twofold::figure::study::{Entry, Table};
-use twofold::figure::wording::number;
-use twofold::figure::{Figure, Reading, Study, cli};
-use twofold::integrate::{Dopri5, Failure, Lsoda, Radau5, StepCap, Taylor, Tolerance};
-use twofold::model::{Caricature, Smoothed, Transition};
-use twofold::num::elementary::{exp10, log10};
-use twofold::num::{DoubleDouble, Scalar};
-use twofold::observe::digits::{
+use twofold::analyse::digits::{
     Agreement, ExtendedCrossing, ExtendedPoint, Plane, agreement, amplification, reference,
 };
+use twofold::cli;
+use twofold::integrate::{Dopri5, Failure, Lsoda, Radau5, StepCap, Taylor, Tolerance};
+use twofold::job::simulate::RunError;
+use twofold::job::spec::Method;
+use twofold::job::table::{Entry, Table};
+use twofold::num::elementary::{exp10, log10};
+use twofold::num::{Arithmetic, DoubleDouble, Scalar};
+use twofold::paper::wording::number;
+use twofold::paper::{Figure, Reading, Study};
 use twofold::render::sheet::*;
 use twofold::render::style;
+use twofold::system::{Caricature, Smoothed, Transition};
 
 /// The start of the paper's runs.
 const START: [f64; 3] = [0.2, 0.0, -1.0];

@@ -1,9 +1,10 @@
-//! Fig. 1: the wheel assembly. A reconstruction: see `twofold::model::wheel`.
+//! Fig. 1: the wheel assembly. A reconstruction: see `twofold::system::wheel`.
 
 use serde_json::json;
-use twofold::figure::sketch::assembly;
-use twofold::figure::{Figure, Picture, Study, View, cli};
-use twofold::model::Wheel;
+use twofold::cli;
+use twofold::draw::sketch::assembly;
+use twofold::paper::{Figure, Picture, Study, View};
+use twofold::system::Wheel;
 
 /// Where on its line the wheel is drawn.
 const R: f64 = 0.69267;

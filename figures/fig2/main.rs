@@ -1,9 +1,10 @@
-//! Fig. 2: the wheel assembly, smoothed. A reconstruction: see `twofold::model::wheel`.
+//! Fig. 2: the wheel assembly, smoothed. A reconstruction: see `twofold::system::wheel`.
 
-use twofold::figure::spec::*;
-use twofold::figure::{Camera, Figure, Panel, Picture, View, cli};
+use twofold::cli;
 use twofold::integrate::{Schedule, StepCap, Tolerance};
-use twofold::model::Wheel;
+use twofold::job::spec::*;
+use twofold::paper::{Camera, Figure, Panel, Picture, View};
+use twofold::system::Wheel;
 
 /// The figure's specification.
 pub fn figure() -> Figure {

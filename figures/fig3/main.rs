@@ -1,8 +1,9 @@
 //! Fig. 3: the two-fold (Teixeira) singularity of the normal form (4).
 
 use serde_json::json;
-use twofold::figure::sketch::portrait;
-use twofold::figure::{Figure, Picture, Study, View, cli};
+use twofold::cli;
+use twofold::draw::sketch::portrait;
+use twofold::paper::{Figure, Picture, Study, View};
 
 /// The constants v, w < 0 with vw > 1: the paper's v+ and v-.
 const V: f64 = -1.2;

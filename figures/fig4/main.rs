@@ -1,10 +1,11 @@
 //! Fig. 4: the mechanism of non-deterministic chaos, computed: a singularity with one way in, and its many ways out that come
 //! back.
 
-use twofold::figure::spec::*;
-use twofold::figure::{Camera, Figure, Panel, Reading, View, cli};
+use twofold::cli;
 use twofold::integrate::filippov::ExitRule;
 use twofold::integrate::{Schedule, StepCap, Tolerance};
+use twofold::job::spec::*;
+use twofold::paper::{Camera, Figure, Panel, Reading, View};
 
 /// The figure's specification.
 pub fn figure() -> Figure {

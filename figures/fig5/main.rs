@@ -1,9 +1,10 @@
 //! Fig. 5: a typical trajectory of the discontinuous system (5).
 
-use twofold::figure::spec::*;
-use twofold::figure::{Camera, Figure, Panel, Reading, View, cli};
+use twofold::cli;
 use twofold::integrate::filippov::{ExitRule, SlidingLaw};
 use twofold::integrate::{Schedule, StepCap, Tolerance};
+use twofold::job::spec::*;
+use twofold::paper::{Camera, Figure, Panel, Reading, View};
 
 /// The figure's specification.
 pub fn figure() -> Figure {

@@ -1,10 +1,11 @@
 //! Fig. 6: single trajectories, smoothed, hysteretic, and with noise.
 
-use twofold::figure::spec::*;
-use twofold::figure::verdict::Claim;
-use twofold::figure::{Camera, Figure, Panel, View, cli};
+use twofold::cli;
 use twofold::integrate::{Kick, KickLaw, Schedule};
-use twofold::model::Relaxation;
+use twofold::job::spec::*;
+use twofold::paper::verdict::Claim;
+use twofold::paper::{Camera, Figure, Panel, View};
+use twofold::system::Relaxation;
 
 /// The figure's specification.
 pub fn figure() -> Figure {

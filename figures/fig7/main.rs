@@ -1,9 +1,10 @@
 //! Fig. 7: Poincare sections of the smoothed system, restarted after every interval.
 
-use twofold::figure::spec::*;
-use twofold::figure::verdict::{Claim, SectionClaim};
-use twofold::figure::{Figure, Panel, View, cli};
+use twofold::cli;
 use twofold::integrate::Schedule;
+use twofold::job::spec::*;
+use twofold::paper::verdict::{Claim, SectionClaim};
+use twofold::paper::{Figure, Panel, View};
 
 /// The figure's specification.
 pub fn figure() -> Figure {

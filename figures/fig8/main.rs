@@ -1,10 +1,11 @@
 //! Fig. 8: fig. 7(iii) with a perturbed transition function.
 
-use twofold::figure::spec::*;
-use twofold::figure::verdict::{Claim, SectionClaim};
-use twofold::figure::{Figure, Panel, View, cli};
+use twofold::cli;
 use twofold::integrate::Schedule;
-use twofold::model::Transition;
+use twofold::job::spec::*;
+use twofold::paper::verdict::{Claim, SectionClaim};
+use twofold::paper::{Figure, Panel, View};
+use twofold::system::Transition;
 
 /// The figure's specification.
 pub fn figure() -> Figure {

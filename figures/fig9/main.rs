@@ -3,11 +3,12 @@
 //! The caption says (i) hysteresis, (ii)-(iii) noise; the text's "(9(iii)) chaotic ... washed out by noise (9(i-ii))" has the
 //! opposite order. The caption is followed.
 
-use twofold::figure::spec::*;
-use twofold::figure::verdict::{Claim, SectionClaim};
-use twofold::figure::{Figure, Panel, View, cli};
+use twofold::cli;
 use twofold::integrate::{Kick, KickLaw, Schedule};
-use twofold::model::Relaxation;
+use twofold::job::spec::*;
+use twofold::paper::verdict::{Claim, SectionClaim};
+use twofold::paper::{Figure, Panel, View};
+use twofold::system::Relaxation;
 
 /// The figure's specification.
 pub fn figure() -> Figure {

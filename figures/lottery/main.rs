@@ -2,10 +2,11 @@
 //!
 //! Each column is one of fig. 7's panels, each row a method. Same equations, same start, same tolerance.
 
-use twofold::figure::spec::*;
-use twofold::figure::verdict::{Claim, SectionClaim};
-use twofold::figure::{Figure, Panel, View, cli};
+use twofold::cli;
 use twofold::integrate::Schedule;
+use twofold::job::spec::*;
+use twofold::paper::verdict::{Claim, SectionClaim};
+use twofold::paper::{Figure, Panel, View};
 
 /// The figure's specification.
 pub fn figure() -> Figure {

@@ -3,7 +3,7 @@
 use nalgebra::SVector;
 use serde::Deserialize;
 use twofold::integrate::{Dopri5, Failure, Lsoda, Radau5, Statistics, Stepper, Tolerance};
-use twofold::model::VectorField;
+use twofold::system::VectorField;
 
 use super::problems::{Problem, Visit, for_each};
 

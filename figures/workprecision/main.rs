@@ -7,10 +7,11 @@ mod data;
 mod problems;
 
 use serde_json::{Value, json};
-use twofold::figure::simulate::RunError;
-use twofold::figure::study::{Entry, Table};
-use twofold::figure::wording::number;
-use twofold::figure::{Figure, Picture, Study, View, cli};
+use twofold::cli;
+use twofold::job::simulate::RunError;
+use twofold::job::table::{Entry, Table};
+use twofold::paper::wording::number;
+use twofold::paper::{Figure, Picture, Study, View};
 use twofold::record::Hash;
 use twofold::render::sheet::*;
 use twofold::render::style;

@@ -2,8 +2,8 @@
 //! scripts/odepack_reference.py.
 
 use nalgebra::{SVector, vector};
-use twofold::model::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
-use twofold::num::Scalar;
+use twofold::num::Elementary;
+use twofold::system::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
 
 /// An initial value problem with a name.
 pub struct Problem<F, const N: usize> {
@@ -25,7 +25,7 @@ pub trait Visit {
 pub struct Robertson;
 
 impl VectorField<3> for Robertson {
-    fn eval<S: Scalar>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+    fn eval<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
         let [a, b, c] = [x[0], x[1], x[2]];
         let slow = a.scale(0.04);
         let back = b.scale(1e4) * c;
@@ -41,7 +41,7 @@ pub struct VanDerPol {
 }
 
 impl VectorField<2> for VanDerPol {
-    fn eval<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+    fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
         vector![x[1], (S::one() - x[0] * x[0]).scale(self.mu) * x[1] - x[0]]
     }
 }
@@ -50,7 +50,7 @@ impl VectorField<2> for VanDerPol {
 pub struct Oregonator;
 
 impl VectorField<3> for Oregonator {
-    fn eval<S: Scalar>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+    fn eval<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
         let [a, b, c] = [x[0], x[1], x[2]];
         vector![
             (b + a * (S::one() - a.scale(8.375e-6) - b)).scale(77.27),
@@ -64,7 +64,7 @@ impl VectorField<3> for Oregonator {
 pub struct Hires;
 
 impl VectorField<8> for Hires {
-    fn eval<S: Scalar>(&self, y: &SVector<S, 8>) -> SVector<S, 8> {
+    fn eval<S: Elementary>(&self, y: &SVector<S, 8>) -> SVector<S, 8> {
         let r = y[5].scale(280.0) * y[7];
         SVector::from([
             y[1].scale(0.43) - y[0].scale(1.71) + y[2].scale(8.32) + S::from_f64(0.0007),
@@ -83,7 +83,7 @@ impl VectorField<8> for Hires {
 pub struct Lorenz;
 
 impl VectorField<3> for Lorenz {
-    fn eval<S: Scalar>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+    fn eval<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
         vector![
             (x[1] - x[0]).scale(10.0),
             x[0] * (S::from_f64(28.0) - x[2]) - x[1],

@@ -4,8 +4,8 @@
 use nalgebra::SVector;
 
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
-use crate::model::VectorField;
 use crate::num::elementary::{pow, sqrt};
+use crate::system::VectorField;
 
 /// Dormand & Prince (1980), table 2.
 mod tableau {

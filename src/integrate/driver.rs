@@ -4,7 +4,7 @@ use nalgebra::SVector;
 
 use super::schedule::{Kicker, Schedule, StepCap};
 use super::step::{Failure, Flow, Statistics, Step, Stepper};
-use crate::model::VectorField;
+use crate::system::VectorField;
 
 /// Receives a run as it happens.
 pub trait Observer<const N: usize> {

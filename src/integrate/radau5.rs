@@ -10,8 +10,8 @@ use nalgebra::{Complex, Matrix3, SMatrix, SVector, Vector3};
 
 use super::linear::Lu;
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
-use crate::model::{VectorField, jacobian};
 use crate::num::elementary::{pow, sqrt};
+use crate::system::{VectorField, jacobian};
 
 /// The method's numbers, each from its definition.
 #[derive(Clone, Debug)]
@@ -467,7 +467,7 @@ impl<const N: usize> Stepper<N> for Radau5<N> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::num::Scalar;
+    use crate::num::Elementary;
 
     /// The numbers that Hairer & Wanner (1996), sec. IV.8, print.
     #[test]
@@ -495,7 +495,7 @@ mod tests {
     /// x' = -x^2, x = 1/(1 + t).
     struct Hyperbola;
     impl VectorField<1> for Hyperbola {
-        fn eval<S: Scalar>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
+        fn eval<S: Elementary>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
             SVector::from([-x[0].squared()])
         }
     }
@@ -503,7 +503,7 @@ mod tests {
     /// The circle, on which energy is conserved and every derivative is known.
     struct Circle;
     impl VectorField<2> for Circle {
-        fn eval<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
             SVector::from([-x[1], x[0]])
         }
     }
@@ -511,7 +511,7 @@ mod tests {
     /// Prothero & Robinson (1974): x' = -lambda (x - cos t) - sin t, with t as a state.
     struct ProtheroRobinson(f64);
     impl VectorField<2> for ProtheroRobinson {
-        fn eval<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
             SVector::from([(x[1].cos() - x[0]).scale(self.0) - x[1].sin(), S::one()])
         }
     }
@@ -628,7 +628,7 @@ mod tests {
     fn a_pole_is_a_named_failure() {
         struct Explosion;
         impl VectorField<1> for Explosion {
-            fn eval<S: Scalar>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
+            fn eval<S: Elementary>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
                 SVector::from([x[0].squared()])
             }
         }

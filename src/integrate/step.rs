@@ -3,7 +3,7 @@
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
-use crate::model::VectorField;
+use crate::system::VectorField;
 
 /// Continuous extension of a method over one step (dense output).
 pub trait Interpolant<const N: usize> {

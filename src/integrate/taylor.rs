@@ -13,10 +13,10 @@
 use nalgebra::SVector;
 
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
-use crate::model::VectorField;
 use crate::num::elementary::{exp, ln, pow};
 use crate::num::series::{Constants, FromDecimal, Program, Solution};
 use crate::num::{DoubleDouble, Scalar};
+use crate::system::VectorField;
 
 /// How far a step inside a layer may move the argument of its tanh.
 pub const LAYER_STRIDE: f64 = 0.5;
@@ -167,7 +167,7 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
     }
 
     fn record<F: VectorField<N>>(&mut self, field: &F) {
-        let program = Program::record(&self.x.map(S::to_f64), |x| field.eval(x));
+        let program = Program::record(|x| field.eval(x));
         self.solution.set_program(program, self.constants);
         self.statistics.evaluations += 1;
     }
@@ -282,11 +282,8 @@ impl<const N: usize, S: Precision> Stepper<N> for Taylor<N, S> {
         self.restart_from(field, S::from_f64(t), x.map(S::from_f64), t_end, max_step)
     }
 
-    fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
+    fn step<F: VectorField<N>>(&mut self, _: &F) -> Result<Step<'_, N>, Failure> {
         let (t0, x0) = (self.t.to_f64(), self.x.map(S::to_f64));
-        if self.solution.program().depends_on_values() {
-            self.record(field);
-        }
         self.solution.expand(&self.x);
         // One evaluation of the series costs about as much as one of the right-hand side per degree.
         self.statistics.evaluations += self.order as u64;

@@ -11,7 +11,7 @@
 use std::cmp::Ordering;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use super::Scalar;
+use super::{Arithmetic, Elementary, Scalar};
 
 /// A number of about 106 bits (32 decimal digits).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -266,19 +266,25 @@ impl SubAssign for DoubleDouble {
     }
 }
 
-impl Scalar for DoubleDouble {
+impl Arithmetic for DoubleDouble {
     #[inline]
     fn from_f64(value: f64) -> Self {
         Self { high: value, low: 0.0 }
     }
     #[inline]
-    fn to_f64(self) -> f64 {
-        self.high
-    }
-    #[inline]
     fn scale(self, factor: f64) -> Self {
         self.times_f64(factor)
     }
+}
+
+impl Scalar for DoubleDouble {
+    #[inline]
+    fn to_f64(self) -> f64 {
+        self.high
+    }
+}
+
+impl Elementary for DoubleDouble {
     fn tanh(self) -> Self {
         // 1 - tanh w < 2 exp(-2 w): beyond this the nearest number is +-1.
         if self.high.abs() >= 38.0 {
@@ -312,6 +318,9 @@ impl Scalar for DoubleDouble {
     }
     fn cos(self) -> Self {
         self.sin_cos().1
+    }
+    fn sign(self) -> Self {
+        Self::from_f64(self.high.sign())
     }
     fn sqrt(self) -> Self {
         if self.high == 0.0 {
@@ -463,8 +472,8 @@ mod tests {
         #[test]
         fn high_parts_agree_with_f64(a in -20.0..20.0_f64) {
             for (extended, plain) in [
-                (dd(a).exp(), Scalar::exp(a)), (dd(a).sin(), Scalar::sin(a)),
-                (dd(a).cos(), Scalar::cos(a)), (dd(a).tanh(), Scalar::tanh(a)),
+                (dd(a).exp(), Elementary::exp(a)), (dd(a).sin(), Elementary::sin(a)),
+                (dd(a).cos(), Elementary::cos(a)), (dd(a).tanh(), Elementary::tanh(a)),
             ] {
                 prop_assert!((extended.to_f64() - plain).abs() <= 4e-16 * plain.abs().max(1e-10), "{extended:?} {plain}");
             }

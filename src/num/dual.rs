@@ -7,7 +7,7 @@
 use std::cmp::Ordering;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use super::Scalar;
+use super::{Arithmetic, Elementary, Scalar};
 
 /// A value and its partial derivatives with respect to `N` variables.
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +18,7 @@ pub struct Dual<S, const N: usize> {
     pub partials: [S; N],
 }
 
-impl<S: Scalar, const N: usize> Dual<S, N> {
+impl<S: Arithmetic, const N: usize> Dual<S, N> {
     /// A constant: all derivatives zero.
     pub fn constant(value: S) -> Self {
         Self { value, partials: [S::zero(); N] }
@@ -50,7 +50,7 @@ impl<S: PartialOrd, const N: usize> PartialOrd for Dual<S, N> {
     }
 }
 
-impl<S: Scalar, const N: usize> Add for Dual<S, N> {
+impl<S: Arithmetic, const N: usize> Add for Dual<S, N> {
     type Output = Self;
     #[inline]
     fn add(mut self, other: Self) -> Self {
@@ -59,7 +59,7 @@ impl<S: Scalar, const N: usize> Add for Dual<S, N> {
     }
 }
 
-impl<S: Scalar, const N: usize> AddAssign for Dual<S, N> {
+impl<S: Arithmetic, const N: usize> AddAssign for Dual<S, N> {
     #[inline]
     fn add_assign(&mut self, other: Self) {
         self.value += other.value;
@@ -69,7 +69,7 @@ impl<S: Scalar, const N: usize> AddAssign for Dual<S, N> {
     }
 }
 
-impl<S: Scalar, const N: usize> Sub for Dual<S, N> {
+impl<S: Arithmetic, const N: usize> Sub for Dual<S, N> {
     type Output = Self;
     #[inline]
     fn sub(mut self, other: Self) -> Self {
@@ -78,7 +78,7 @@ impl<S: Scalar, const N: usize> Sub for Dual<S, N> {
     }
 }
 
-impl<S: Scalar, const N: usize> SubAssign for Dual<S, N> {
+impl<S: Arithmetic, const N: usize> SubAssign for Dual<S, N> {
     #[inline]
     fn sub_assign(&mut self, other: Self) {
         self.value -= other.value;
@@ -88,7 +88,7 @@ impl<S: Scalar, const N: usize> SubAssign for Dual<S, N> {
     }
 }
 
-impl<S: Scalar, const N: usize> Mul for Dual<S, N> {
+impl<S: Arithmetic, const N: usize> Mul for Dual<S, N> {
     type Output = Self;
     #[inline]
     fn mul(self, other: Self) -> Self {
@@ -100,7 +100,7 @@ impl<S: Scalar, const N: usize> Mul for Dual<S, N> {
     }
 }
 
-impl<S: Scalar, const N: usize> Div for Dual<S, N> {
+impl<S: Arithmetic, const N: usize> Div for Dual<S, N> {
     type Output = Self;
     #[inline]
     fn div(self, other: Self) -> Self {
@@ -113,7 +113,7 @@ impl<S: Scalar, const N: usize> Div for Dual<S, N> {
     }
 }
 
-impl<S: Scalar, const N: usize> Neg for Dual<S, N> {
+impl<S: Arithmetic, const N: usize> Neg for Dual<S, N> {
     type Output = Self;
     #[inline]
     fn neg(self) -> Self {
@@ -121,13 +121,19 @@ impl<S: Scalar, const N: usize> Neg for Dual<S, N> {
     }
 }
 
-impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
+impl<S: Arithmetic, const N: usize> Arithmetic for Dual<S, N> {
     fn from_f64(value: f64) -> Self {
         Self::constant(S::from_f64(value))
     }
+}
+
+impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
     fn to_f64(self) -> f64 {
         self.value.to_f64()
     }
+}
+
+impl<S: Elementary, const N: usize> Elementary for Dual<S, N> {
     fn tanh(self) -> Self {
         let t = self.value.tanh();
         self.chain(t, S::one() - t * t)
@@ -145,6 +151,9 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
     fn sqrt(self) -> Self {
         let r = self.value.sqrt();
         self.chain(r, S::from_f64(0.5) / r)
+    }
+    fn sign(self) -> Self {
+        Self::constant(self.value.sign())
     }
 }
 

@@ -7,7 +7,7 @@
 use std::cmp::Ordering;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use super::Scalar;
+use super::{Arithmetic, Elementary, Scalar};
 
 /// The series c_0 + c_1 sigma + ... + c_(K-1) sigma^(K-1), with everything from sigma^K on dropped. `K` is at least 1.
 #[derive(Clone, Copy, Debug)]
@@ -109,16 +109,22 @@ impl<const K: usize> Neg for Jet<K> {
     }
 }
 
-impl<const K: usize> Scalar for Jet<K> {
+impl<const K: usize> Arithmetic for Jet<K> {
     fn from_f64(value: f64) -> Self {
         Self::constant(value)
     }
+}
+
+impl<const K: usize> Scalar for Jet<K> {
     fn to_f64(self) -> f64 {
         self.c[0]
     }
+}
+
+impl<const K: usize> Elementary for Jet<K> {
     fn tanh(self) -> Self {
         // t' = (1 - t^2) a'
-        Self::recur(Scalar::tanh(self.c[0]), |k, t| {
+        Self::recur(Elementary::tanh(self.c[0]), |k, t| {
             (1..=k)
                 .map(|j| {
                     let square: f64 = (0..=k - j).map(|i| t[i] * t[k - j - i]).sum();
@@ -129,7 +135,7 @@ impl<const K: usize> Scalar for Jet<K> {
         })
     }
     fn exp(self) -> Self {
-        Self::recur(Scalar::exp(self.c[0]), |k, e| (1..=k).map(|j| j as f64 * self.c[j] * e[k - j]).sum())
+        Self::recur(Elementary::exp(self.c[0]), |k, e| (1..=k).map(|j| j as f64 * self.c[j] * e[k - j]).sum())
     }
     fn sin(self) -> Self {
         sin_cos(&self).0
@@ -137,10 +143,13 @@ impl<const K: usize> Scalar for Jet<K> {
     fn cos(self) -> Self {
         sin_cos(&self).1
     }
+    fn sign(self) -> Self {
+        Self::constant(self.c[0].sign())
+    }
     fn sqrt(self) -> Self {
         // r^2 = a
         let mut r = [0.0; K];
-        r[0] = Scalar::sqrt(self.c[0]);
+        r[0] = Elementary::sqrt(self.c[0]);
         for k in 1..K {
             let known: f64 = (1..k).map(|j| r[j] * r[k - j]).sum();
             r[k] = (self.c[k] - known) / (2.0 * r[0]);
@@ -151,7 +160,7 @@ impl<const K: usize> Scalar for Jet<K> {
 
 fn sin_cos<const K: usize>(a: &Jet<K>) -> (Jet<K>, Jet<K>) {
     let (mut s, mut c) = ([0.0; K], [0.0; K]);
-    (s[0], c[0]) = (Scalar::sin(a.c[0]), Scalar::cos(a.c[0]));
+    (s[0], c[0]) = (Elementary::sin(a.c[0]), Elementary::cos(a.c[0]));
     for k in 1..K {
         s[k] = (1..=k).map(|j| j as f64 * a.c[j] * c[k - j]).sum::<f64>() / k as f64;
         c[k] = -(1..=k).map(|j| j as f64 * a.c[j] * s[k - j]).sum::<f64>() / k as f64;
@@ -170,7 +179,8 @@ mod tests {
     #[test]
     fn series_sum_to_the_function() {
         let f = |x: f64| -> f64 {
-            Scalar::tanh(x) * Scalar::exp(-x) + Scalar::sin(x) / (2.0 + Scalar::cos(x)) - Scalar::sqrt(1.5 + x)
+            Elementary::tanh(x) * Elementary::exp(-x) + Elementary::sin(x) / (2.0 + Elementary::cos(x))
+                - Elementary::sqrt(1.5 + x)
         };
         let mut x = Jet::<16>::constant(0.3);
         x.c[1] = 1.0;

@@ -1,7 +1,7 @@
 //! Arithmetic that results depend on.
 //!
 //! This is the only room that names a math library. Everything that ends in a published number goes through
-//! [`elementary`] (functions with the same bits on every machine), [`Scalar`] (what an equation may do with a
+//! [`elementary`] (functions with the same bits on every machine), [`Elementary`] (what an equation may do with a
 //! number, so that one definition serves plain evaluation, differentiation, power series and extended precision), and
 //! [`random`] (a named generator and our own map from bits to numbers).
 
@@ -15,4 +15,4 @@ pub mod series;
 
 pub use double_double::DoubleDouble;
 pub use dual::Dual;
-pub use scalar::Scalar;
+pub use scalar::{Arithmetic, Elementary, Scalar};

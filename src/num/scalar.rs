@@ -5,16 +5,13 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use super::elementary;
 
-/// A real number, as the equations in [`crate::model`] see it.
+/// Sums, products and quotients: what a polynomial or rational equation needs.
 ///
-/// Implemented by `f64`, by [`Dual`](super::Dual) (which carries derivatives) and by extended-precision numbers. An
-/// equation written once over a `Scalar` therefore also gives its Jacobian and its high-precision value.
-/// Comparisons look at the value only, never at derivatives.
-pub trait Scalar:
+/// Equality is that of values (of all lanes, of both ends of an interval); an equation never asks for it.
+pub trait Arithmetic:
     Copy
     + Debug
     + PartialEq
-    + PartialOrd
     + Add<Output = Self>
     + Sub<Output = Self>
     + Mul<Output = Self>
@@ -28,18 +25,6 @@ pub trait Scalar:
 {
     /// The exact value of an `f64`.
     fn from_f64(value: f64) -> Self;
-    /// The nearest `f64`.
-    fn to_f64(self) -> f64;
-    /// Hyperbolic tangent.
-    fn tanh(self) -> Self;
-    /// Exponential.
-    fn exp(self) -> Self;
-    /// Sine.
-    fn sin(self) -> Self;
-    /// Cosine.
-    fn cos(self) -> Self;
-    /// Square root.
-    fn sqrt(self) -> Self;
 
     /// Zero.
     #[inline]
@@ -63,15 +48,47 @@ pub trait Scalar:
     }
 }
 
-impl Scalar for f64 {
+/// A number as the equations see it: arithmetic and elementary functions, but no comparisons.
+///
+/// Implemented by `f64`, by [`Dual`](super::Dual) (which carries derivatives), by power series, by extended-precision numbers
+/// and by numbers that only record what is done with them. An equation written once over `Elementary` therefore also gives its
+/// Jacobian, its Taylor coefficients and its high-precision value. It cannot branch on a value: what a
+/// recording holds at one point, it holds everywhere.
+pub trait Elementary: Arithmetic {
+    /// Hyperbolic tangent.
+    fn tanh(self) -> Self;
+    /// Exponential.
+    fn exp(self) -> Self;
+    /// Sine.
+    fn sin(self) -> Self;
+    /// Cosine.
+    fn cos(self) -> Self;
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// -1 below zero, +1 from zero on; its derivative is zero.
+    fn sign(self) -> Self;
+    /// The absolute value; its derivative at 0 is taken as +1.
+    #[inline]
+    fn abs(self) -> Self {
+        self * self.sign()
+    }
+}
+
+/// An [`Elementary`] number with an order and a nearest `f64`: what step control and event location need.
+/// Comparisons look at the value only, never at derivatives.
+pub trait Scalar: Elementary + PartialOrd {
+    /// The nearest `f64`.
+    fn to_f64(self) -> f64;
+}
+
+impl Arithmetic for f64 {
     #[inline]
     fn from_f64(value: f64) -> Self {
         value
     }
-    #[inline]
-    fn to_f64(self) -> f64 {
-        self
-    }
+}
+
+impl Elementary for f64 {
     #[inline]
     fn tanh(self) -> Self {
         elementary::tanh(self)
@@ -91,5 +108,16 @@ impl Scalar for f64 {
     #[inline]
     fn sqrt(self) -> Self {
         elementary::sqrt(self)
+    }
+    #[inline]
+    fn sign(self) -> Self {
+        if self < 0.0 { -1.0 } else { 1.0 }
+    }
+}
+
+impl Scalar for f64 {
+    #[inline]
+    fn to_f64(self) -> f64 {
+        self
     }
 }

@@ -1,21 +1,20 @@
 //! Taylor coefficients of solutions, from the equation itself.
 //!
 //! [`Program::record`] runs an equation once on numbers that write down what is done with them. A [`Solution`] then yields,
-//! for any [`Scalar`], the coefficients of the solution's power series one degree after another, each operation by its
+//! for any [`Elementary`] number, the coefficients of the solution's power series one degree after another, each operation by its
 //! own recurrence (Moore 1966, ch. 11; Griewank & Walther 2008, table 13.2; Jorba & Zou 2005, sec. 2). Degree K costs
-//! O(K^2) per nonlinear operation. A truncated series that is itself a `Scalar` would have to be evaluated anew at
+//! O(K^2) per nonlinear operation. A truncated series that is itself a number would have to be evaluated anew at
 //! every degree, O(K^3)/3; that is why there is none.
 //!
 //! The recording also knows the arguments of every tanh. That is how an integrator learns where an equation has a
 //! layer, without being told (see [`Solution::tanh_arguments`]).
 
-use std::cell::{Cell, RefCell};
-use std::cmp::Ordering;
+use std::cell::RefCell;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Range, Sub, SubAssign};
 
 use nalgebra::SVector;
 
-use super::{DoubleDouble, Scalar};
+use super::{Arithmetic, DoubleDouble, Elementary};
 
 /// Index of an operation in a program.
 type Node = usize;
@@ -36,6 +35,8 @@ enum Operation {
     Div(Node, Node),
     Exp(Node),
     Sqrt(Node),
+    /// -1 or +1, by the value at the start of the series.
+    Sign(Node),
     /// tanh of the node; its companion 1 - tanh^2 is the next operation.
     Tanh(Node),
     /// 1 - u^2 of the tanh u before it.
@@ -75,26 +76,25 @@ impl FromDecimal for DoubleDouble {
 }
 
 thread_local! {
-    /// The operations of the recording under way on this thread. `Scalar` is `Copy + 'static`, so that a recorded number
+    /// The operations of the recording under way on this thread. `Elementary` is `Copy + 'static`, so that a recorded number
     /// cannot carry a reference to its recording.
     static OPERATIONS: RefCell<Vec<Operation>> = const { RefCell::new(Vec::new()) };
-    /// Whether the recorded function looked at a value.
-    static LOOKED: Cell<bool> = const { Cell::new(false) };
 }
 
 /// Appends `operation` unless the same one is there already (f+ and f- share the re-injection term).
-fn record(operation: Operation) -> Node {
+fn record(operation: Operation) -> Recorded {
     OPERATIONS.with_borrow_mut(|operations| {
         if let Some(node) = operations.iter().position(|o| *o == operation) {
-            return node;
+            return Recorded { node };
         }
         operations.push(operation);
+        let node = operations.len() - 1;
         match operation {
-            Operation::Tanh(_) => operations.push(Operation::TanhSlope(operations.len() - 1)),
+            Operation::Tanh(_) => operations.push(Operation::TanhSlope(node)),
             Operation::Sin(a) => operations.push(Operation::Cos(a)),
-            _ => return operations.len() - 1,
+            _ => {}
         }
-        operations.len() - 2
+        Recorded { node }
     })
 }
 
@@ -105,75 +105,51 @@ fn constant(node: Node) -> Option<f64> {
     })
 }
 
-/// A number that writes down what is done with it. It also has a value, so that equations may look at it; if they do, the
-/// program holds for that value only ([`Program::depends_on_values`]).
-#[derive(Clone, Copy, Debug)]
+/// A number that writes down what is done with it. It has no value: an equation cannot look.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Recorded {
     node: Node,
-    value: f64,
-}
-
-impl Recorded {
-    fn unary(self, operation: fn(Node) -> Operation, value: f64) -> Self {
-        Self { node: record(operation(self.node)), value }
-    }
-}
-
-impl PartialEq for Recorded {
-    fn eq(&self, other: &Self) -> bool {
-        LOOKED.set(true);
-        self.value == other.value
-    }
-}
-
-impl PartialOrd for Recorded {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        LOOKED.set(true);
-        self.value.partial_cmp(&other.value)
-    }
 }
 
 impl Add for Recorded {
     type Output = Self;
     fn add(self, other: Self) -> Self {
-        Self { node: record(Operation::Add(self.node, other.node)), value: self.value + other.value }
+        record(Operation::Add(self.node, other.node))
     }
 }
 
 impl Sub for Recorded {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
-        Self { node: record(Operation::Sub(self.node, other.node)), value: self.value - other.value }
+        record(Operation::Sub(self.node, other.node))
     }
 }
 
 impl Mul for Recorded {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
-        let operation = match (constant(self.node), constant(other.node)) {
+        record(match (constant(self.node), constant(other.node)) {
             (_, Some(c)) => Operation::Scale(self.node, c),
             (Some(c), None) => Operation::Scale(other.node, c),
             (None, None) => Operation::Mul(self.node, other.node),
-        };
-        Self { node: record(operation), value: self.value * other.value }
+        })
     }
 }
 
 impl Div for Recorded {
     type Output = Self;
     fn div(self, other: Self) -> Self {
-        let operation = match constant(other.node) {
+        record(match constant(other.node) {
             Some(c) => Operation::Over(self.node, c),
             None => Operation::Div(self.node, other.node),
-        };
-        Self { node: record(operation), value: self.value / other.value }
+        })
     }
 }
 
 impl Neg for Recorded {
     type Output = Self;
     fn neg(self) -> Self {
-        self.unary(Operation::Neg, -self.value)
+        record(Operation::Neg(self.node))
     }
 }
 
@@ -189,30 +165,31 @@ impl SubAssign for Recorded {
     }
 }
 
-impl Scalar for Recorded {
+impl Arithmetic for Recorded {
     fn from_f64(value: f64) -> Self {
-        Self { node: record(Operation::Constant(value)), value }
+        record(Operation::Constant(value))
     }
-    fn to_f64(self) -> f64 {
-        LOOKED.set(true);
-        self.value
-    }
+}
+
+impl Elementary for Recorded {
     fn tanh(self) -> Self {
-        self.unary(Operation::Tanh, Scalar::tanh(self.value))
+        record(Operation::Tanh(self.node))
     }
     fn exp(self) -> Self {
-        self.unary(Operation::Exp, Scalar::exp(self.value))
+        record(Operation::Exp(self.node))
     }
     fn sin(self) -> Self {
-        self.unary(Operation::Sin, Scalar::sin(self.value))
+        record(Operation::Sin(self.node))
     }
     fn cos(self) -> Self {
         // The sine is recorded with its companion cosine.
-        let sine = self.unary(Operation::Sin, 0.0);
-        Self { node: sine.node + 1, value: Scalar::cos(self.value) }
+        Self { node: record(Operation::Sin(self.node)).node + 1 }
     }
     fn sqrt(self) -> Self {
-        self.unary(Operation::Sqrt, Scalar::sqrt(self.value))
+        record(Operation::Sqrt(self.node))
+    }
+    fn sign(self) -> Self {
+        record(Operation::Sign(self.node))
     }
 }
 
@@ -222,18 +199,16 @@ pub struct Program<const N: usize> {
     operations: Vec<Operation>,
     outputs: Vec<Node>,
     tanh_arguments: Vec<Node>,
-    depends_on_values: bool,
 }
 
 impl<const N: usize> Program<N> {
-    /// Records `function` at the point `x`.
-    pub fn record(x: &SVector<f64, N>, function: impl FnOnce(&SVector<Recorded, N>) -> SVector<Recorded, N>) -> Self {
+    /// Records `function`.
+    pub fn record(function: impl FnOnce(&SVector<Recorded, N>) -> SVector<Recorded, N>) -> Self {
         OPERATIONS.with_borrow_mut(|o| {
             o.clear();
             o.extend((0..N).map(Operation::Variable));
         });
-        LOOKED.set(false);
-        let values = function(&SVector::from_fn(|i, _| Recorded { node: i, value: x[i] }));
+        let values = function(&SVector::from_fn(|node, _| Recorded { node }));
         let operations = OPERATIONS.take();
         let mut tanh_arguments = Vec::new();
         for operation in &operations {
@@ -241,18 +216,7 @@ impl<const N: usize> Program<N> {
                 tanh_arguments.push(*argument);
             }
         }
-        Self {
-            operations,
-            outputs: values.iter().map(|v| v.node).collect(),
-            tanh_arguments,
-            depends_on_values: LOOKED.get(),
-        }
-    }
-
-    /// Whether the function compared numbers or read their values. Then it may do other things elsewhere, and must be
-    /// recorded again at every point.
-    pub fn depends_on_values(&self) -> bool {
-        self.depends_on_values
+        Self { operations, outputs: values.iter().map(|v| v.node).collect(), tanh_arguments }
     }
 
     /// How many tanh the function has.
@@ -283,7 +247,7 @@ pub struct Solution<S, const N: usize> {
     constants: Vec<S>,
 }
 
-impl<S: Scalar + FromDecimal, const N: usize> Solution<S, N> {
+impl<S: Elementary + FromDecimal, const N: usize> Solution<S, N> {
     /// Room for series up to `degree`, of solutions of x' = f(x), f being `program`.
     pub fn new(degree: usize, program: Program<N>, constants: Constants) -> Self {
         let mut solution =
@@ -380,6 +344,8 @@ impl<S: Scalar + FromDecimal, const N: usize> Solution<S, N> {
                 // r_k is still zero, so that the square's coefficient lacks exactly 2 r_0 r_k.
                 (series(a)[k] - square(r, k)) / r[0].scale(2.0)
             }
+            Operation::Sign(a) if k == 0 => series(a)[0].sign(),
+            Operation::Sign(_) => S::zero(),
             Operation::Tanh(a) if k == 0 => series(a)[0].tanh(),
             // u' = a' (1 - u^2)
             Operation::Tanh(a) => one_over(weighted(series(a), series(node + 1), k)),
@@ -396,7 +362,7 @@ impl<S: Scalar + FromDecimal, const N: usize> Solution<S, N> {
 
 /// sum over j from `first` to k of a_j b_(k-j).
 #[inline]
-fn convolution<S: Scalar>(a: &[S], b: &[S], first: usize, k: usize) -> S {
+fn convolution<S: Arithmetic>(a: &[S], b: &[S], first: usize, k: usize) -> S {
     let mut sum = S::zero();
     for j in first..=k {
         sum += a[j] * b[k - j];
@@ -406,13 +372,13 @@ fn convolution<S: Scalar>(a: &[S], b: &[S], first: usize, k: usize) -> S {
 
 /// sum over j from 1 to k of c_(k-j) b_j: what the known part of a quotient c = a/b contributes to a.
 #[inline]
-fn tail<S: Scalar>(c: &[S], b: &[S], k: usize) -> S {
+fn tail<S: Arithmetic>(c: &[S], b: &[S], k: usize) -> S {
     convolution(b, c, 1, k)
 }
 
 /// Coefficient k of a^2, each product once.
 #[inline]
-fn square<S: Scalar>(a: &[S], k: usize) -> S {
+fn square<S: Arithmetic>(a: &[S], k: usize) -> S {
     let mut sum = S::zero();
     for j in 0..k.div_ceil(2) {
         sum += a[j] * a[k - j];
@@ -426,7 +392,7 @@ fn square<S: Scalar>(a: &[S], k: usize) -> S {
 
 /// sum over j from 1 to k of j a_j b_(k-j): k times the coefficient k of the integral of a' b.
 #[inline]
-fn weighted<S: Scalar>(a: &[S], b: &[S], k: usize) -> S {
+fn weighted<S: Arithmetic>(a: &[S], b: &[S], k: usize) -> S {
     let mut sum = S::zero();
     for j in 1..=k {
         sum += a[j].scale(j as f64) * b[k - j];
@@ -437,6 +403,7 @@ fn weighted<S: Scalar>(a: &[S], b: &[S], k: usize) -> S {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::num::Scalar;
     use nalgebra::vector;
 
     fn expand<const N: usize>(
@@ -444,7 +411,7 @@ mod tests {
         x: SVector<f64, N>,
         f: impl Fn(&SVector<Recorded, N>) -> SVector<Recorded, N>,
     ) -> Solution<DoubleDouble, N> {
-        let mut solution = Solution::new(degree, Program::record(&x, f), Constants::Binary);
+        let mut solution = Solution::new(degree, Program::record(f), Constants::Binary);
         solution.expand(&x.map(DoubleDouble::from_f64));
         solution
     }
@@ -533,8 +500,8 @@ mod tests {
 
     #[test]
     fn decimal_constants_are_decimal() {
-        let x = vector![1.0];
-        let p = Program::record(&x, |x| vector![x[0].scale(0.1) / Recorded::from_f64(1e-3) + Recorded::from_f64(-1.2)]);
+        let p =
+            Program::<1>::record(|x| vector![x[0].scale(0.1) / Recorded::from_f64(1e-3) + Recorded::from_f64(-1.2)]);
         let slope = |constants| {
             let mut s = Solution::<DoubleDouble, 1>::new(1, p.clone(), constants);
             s.expand(&vector![DoubleDouble::one()]);
@@ -545,13 +512,18 @@ mod tests {
     }
 
     #[test]
-    fn shared_terms_are_computed_once_and_looking_is_noticed() {
-        let x = vector![0.3, 0.4];
-        let p = Program::record(&x, |x| vector![x[0] * x[1] + x[0], x[0] * x[1] - x[0].tanh()]);
+    fn shared_terms_are_computed_once() {
+        let p = Program::<2>::record(|x| vector![x[0] * x[1] + x[0], x[0] * x[1] - x[0].tanh()]);
         // Two variables, product, sum, tanh with its slope, difference.
         assert_eq!(p.operations.len(), 7);
-        assert!(!p.depends_on_values());
-        let p = Program::record(&x, |x| if x[0] < x[1] { vector![x[0], x[0]] } else { vector![x[1], x[1]] });
-        assert!(p.depends_on_values());
+    }
+
+    #[test]
+    fn absolute_value_by_the_sign_at_the_start() {
+        // x' = -|x| from -1: -exp(t); from 1: exp(-t)
+        for (start, sign) in [(-1.0, 1.0), (1.0, -1.0_f64)] {
+            let s = expand(12, vector![start], |x| vector![-x[0].abs()]);
+            first_is(&s, |j| start * (if j % 2 == 0 { 1.0 } else { sign }) / factorial(j));
+        }
     }
 }

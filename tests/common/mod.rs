@@ -7,11 +7,12 @@ use std::fs;
 use std::path::Path;
 use std::sync::OnceLock;
 
-use twofold::figure::progress::Progress;
-use twofold::figure::spec::*;
-use twofold::figure::verdict::{Claim, SectionClaim};
-use twofold::figure::{Figure, Panel, View, cli};
+use twofold::cli;
+use twofold::cli::progress::Progress;
 use twofold::integrate::Schedule;
+use twofold::job::spec::*;
+use twofold::paper::verdict::{Claim, SectionClaim};
+use twofold::paper::{Figure, Panel, View};
 use twofold::record::manifest::VERSION;
 use twofold::record::{Manifest, PictureEntry};
 

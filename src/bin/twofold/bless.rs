@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-use twofold::figure::cli::{in_pool, print};
-use twofold::figure::pipeline::compute;
-use twofold::figure::progress::Progress;
+use twofold::cli::progress::Progress;
+use twofold::cli::{in_pool, print};
+use twofold::paper::pipeline::compute;
 use twofold::record::manifest::VERSION;
 use twofold::record::{self, Manifest};
 

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use twofold::figure::cli::{in_pool, print};
-use twofold::figure::pipeline::{PictureRecord, compute};
-use twofold::figure::progress::Progress;
+use twofold::cli::progress::Progress;
+use twofold::cli::{in_pool, print};
+use twofold::paper::pipeline::{PictureRecord, compute};
 use twofold::record::{self, Manifest};
 
 use super::{Outcome, Problem, catalogue, published};
@@ -123,7 +123,7 @@ fn read_manifest(path: &Path) -> Result<Manifest, Problem> {
 }
 
 /// The figures of these names, or all.
-pub fn chosen(names: &[String]) -> Result<Vec<twofold::figure::Figure>, Problem> {
+pub fn chosen(names: &[String]) -> Result<Vec<twofold::paper::Figure>, Problem> {
     let all = catalogue::all();
     if let Some(unknown) = names.iter().find(|n| !all.iter().any(|f| f.id == *n)) {
         let known: Vec<&str> = all.iter().map(|f| f.id).collect();

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use twofold::figure::cli::print;
-use twofold::figure::pipeline::pixel_hash;
+use twofold::cli::print;
+use twofold::paper::pipeline::pixel_hash;
 use twofold::record::{self, Hash, Manifest, PictureEntry, read_tree};
 use twofold::render::{Format, Provenance, ProvenanceError, decode_png, read_provenance};
 

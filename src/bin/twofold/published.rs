@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use twofold::figure::Figure;
-use twofold::figure::cli::{in_pool, print};
-use twofold::figure::compare::{Comparison, Limits, Rung, compare};
-use twofold::figure::pipeline::{Computed, compute, pixel_hash};
-use twofold::figure::progress::Progress;
+use twofold::cli::progress::Progress;
+use twofold::cli::{in_pool, print};
+use twofold::compare::{Comparison, Limits, Rung, compare};
+use twofold::paper::Figure;
+use twofold::paper::pipeline::{Computed, compute, pixel_hash};
 use twofold::record::{FileBytes, Hash, read_tree};
 use twofold::render::decode_png;
 

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use twofold::figure::cli::print;
-use twofold::figure::report::{Links, Report, archive, assemble, names, page};
+use twofold::cli::print;
 use twofold::record::{self, FileBytes, read_tree};
+use twofold::report::{Links, Report, archive, assemble, names, page};
 
 use super::{Outcome, Problem};
 

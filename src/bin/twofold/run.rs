@@ -2,15 +2,16 @@
 
 use std::path::PathBuf;
 
-use twofold::figure::cli::print_bytes;
-use twofold::figure::progress::Progress;
-use twofold::figure::simulate::simulate;
-use twofold::figure::spec::*;
-use twofold::figure::{Reading, encode};
+use twofold::cli::print_bytes;
+use twofold::cli::progress::Progress;
 use twofold::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use twofold::integrate::{Kick, KickLaw, Schedule, StepCap, Tolerance};
-use twofold::model::{Relaxation, Transition, Wheel};
+use twofold::job::encode;
+use twofold::job::simulate::simulate;
+use twofold::job::spec::*;
+use twofold::paper::Reading;
 use twofold::record;
+use twofold::system::{Relaxation, Transition, Wheel};
 
 use super::{Outcome, Problem};
 

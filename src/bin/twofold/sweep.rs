@@ -5,12 +5,12 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use rayon::prelude::*;
-use twofold::figure::cli::{in_pool, print_bytes};
-use twofold::figure::progress::Progress;
-use twofold::figure::simulate::{Data, simulate};
-use twofold::figure::spec::{Observation, RunSpec};
-use twofold::figure::verdict::section_evidence;
-use twofold::observe::attractor::{Evidence, Verdict};
+use twofold::analyse::attractor::{Evidence, Verdict};
+use twofold::cli::progress::Progress;
+use twofold::cli::{in_pool, print_bytes};
+use twofold::job::simulate::{Data, simulate};
+use twofold::job::spec::{Observation, RunSpec};
+use twofold::paper::verdict::section_evidence;
 use twofold::record;
 
 use super::run::RunFlags;

@@ -11,9 +11,9 @@ use super::{
 use crate::integrate::dopri5::Dopri5;
 use crate::integrate::roots::{Start, Zero, brent, first_zero};
 use crate::integrate::step::{Failure, Flow, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
-use crate::model::filippov::{gradient, lie_derivatives};
-use crate::model::{PiecewiseSmooth, VectorField, variables};
 use crate::num::Dual;
+use crate::system::filippov::{gradient, lie_derivatives};
+use crate::system::{PiecewiseSmooth, VectorField, variables};
 
 /// Runs the Filippov motion of `system` from (0, x0) to `t_end`. `M` is `N + 1` and is inferred.
 ///

@@ -5,9 +5,9 @@ use nalgebra::SVector;
 use super::exit::Side;
 use crate::integrate::roots::brent;
 use crate::integrate::step::Interpolant;
-use crate::model::filippov::{gradient, lie_derivatives};
-use crate::model::{PiecewiseSmooth, VectorField};
-use crate::num::Scalar;
+use crate::num::Elementary;
+use crate::system::filippov::{gradient, lie_derivatives};
+use crate::system::{PiecewiseSmooth, VectorField};
 
 /// f+ or f-, continued smoothly across the surface.
 #[derive(Clone, Copy, Debug)]
@@ -17,7 +17,7 @@ pub(super) struct FreeFlow<'a, P> {
 }
 
 impl<P: PiecewiseSmooth<N>, const N: usize> VectorField<N> for FreeFlow<'_, P> {
-    fn eval<S: Scalar>(&self, x: &SVector<S, N>) -> SVector<S, N> {
+    fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
         match self.side {
             Side::Plus => self.system.plus(x),
             Side::Minus => self.system.minus(x),
@@ -28,7 +28,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> VectorField<N> for FreeFlow<'_, P> {
 /// The desingularised sliding field F = L-h f+ - L+h f-: the sliding field multiplied by L-h - L+h.
 ///
 /// It is smooth everywhere, vanishes at a two-fold, and leaves h unchanged exactly: L_F h = L-h L+h - L+h L-h = 0.
-pub(super) fn desingularised<P: PiecewiseSmooth<N>, S: Scalar, const N: usize>(
+pub(super) fn desingularised<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(
     system: &P,
     x: &SVector<S, N>,
 ) -> (SVector<S, N>, S) {
@@ -49,7 +49,7 @@ pub struct SlidingFlow<'a, P, const N: usize> {
 macro_rules! sliding_in_dimension {
     ($n:literal, $m:literal) => {
         impl<P: PiecewiseSmooth<$n>> VectorField<$m> for SlidingFlow<'_, P, $n> {
-            fn eval<S: Scalar>(&self, state: &SVector<S, $m>) -> SVector<S, $m> {
+            fn eval<S: Elementary>(&self, state: &SVector<S, $m>) -> SVector<S, $m> {
                 let x = SVector::<S, $n>::from_fn(|i, _| state[i]);
                 let (field, rate) = desingularised(self.system, &x);
                 SVector::from_fn(|i, _| if i < $n { field[i] } else { rate }.scale(self.direction))

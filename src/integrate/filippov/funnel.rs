@@ -7,9 +7,9 @@ use super::two_fold::SlidingAtTwoFold;
 use super::{
     End, ExitRule, FilippovError, FilippovSummary, Settings, Side, SlidingFlow, Trajectory, engine, flow::project,
 };
-use crate::model::filippov::{Region, region};
-use crate::model::{PiecewiseSmooth, Reversed, VectorField};
 use crate::num::elementary::pow;
+use crate::system::filippov::{Region, region};
+use crate::system::{PiecewiseSmooth, Reversed, VectorField};
 
 /// Which members of the funnel to compute: exit times between the shortest and the longest, both sides of each.
 #[derive(Clone, Copy, Debug, PartialEq)]

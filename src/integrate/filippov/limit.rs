@@ -16,10 +16,10 @@ use crate::integrate::Taylor;
 use crate::integrate::dopri5::Dopri5;
 use crate::integrate::roots::sign_changes;
 use crate::integrate::step::{Failure, Flow, Step, Stepper, Tolerance};
-use crate::model::filippov::{Region, region};
-use crate::model::{PiecewiseSmooth, Smoothed, Transition, VectorField};
 use crate::num::DoubleDouble;
 use crate::num::elementary::ln;
+use crate::system::filippov::{Region, region};
+use crate::system::{PiecewiseSmooth, Smoothed, Transition, VectorField};
 
 /// One comparison of a smoothed orbit with the Filippov orbit.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -52,7 +52,7 @@ impl<const N: usize> Trajectory<N> {
         self
     }
 
-    /// The trajectory of the reversed system ([`Reversed`](crate::model::Reversed)) as one of the original: order turned round,
+    /// The trajectory of the reversed system ([`Reversed`](crate::system::Reversed)) as one of the original: order turned round,
     /// time t becomes `origin` - t, attracting and repelling change places. Events are dropped: an end is not a beginning.
     pub fn turned(mut self, origin: f64) -> Self {
         self.events.clear();

@@ -23,12 +23,12 @@ use nalgebra::{SMatrix, SVector};
 use super::flow::desingularised;
 use crate::integrate::roots::brent;
 use crate::integrate::step::Interpolant;
-use crate::model::PiecewiseSmooth;
-use crate::model::filippov::lie_derivatives;
-use crate::model::variables;
 use crate::num::Dual;
 use crate::num::elementary::{pow, sqrt};
 use crate::num::jet::Jet;
+use crate::system::PiecewiseSmooth;
+use crate::system::filippov::lie_derivatives;
+use crate::system::variables;
 
 /// Terms kept in the series of the invariant curve.
 const TERMS: usize = 24;

@@ -33,8 +33,8 @@ use serde::{Deserialize, Serialize};
 
 use super::linear::Lu;
 use super::step::{Failure, Statistics, Step, Stepper, Tolerance, finite};
-use crate::model::{VectorField, jacobian};
 use crate::num::elementary::{pow, sqrt};
+use crate::system::{VectorField, jacobian};
 use coefficients::{ADAMS, ADAMS_ORDERS, ADAMS_STABILITY, BDF, BDF_ORDERS, Formula};
 use nordsieck::Nordsieck;
 use selection::*;

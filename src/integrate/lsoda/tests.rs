@@ -1,15 +1,15 @@
 //! Orders of convergence with step and order held, and what the controlled method conserves, damps and forgets.
 
 use super::*;
-use crate::model::{Caricature, Hysteretic, Relaxation};
-use crate::num::Scalar;
+use crate::num::Elementary;
+use crate::system::{Caricature, Hysteretic, Relaxation};
 use nalgebra::vector;
 
 /// (c, s)' = (-s, c): the circle, on which every derivative is known.
 struct Circle;
 
 impl VectorField<2> for Circle {
-    fn eval<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+    fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
         vector![-x[1], x[0]]
     }
 }
@@ -18,7 +18,7 @@ impl VectorField<2> for Circle {
 struct Hyperbola;
 
 impl VectorField<1> for Hyperbola {
-    fn eval<S: Scalar>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
+    fn eval<S: Elementary>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
         vector![-x[0].squared()]
     }
 }
@@ -127,7 +127,7 @@ fn conserves_linear_invariants() {
     /// Robertson (1966).
     struct Reactions;
     impl VectorField<3> for Reactions {
-        fn eval<S: Scalar>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+        fn eval<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
             let (slow, back, fast) = (x[0].scale(0.04), x[1].scale(1e4) * x[2], x[1].squared().scale(3e7));
             vector![back - slow, slow - back - fast, fast]
         }
@@ -145,7 +145,7 @@ fn stiff_decay_is_left_to_bdf() {
     /// Prothero & Robinson (1974): x' = -lambda (x - cos t) - sin t with t as a state; x = cos t after the transient.
     struct ProtheroRobinson;
     impl VectorField<2> for ProtheroRobinson {
-        fn eval<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
             vector![(x[1].cos() - x[0]).scale(1e6) - x[1].sin(), S::one()]
         }
     }
@@ -165,7 +165,7 @@ fn adams_returns_when_stiffness_ends() {
     /// x' = -1e4 s(t) (x - cos t) - sin t with s going smoothly from 1 to 0 at t = 5, and t as a state.
     struct Fading;
     impl VectorField<2> for Fading {
-        fn eval<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
             let s = (S::one() - (x[1] - S::from_f64(5.0)).scale(4.0).tanh()).scale(0.5);
             vector![(x[1].cos() - x[0]).scale(1e4) * s - x[1].sin(), S::one()]
         }
@@ -244,7 +244,7 @@ fn dense_output_is_accurate() {
 fn failures_are_named() {
     struct Explosion;
     impl VectorField<1> for Explosion {
-        fn eval<S: Scalar>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
+        fn eval<S: Elementary>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
             vector![x[0].squared()]
         }
     }

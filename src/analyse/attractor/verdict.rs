@@ -1,0 +1,197 @@
+//! The answers: a verdict, and the evidence behind it as a record that can be written to a file.
+
+use serde::{Deserialize, Serialize};
+
+use super::Thresholds;
+use crate::analyse::lyapunov::Exponent;
+
+/// One dot of a periodic orbit's section.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CyclePoint {
+    /// Its place in the plane: the mean over the turns of the orbit's last window.
+    pub u: [f64; 2],
+    /// Whether the orbit crosses upwards here.
+    pub upward: bool,
+    /// Largest distance from that mean in the window.
+    pub spread: f64,
+}
+
+/// An exponential rate from a straight-line fit to ln(distance).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rate {
+    /// Rate per unit time at which the distance shrinks; negative when it grows.
+    pub per_time: f64,
+    /// Its standard error from the scatter about the line.
+    pub standard_error: f64,
+    /// Start of the fitted stretch of time.
+    pub from: f64,
+    /// End of the fitted stretch of time.
+    pub to: f64,
+}
+
+/// A closed orbit as the section shows it, and how the run came to it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cycle {
+    /// Points of one direction per turn: one for the paper's "periodic", three for its "period three".
+    pub period: usize,
+    /// All dots: first those of the counted direction in the order of the motion, then those of the other.
+    pub points: Vec<CyclePoint>,
+    /// Time for one turn.
+    pub duration: f64,
+    /// Mean distance of the last window's points from their dots.
+    pub radius: f64,
+    /// From this time on the run only turns around the cycle. Before it lies the transient; its length is this time minus
+    /// the start.
+    pub captured_at: f64,
+    /// From this time on every point is within a dot's size of its centre, if that has happened.
+    pub settled_at: Option<f64>,
+    /// How fast the distance from the cycle shrinks, where that could be fitted.
+    pub approach: Option<Rate>,
+    /// Mean angle of the motion around the cycle per turn, in full circles, in (-1/2, 1/2]; absent when the points lie on a line
+    /// or within rounding of the centre.
+    pub rotation: Option<f64>,
+}
+
+/// What a run settles on, judged from its section.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Verdict {
+    /// A periodic orbit: at the end every phase is a dot.
+    Periodic(Cycle),
+    /// Still on its way to (or, with a negative rate, away from) a periodic orbit, around which it turns in a spiral.
+    Spiralling(Cycle),
+    /// Rings: regular, neither closing up nor approaching anything at a visible rate.
+    QuasiPeriodic(Cycle),
+    /// Irregular and deterministic.
+    Chaotic {
+        /// The largest exponent given with the question.
+        lyapunov: Option<Exponent>,
+        /// Number of separate pieces visited in turn.
+        bands: usize,
+    },
+    /// Random.
+    Noisy {
+        /// How much of the reference's fine structure is left, in [0, 1]: see [`Overlap`](super::Overlap), which holds the
+        /// value before it was cut to that range. Absent without a reference.
+        share_of_structure: Option<f64>,
+        /// The closed orbit around which the noise holds the run in small clouds, if it does.
+        around: Option<Cycle>,
+    },
+    /// The orbit stopped crossing the section.
+    Escaped {
+        /// Its last crossing.
+        last_crossing: f64,
+    },
+    /// Not enough points to decide.
+    TooFew {
+        /// Points of the more frequent direction.
+        points: usize,
+    },
+}
+
+impl Verdict {
+    /// The verdict in a word, as tables show it.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Periodic(_) => "periodic",
+            Self::Spiralling(_) => "spiralling",
+            Self::QuasiPeriodic(_) => "quasi-periodic",
+            Self::Chaotic { .. } => "chaotic",
+            Self::Noisy { .. } => "noisy",
+            Self::Escaped { .. } => "escaped",
+            Self::TooFew { .. } => "too-few",
+        }
+    }
+
+    /// The closed orbit, for the verdicts that have one.
+    pub fn cycle(&self) -> Option<&Cycle> {
+        match self {
+            Self::Periodic(c) | Self::Spiralling(c) | Self::QuasiPeriodic(c) => Some(c),
+            Self::Noisy { around, .. } => around.as_ref(),
+            _ => None,
+        }
+    }
+}
+
+impl std::fmt::Display for Verdict {
+    /// One line for a table.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Periodic(c) => {
+                write!(f, "period {}", c.period)?;
+                match c.settled_at {
+                    Some(t) => write!(f, ", settled at t = {t:.0}"),
+                    None => Ok(()),
+                }
+            }
+            Self::Spiralling(c) => {
+                write!(
+                    f,
+                    "spiralling onto period {} since t = {:.0}, radius {:.3}",
+                    c.period, c.captured_at, c.radius
+                )?;
+                match c.approach {
+                    Some(r) => write!(f, ", rate {:.1e}", r.per_time),
+                    None => Ok(()),
+                }
+            }
+            Self::QuasiPeriodic(c) => {
+                write!(
+                    f,
+                    "quasi-periodic around period {} since t = {:.0}, radius {:.3}",
+                    c.period, c.captured_at, c.radius
+                )
+            }
+            Self::Chaotic { lyapunov: Some(l), .. } => {
+                write!(f, "chaotic, largest exponent {:.4} +- {:.4}", l.value, l.standard_error)
+            }
+            Self::Chaotic { lyapunov: None, .. } => write!(f, "chaotic"),
+            Self::Noisy { share_of_structure, around } => {
+                write!(f, "noisy")?;
+                if let Some(c) = around {
+                    write!(f, ", in clouds of radius {:.1e} around period {}", c.radius, c.period)?;
+                }
+                match share_of_structure {
+                    Some(s) => write!(f, ", {:.0} % of the structure left", 100.0 * s),
+                    None => Ok(()),
+                }
+            }
+            Self::Escaped { last_crossing } => write!(f, "left the section at t = {last_crossing:.0}"),
+            Self::TooFew { points } => write!(f, "too few crossings ({points})"),
+        }
+    }
+}
+
+/// Everything a verdict rests on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Evidence {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// [`Verdict::name`], so that a reader of the file needs no knowledge of the enum.
+    pub name: String,
+    /// [`Verdict`] as one line of text.
+    pub summary: String,
+    /// Crossings given.
+    pub crossings: usize,
+    /// Diagonal of the box around them.
+    pub extent: f64,
+    /// Mean time between crossings of one direction.
+    pub return_time: f64,
+    /// From this time on the paper shows points.
+    pub shown_from: f64,
+    /// The run changed its character after that: a picture of the shown part holds both.
+    pub mixed: bool,
+    /// Everything shown is in dots: the run had settled on its periodic orbit by then.
+    pub dots_only: bool,
+    /// K of the 0-1 test: near 0 regular, near 1 irregular. Of the captured part if there is one, else of the end.
+    pub zero_one: Option<f64>,
+    /// Divergence of nearest neighbours, per return and per unit time: the largest exponent estimated from the points
+    /// alone.
+    pub divergence: Option<super::Divergence>,
+    /// The largest exponent given with the question.
+    pub lyapunov: Option<Exponent>,
+    /// Comparison with the reference given with the question.
+    pub overlap: Option<super::Overlap>,
+    /// The limits used.
+    pub thresholds: Thresholds,
+}

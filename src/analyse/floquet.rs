@@ -1,0 +1,337 @@
+//! Closed orbits and their multipliers.
+//!
+//! A closed orbit is a fixed point of the return map of a plane, found by Newton's method with the map's exact derivative from the
+//! variational equation; the eigenvalues of that derivative are the orbit's Floquet multipliers without the trivial one (Guckenheimer &
+//! Holmes 1983, sec. 1.5; Parker & Chua 1989, ch. 5). |multiplier| < 1 for all: the orbit attracts, at the rate -ln|multiplier|
+//! / period.
+
+use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
+
+use super::tangent::Tangent;
+use crate::integrate::{Dopri5, Failure, Stepper, Tolerance, roots};
+use crate::num::elementary::{ln, sqrt};
+use crate::system::VectorField;
+
+/// The plane `x[axis] = value`, crossed in one direction.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plane {
+    /// Index of the coordinate.
+    pub axis: usize,
+    /// Its value on the plane.
+    pub value: f64,
+    /// Whether the coordinate increases where the orbit is counted.
+    pub upward: bool,
+}
+
+/// How a closed orbit is computed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Local error of the orbit and its tangent vectors.
+    pub tolerance: Tolerance,
+    /// Longest step.
+    pub max_step: f64,
+    /// Largest return error |P(u) - u| that counts as closed.
+    pub closed: f64,
+    /// Most Newton iterations.
+    pub iterations: usize,
+    /// Give up on a return after this time.
+    pub longest_return: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            tolerance: Tolerance { rtol: 1e-11, atol: 1e-11 },
+            max_step: f64::INFINITY,
+            closed: 1e-9,
+            iterations: 30,
+            longest_return: 1e4,
+        }
+    }
+}
+
+/// A closed orbit with its stability.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ClosedOrbit {
+    /// Where it crosses the plane in the counted direction, in the order of the motion; full states.
+    pub points: Vec<Vec<f64>>,
+    /// Where it crosses in the other direction.
+    pub opposite: Vec<Vec<f64>>,
+    /// Its period.
+    pub period: f64,
+    /// Multipliers as (real, imaginary), by falling modulus.
+    pub multipliers: Vec<[f64; 2]>,
+    /// Rate at which nearby orbits approach it in the end, per unit time: -ln(largest modulus)/period. Negative: it
+    /// repels.
+    pub rate: f64,
+    /// |P(u) - u| at the end.
+    pub residual: f64,
+    /// Newton iterations made.
+    pub iterations: usize,
+}
+
+/// Why no closed orbit came out.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// The integration failed.
+    #[error(transparent)]
+    Integration(#[from] Failure),
+    /// The orbit does not come back.
+    #[error(
+        "the orbit from {from:?} did not return to the plane within t = {within}: start nearer to the closed orbit"
+    )]
+    NoReturn {
+        /// Start on the plane.
+        from: Vec<f64>,
+        /// Time given.
+        within: f64,
+    },
+    /// Newton's method did not converge.
+    #[error(
+        "no closed orbit found near the start: return error {residual:e} after {iterations} Newton iterations; start nearer or check the number of returns"
+    )]
+    NotConverged {
+        /// Return error reached.
+        residual: f64,
+        /// Iterations made.
+        iterations: usize,
+    },
+    /// The derivative of the return map minus the identity is singular.
+    #[error("the closed orbit is not isolated here (the return map has multiplier 1)")]
+    NotIsolated,
+}
+
+/// The return after a number of crossings, with the map's derivative.
+struct Return<const N: usize> {
+    point: SVector<f64, N>,
+    time: f64,
+    /// dP/du as an N x N matrix whose row and column `axis` are zero.
+    derivative: SMatrix<f64, N, N>,
+    same: Vec<Vec<f64>>,
+    opposite: Vec<Vec<f64>>,
+}
+
+/// The closed orbit that crosses `plane` `returns` times per turn in its direction, by Newton's method from `guess` (its component
+/// `plane.axis` is set to `plane.value`). `M` is `N` (`N` + 1): `closed_orbit::<3, 12, _>(...)`.
+pub fn closed_orbit<const N: usize, const M: usize, F>(
+    field: &F,
+    plane: Plane,
+    returns: usize,
+    guess: SVector<f64, N>,
+    settings: &Settings,
+) -> Result<ClosedOrbit, Error>
+where
+    F: VectorField<N>,
+    for<'a> Tangent<'a, F, N>: VectorField<M>,
+{
+    const { assert!(M == N * (N + 1)) };
+    let mut u = guess;
+    u[plane.axis] = plane.value;
+    let mut residual = f64::INFINITY;
+    for iteration in 0..settings.iterations {
+        let r = returned::<N, M, F>(field, plane, returns, u, settings)?;
+        let difference = r.point - u;
+        residual = difference.norm();
+        if residual <= settings.closed {
+            let multipliers = multipliers(&r.derivative, plane.axis);
+            let largest = multipliers.first().map_or(0.0, |m| sqrt(m[0] * m[0] + m[1] * m[1]));
+            // The start is the orbit's first crossing; the last return is the start again.
+            let mut points = vec![Failure::state(&u)];
+            points.extend(r.same.into_iter().take(returns - 1));
+            return Ok(ClosedOrbit {
+                points,
+                opposite: r.opposite,
+                period: r.time,
+                multipliers,
+                rate: -ln(largest) / r.time,
+                residual,
+                iterations: iteration,
+            });
+        }
+        // (DP - 1) du = -(P(u) - u) in the plane; the row and column of the axis become the identity's.
+        let mut matrix = r.derivative - SMatrix::identity();
+        matrix[(plane.axis, plane.axis)] = 1.0;
+        let step = solve(matrix, -difference).ok_or(Error::NotIsolated)?;
+        u += step;
+        u[plane.axis] = plane.value;
+    }
+    Err(Error::NotConverged { residual, iterations: settings.iterations })
+}
+
+fn returned<const N: usize, const M: usize, F>(
+    field: &F,
+    plane: Plane,
+    returns: usize,
+    u: SVector<f64, N>,
+    settings: &Settings,
+) -> Result<Return<N>, Error>
+where
+    F: VectorField<N>,
+    for<'a> Tangent<'a, F, N>: VectorField<M>,
+{
+    let tangent = Tangent::<F, N>(field);
+    let mut stepper = Dopri5::<M>::new(settings.tolerance);
+    // x, then the columns of the identity.
+    let mut state =
+        SVector::<f64, M>::from_fn(|i, _| if i < N { u[i] } else { f64::from(u8::from((i - N) / N == (i - N) % N)) });
+    let mut t = 0.0;
+    let (mut same, mut opposite) = (Vec::new(), Vec::new());
+    stepper.restart(&tangent, t, state, settings.longest_return, settings.max_step)?;
+    while t < settings.longest_return {
+        let step = stepper.step(&tangent)?;
+        let (t0, state0) = (step.t0, step.x0);
+        let crossings = roots::sign_changes(&step, |s| s[plane.axis] - plane.value);
+        let times: Vec<(f64, SVector<f64, M>)> =
+            crossings.iter().map(|theta| (step.time(*theta), step.at(*theta))).collect();
+        (t, state) = (step.t1, step.x1);
+        for (tc, at) in times {
+            let speed = tangent.eval(&at)[plane.axis];
+            let x: Vec<f64> = at.iter().take(N).copied().collect();
+            if (speed > 0.0) != plane.upward {
+                opposite.push(x);
+                continue;
+            }
+            same.push(x);
+            if same.len() < returns {
+                continue;
+            }
+            // Land there by a step of its own: the dense output is less accurate than the method.
+            let mut landing = state0;
+            if tc > t0 {
+                let mut to = Dopri5::<M>::new(settings.tolerance);
+                to.restart(&tangent, t0, state0, tc, settings.max_step)?;
+                let mut now = t0;
+                while now < tc {
+                    let s = to.step(&tangent)?;
+                    (now, landing) = (s.t1, s.x1);
+                }
+            }
+            let f = tangent.eval(&landing);
+            let dt = (plane.value - landing[plane.axis]) / f[plane.axis];
+            // What is left is of the size of the dense output's error: first order in it suffices.
+            let landing = landing + f * dt;
+            let f = tangent.eval(&landing);
+            let point = SVector::<f64, N>::from_fn(|i, _| if i == plane.axis { plane.value } else { landing[i] });
+            // Tangent vectors projected along the flow into the plane.
+            let derivative = SMatrix::from_fn(|i, j| {
+                if i == plane.axis || j == plane.axis {
+                    return 0.0;
+                }
+                let column = |k: usize| landing[N * (j + 1) + k];
+                column(i) - f[i] / f[plane.axis] * column(plane.axis)
+            });
+            return Ok(Return { point, time: tc + dt, derivative, same, opposite });
+        }
+    }
+    let _ = state;
+    Err(Error::NoReturn { from: Failure::state(&u), within: settings.longest_return })
+}
+
+/// The solution of a x = b by elimination with row pivoting; `None` when `a` is singular to rounding.
+fn solve<const N: usize>(mut a: SMatrix<f64, N, N>, mut b: SVector<f64, N>) -> Option<SVector<f64, N>> {
+    let scale = a.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    for k in 0..N {
+        let p = (k..N).max_by(|i, j| a[(*i, k)].abs().total_cmp(&a[(*j, k)].abs()))?;
+        if a[(p, k)].abs() <= 1e-14 * scale || a[(p, k)].is_nan() {
+            return None;
+        }
+        a.swap_rows(k, p);
+        b.swap_rows(k, p);
+        for i in k + 1..N {
+            let m = a[(i, k)] / a[(k, k)];
+            for j in k..N {
+                a[(i, j)] -= m * a[(k, j)];
+            }
+            b[i] -= m * b[k];
+        }
+    }
+    for k in (0..N).rev() {
+        for j in k + 1..N {
+            b[k] -= a[(k, j)] * b[j];
+        }
+        b[k] /= a[(k, k)];
+    }
+    Some(b)
+}
+
+/// Eigenvalues of the matrix without row and column `axis`, by falling modulus, from its characteristic polynomial (dimension at most
+/// three). The large ones, which decide stability, are accurate; a strongly contracted one is lost below rounding of the
+/// largest.
+fn multipliers<const N: usize>(m: &SMatrix<f64, N, N>, axis: usize) -> Vec<[f64; 2]> {
+    let kept: Vec<usize> = (0..N).filter(|i| *i != axis).collect();
+    let a = |i: usize, j: usize| m[(kept[i], kept[j])];
+    let mut found = match kept.len() {
+        1 => vec![[a(0, 0), 0.0]],
+        2 => quadratic(a(0, 0) + a(1, 1), a(0, 0) * a(1, 1) - a(0, 1) * a(1, 0)).to_vec(),
+        3 => {
+            let trace = a(0, 0) + a(1, 1) + a(2, 2);
+            let minor = |i: usize, j: usize| a(i, i) * a(j, j) - a(i, j) * a(j, i);
+            let minors = minor(0, 1) + minor(0, 2) + minor(1, 2);
+            let det = a(0, 0) * minor(1, 2) - a(0, 1) * (a(1, 0) * a(2, 2) - a(1, 2) * a(2, 0))
+                + a(0, 2) * (a(1, 0) * a(2, 1) - a(1, 1) * a(2, 0));
+            // l^3 - trace l^2 + minors l - det has a real zero within Cauchy's bound.
+            let p = |l: f64| ((l - trace) * l + minors) * l - det;
+            let bound = 1.0 + trace.abs().max(minors.abs()).max(det.abs());
+            let real = roots::brent(p, -bound, bound, p(-bound), p(bound));
+            let mut all = quadratic(trace - real, minors - real * (trace - real)).to_vec();
+            all.push([real, 0.0]);
+            all
+        }
+        n => unreachable!("no model has {n} dimensions in its section"),
+    };
+    found.sort_by(|x, y| (y[0] * y[0] + y[1] * y[1]).total_cmp(&(x[0] * x[0] + x[1] * x[1])));
+    found
+}
+
+/// Zeros of l^2 - s l + p.
+fn quadratic(s: f64, p: f64) -> [[f64; 2]; 2] {
+    let d = 0.25 * s * s - p;
+    if d < 0.0 {
+        return [[0.5 * s, sqrt(-d)], [0.5 * s, -sqrt(-d)]];
+    }
+    // The larger first; the smaller from the product, free of cancellation.
+    let large = 0.5 * s + sqrt(d).copysign(s);
+    let small = if large == 0.0 { 0.0 } else { p / large };
+    [[large, 0.0], [small, 0.0]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::num::Elementary;
+
+    /// r' = a r (1 - r^2), angle' = 1: period 2 pi, multiplier exp(-4 pi a).
+    struct Hopf(f64);
+    impl VectorField<2> for Hopf {
+        fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+            let g = (S::one() - x[0] * x[0] - x[1] * x[1]).scale(self.0);
+            SVector::from([g * x[0] - x[1], g * x[1] + x[0]])
+        }
+    }
+
+    #[test]
+    fn hopf_normal_form_is_exact() {
+        let plane = Plane { axis: 1, value: 0.0, upward: true };
+        for a in [0.05, 0.5, -0.03] {
+            let o =
+                closed_orbit::<2, 6, _>(&Hopf(a), plane, 1, SVector::from([1.2, 0.0]), &Settings::default()).unwrap();
+            assert!((o.period - std::f64::consts::TAU).abs() < 1e-9, "{o:?}");
+            assert!((o.rate - 2.0 * a).abs() < 1e-8, "{o:?}");
+            assert!((o.points[0][0] - 1.0).abs() < 1e-8 && (o.opposite[0][0] + 1.0).abs() < 1e-8);
+        }
+    }
+
+    #[test]
+    fn cubic_eigenvalues() {
+        // Companion form of (l - 0.9)(l^2 - 0.2 l + 0.5), surrounded by the axis.
+        let mut m = SMatrix::<f64, 4, 4>::zeros();
+        let (c2, c1, c0) = (1.1, -0.68, 0.45);
+        for (i, j, v) in [(0, 0, c2), (0, 2, c1), (0, 3, c0), (2, 0, 1.0), (3, 2, 1.0)] {
+            m[(i, j)] = v;
+        }
+        let e = multipliers(&m, 1);
+        assert!((e[0][0] - 0.9).abs() < 1e-12 && e[0][1] == 0.0, "{e:?}");
+        assert!((e[1][0] - 0.1).abs() < 1e-12 && (e[1][1].abs() - 0.7).abs() < 1e-12, "{e:?}");
+    }
+}

@@ -1,0 +1,283 @@
+//! From a spec to a recording. Pure: the same spec gives the same bytes.
+
+use nalgebra::{SVector, vector};
+
+use super::spec::{FunnelSpec, Method, Observation, RunSpec, SpecError, SwitchSpec, SystemSpec};
+use crate::analyse::{Crossing, Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder};
+use crate::integrate::filippov::{
+    self, AllModes, ExitRule, FilippovError, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent, Side,
+};
+use crate::integrate::{
+    Dopri5, Failure, Flow, Lsoda, Observer, Radau5, Statistics, Step, Stepper, Taylor, Watch, drive,
+};
+use crate::system::{Hysteretic, PiecewiseSmooth, Smoothed, VectorField};
+
+/// What a run left behind.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// The recorded points.
+    pub data: Data,
+    /// Final time.
+    pub t: f64,
+    /// Final state (first three components).
+    pub x: [f64; 3],
+    /// Work done.
+    pub statistics: Statistics,
+    /// The largest number of steps between restarts; NDSolve's default limit is 10,000.
+    pub most_steps_in_segment: u64,
+}
+
+/// Recorded points.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Data {
+    /// A path.
+    Path(Vec<Sample>),
+    /// A Poincare section.
+    Section(Vec<Crossing>),
+    /// A Filippov motion: pieces by mode, and events.
+    Motion(Motion),
+    /// The approach to a set-valued point and its futures.
+    Funnel {
+        /// The motion up to there.
+        approach: Motion,
+        /// The futures, by exit time, plus before minus.
+        futures: Vec<Future>,
+    },
+}
+
+/// One future of a set-valued point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Future {
+    /// Time of repelling sliding asked for.
+    pub exit_time: f64,
+    /// The side left to.
+    pub side: Side,
+    /// The motion from the set-valued point on.
+    pub motion: Motion,
+}
+
+impl Data {
+    /// Number of recorded points.
+    pub fn len(&self) -> usize {
+        match self {
+            Data::Path(samples) => samples.len(),
+            Data::Section(crossings) => crossings.len(),
+            Data::Motion(motion) => motion.len(),
+            Data::Funnel { approach, futures } => {
+                approach.len() + futures.iter().map(|f| f.motion.len()).sum::<usize>()
+            }
+        }
+    }
+
+    /// Whether nothing was recorded.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// Why a run gave no recording.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RunError {
+    /// The spec is wrong.
+    #[error(transparent)]
+    Spec(#[from] SpecError),
+    /// The integration failed.
+    #[error(transparent)]
+    Integration(#[from] Failure),
+    /// The Filippov motion could not go on.
+    #[error(transparent)]
+    Filippov(#[from] FilippovError),
+}
+
+/// Computes a run.
+pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, RunError> {
+    spec.validate()?;
+    match spec.system {
+        SystemSpec::Caricature(system) => switch(spec, system, watch),
+        SystemSpec::Wheel(system) => switch(spec, system, watch),
+    }
+}
+
+fn switch<P: PiecewiseSmooth<3> + Copy>(spec: &RunSpec, system: P, watch: &dyn Watch) -> Result<Recording, RunError> {
+    let x0 = SVector::from(spec.start);
+    match spec.switch {
+        SwitchSpec::Smoothed { eps, transition } => observe(spec, &Smoothed { system, transition, eps }, x0, watch),
+        SwitchSpec::Hysteretic { eps, eps_prime, relaxation, phi0 } => {
+            let field = Hysteretic { system, eps, eps_prime, relaxation };
+            observe(spec, &field, vector![x0[0], x0[1], x0[2], phi0], watch)
+        }
+        SwitchSpec::Filippov { exit, funnel } => discontinuous(spec, &system, x0, exit, funnel, watch),
+    }
+}
+
+/// The discontinuous system, event by event.
+fn discontinuous<P: PiecewiseSmooth<3>>(
+    spec: &RunSpec,
+    system: &P,
+    x0: SVector<f64, 3>,
+    exit: ExitRule,
+    funnel: Option<FunnelSpec>,
+    watch: &dyn Watch,
+) -> Result<Recording, RunError> {
+    let settings = filippov::Settings {
+        tolerance: spec.method.tolerance,
+        max_step: spec.method.step_cap.for_segment(spec.t_end),
+        max_steps: spec.method.max_steps,
+        ..filippov::Settings::default()
+    };
+    let recording = |data, summary: FilippovSummary<3>| Recording {
+        data,
+        t: summary.t,
+        x: summary.x.into(),
+        most_steps_in_segment: summary.statistics.steps,
+        statistics: summary.statistics,
+    };
+    match (spec.observe, funnel) {
+        (Observation::Path { .. }, Some(funnel)) => futures(spec, system, x0, &settings, &funnel),
+        (Observation::Path { chord }, None) => {
+            let mut recorder = Watched { inner: MotionRecorder::new(chord), watch };
+            let end = filippov::run(system, x0, spec.t_end, &settings, exit, &mut recorder)?;
+            Ok(recording(Data::Motion(recorder.inner.into_motion()), end))
+        }
+        (Observation::Section { coordinate, value }, _) => {
+            let mut recorder = SectionRecorder::new(coordinate, value);
+            let mut watched = Watched { inner: AllModes(&mut recorder), watch };
+            let end = filippov::run(system, x0, spec.t_end, &settings, exit, &mut watched)?;
+            Ok(recording(Data::Section(recorder.into_crossings()), end))
+        }
+    }
+}
+
+/// A Filippov observer that also reports progress.
+struct Watched<'a, O> {
+    inner: O,
+    watch: &'a dyn Watch,
+}
+
+impl<O: FilippovObserver<3>> FilippovObserver<3> for Watched<'_, O> {
+    fn step(&mut self, mode: Mode, step: &Step<'_, 3>) -> Flow {
+        self.inner.step(mode, step)
+    }
+    fn event(&mut self, event: &ModeEvent<3>) -> Flow {
+        if self.watch.reached(event.t) { self.inner.event(event) } else { Flow::Stop }
+    }
+}
+
+/// The funnel: the approach to the set-valued point, and its futures.
+fn futures<P: PiecewiseSmooth<3>>(
+    spec: &RunSpec,
+    system: &P,
+    x0: SVector<f64, 3>,
+    settings: &filippov::Settings,
+    funnel: &FunnelSpec,
+) -> Result<Recording, RunError> {
+    let grid = FunnelGrid {
+        shortest: funnel.shortest,
+        longest: funnel.longest,
+        times: funnel.times,
+        horizon: funnel.horizon,
+        until_two_fold: funnel.until_two_fold,
+        per_step: POINTS_PER_STEP,
+    };
+    let found = filippov::funnel(system, x0, spec.t_end, settings, &grid)?;
+    let mut statistics = Statistics::default();
+    for member in &found.members {
+        statistics.steps += member.summary.statistics.steps;
+        statistics.rejected += member.summary.statistics.rejected;
+        statistics.evaluations += member.summary.statistics.evaluations;
+        statistics.restarts += member.summary.statistics.restarts;
+        statistics.highest_order = member.summary.statistics.highest_order;
+    }
+    let futures = found
+        .members
+        .into_iter()
+        .map(|m| Future { exit_time: m.exit_time, side: m.side, motion: motion(m.trajectory) })
+        .collect();
+    Ok(Recording {
+        data: Data::Funnel { approach: motion(found.approach), futures },
+        t: found.t,
+        x: found.point.into(),
+        most_steps_in_segment: statistics.steps,
+        statistics,
+    })
+}
+
+/// Recorded points in each step of a funnel's orbits.
+const POINTS_PER_STEP: usize = 6;
+
+fn motion(trajectory: filippov::Trajectory<3>) -> Motion {
+    let samples =
+        |points: Vec<(f64, SVector<f64, 3>)>| points.into_iter().map(|(t, x)| Sample { t, x: x.into() }).collect();
+    let pieces = trajectory.pieces.into_iter().map(|p| (p.mode, samples(p.points))).collect();
+    Motion { pieces, events: trajectory.events }
+}
+
+fn observe<F: VectorField<N>, const N: usize>(
+    spec: &RunSpec,
+    field: &F,
+    x0: SVector<f64, N>,
+    watch: &dyn Watch,
+) -> Result<Recording, RunError> {
+    match spec.observe {
+        Observation::Path { chord } => {
+            let mut recorder = PathRecorder::new(&x0, chord);
+            let end = integrate(spec, field, x0, &mut recorder, watch)?;
+            Ok(end.recording(Data::Path(recorder.into_samples())))
+        }
+        Observation::Section { coordinate, value } => {
+            let mut recorder = SectionRecorder::new(coordinate, value);
+            let end = integrate(spec, field, x0, &mut recorder, watch)?;
+            Ok(end.recording(Data::Section(recorder.into_crossings())))
+        }
+    }
+}
+
+fn integrate<F: VectorField<N>, O: Observer<N>, const N: usize>(
+    spec: &RunSpec,
+    field: &F,
+    x0: SVector<f64, N>,
+    observer: &mut O,
+    watch: &dyn Watch,
+) -> Result<End, RunError> {
+    match spec.method.name {
+        Method::Lsoda => step(spec, field, x0, Lsoda::new(spec.method.tolerance), observer, watch),
+        Method::Dopri5 => step(spec, field, x0, Dopri5::new(spec.method.tolerance), observer, watch),
+        Method::Radau5 => step(spec, field, x0, Radau5::new(spec.method.tolerance), observer, watch),
+        Method::Taylor => step(spec, field, x0, Taylor::new(spec.method.tolerance), observer, watch),
+        Method::TaylorExtended => step(spec, field, x0, Taylor::extended(spec.method.tolerance), observer, watch),
+    }
+}
+
+fn step<F: VectorField<N>, M: Stepper<N>, O: Observer<N>, const N: usize>(
+    spec: &RunSpec,
+    field: &F,
+    x0: SVector<f64, N>,
+    mut stepper: M,
+    observer: &mut O,
+    watch: &dyn Watch,
+) -> Result<End, RunError> {
+    let method = &spec.method;
+    let summary =
+        drive(field, x0, spec.t_end, &mut stepper, &spec.schedule, method.step_cap, method.max_steps, observer, watch)?;
+    Ok(End {
+        t: summary.t,
+        x: [summary.x[0], summary.x[1], summary.x[2]],
+        statistics: summary.statistics,
+        most_steps_in_segment: summary.most_steps_in_segment,
+    })
+}
+
+/// The end of a run, before its data join it.
+struct End {
+    t: f64,
+    x: [f64; 3],
+    statistics: Statistics,
+    most_steps_in_segment: u64,
+}
+
+impl End {
+    fn recording(self, data: Data) -> Recording {
+        let End { t, x, statistics, most_steps_in_segment } = self;
+        Recording { data, t, x, statistics, most_steps_in_segment }
+    }
+}

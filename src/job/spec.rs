@@ -1,0 +1,327 @@
+//! Runs as plain data: everything a computation depends on, and nothing else.
+//!
+//! A [`RunSpec`] can be written as JSON, hashed, and given back to `twofold run --spec`. Two equal specs give the same
+//! bytes on any machine.
+
+use serde::{Deserialize, Serialize};
+
+use crate::integrate::filippov::ExitRule;
+use crate::integrate::{Schedule, StepCap, Tolerance};
+use crate::num::elementary::exp10;
+use crate::system::{Caricature, Relaxation, Transition, Wheel};
+
+/// One run: system, switch, start, method, schedule, and what is recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunSpec {
+    /// The piecewise-smooth system.
+    pub system: SystemSpec,
+    /// How the switch at h = 0 is modelled.
+    pub switch: SwitchSpec,
+    /// Initial state.
+    pub start: [f64; 3],
+    /// Final time; the run starts at 0.
+    pub t_end: f64,
+    /// Integration method and its settings.
+    pub method: MethodSpec,
+    /// Restarts and kicks.
+    pub schedule: Schedule,
+    /// What is recorded.
+    pub observe: Observation,
+}
+
+/// A piecewise-smooth system of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SystemSpec {
+    /// Eq. (5).
+    Caricature(Caricature),
+    /// Eqs (1)-(2), reconstructed.
+    Wheel(Wheel),
+}
+
+impl SystemSpec {
+    /// Names of the state's components.
+    pub fn coordinates(&self) -> [&'static str; 3] {
+        match self {
+            SystemSpec::Caricature(_) => ["x", "y", "z"],
+            SystemSpec::Wheel(_) => ["r", "v", "omega"],
+        }
+    }
+}
+
+/// What stands in for the discontinuity.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum SwitchSpec {
+    /// Eq. (8): phi is a function of h/eps.
+    Smoothed {
+        /// Stiffness parameter.
+        eps: f64,
+        /// Transition function.
+        transition: Transition,
+    },
+    /// Eq. (10): phi is a state.
+    Hysteretic {
+        /// Half-width of the loop.
+        eps: f64,
+        /// Relaxation time.
+        eps_prime: f64,
+        /// Reading of eq. (10).
+        relaxation: Relaxation,
+        /// phi at the start.
+        phi0: f64,
+    },
+    /// The discontinuous system itself, in Filippov's sense (sec. 3).
+    Filippov {
+        /// How repelling sliding ends: the choice that the equations do not make.
+        exit: ExitRule,
+        /// Which futures are followed if `exit` is [`ExitRule::All`]; required there, absent elsewhere.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        funnel: Option<FunnelSpec>,
+    },
+}
+
+/// Which members of a funnel are computed: exit times, geometrically spaced, and both sides of each.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FunnelSpec {
+    /// Shortest time of repelling sliding.
+    pub shortest: f64,
+    /// Longest time of repelling sliding.
+    pub longest: f64,
+    /// Number of times.
+    pub times: usize,
+    /// Follow each future so long at most.
+    pub horizon: f64,
+    /// Stop a future when it next comes to a two-fold.
+    pub until_two_fold: bool,
+}
+
+impl SwitchSpec {
+    /// tanh smoothing, sec. 4.1.
+    pub fn tanh(eps: f64) -> Self {
+        SwitchSpec::Smoothed { eps, transition: Transition::Tanh }
+    }
+
+    /// The hysteretic system of sec. 4.3 with eps' = 10 eps and phi(0) = 1.
+    pub fn hysteretic(eps: f64, relaxation: Relaxation) -> Self {
+        SwitchSpec::Hysteretic { eps, eps_prime: 10.0 * eps, relaxation, phi0: 1.0 }
+    }
+}
+
+/// An integration method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// LSODA: Adams and BDF with automatic switching, the default NDSolve of the paper's day.
+    Lsoda,
+    /// Dormand-Prince 5(4).
+    Dopri5,
+    /// Radau IIA of order 5.
+    Radau5,
+    /// Taylor series that resolve the layer, in f64.
+    Taylor,
+    /// The same in double-double arithmetic, about 32 digits: the reference.
+    TaylorExtended,
+}
+
+impl Method {
+    /// The name on the command line and in small print.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Lsoda => "lsoda",
+            Method::Dopri5 => "dopri5",
+            Method::Radau5 => "radau5",
+            Method::Taylor => "taylor",
+            Method::TaylorExtended => "taylor-extended",
+        }
+    }
+}
+
+/// A method with its settings.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MethodSpec {
+    /// The method.
+    pub name: Method,
+    /// Local error control.
+    pub tolerance: Tolerance,
+    /// Longest step.
+    pub step_cap: StepCap,
+    /// Most steps of the whole run before it is given up as a failure.
+    pub max_steps: u64,
+}
+
+/// A budget far above what any run of the paper needs; a run on the stiff far attractor reaches it within minutes.
+pub const DEFAULT_MAX_STEPS: u64 = 400_000_000;
+
+impl MethodSpec {
+    /// NDSolve's defaults: AccuracyGoal = PrecisionGoal = MachinePrecision/2, so rtol = atol = 10^-7.97727; MaxStepFraction
+    /// = 1/10 of the interval.
+    pub fn ndsolve_defaults(name: Method) -> Self {
+        let tolerance = exp10(-7.97727);
+        Self {
+            name,
+            tolerance: Tolerance { rtol: tolerance, atol: tolerance },
+            step_cap: StepCap::FractionOfSegment(0.1),
+            max_steps: DEFAULT_MAX_STEPS,
+        }
+    }
+}
+
+/// What is recorded of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Observation {
+    /// The path, as a polyline that stays within `chord` of the dense output.
+    Path {
+        /// Largest distance, in the state's units.
+        chord: f64,
+    },
+    /// Passages through the plane `coordinate = value`.
+    Section {
+        /// Index of the coordinate.
+        coordinate: usize,
+        /// Its value.
+        value: f64,
+    },
+}
+
+/// A wrong number in a spec: which, and what is allowed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{field} is {value}: {rule}")]
+pub struct SpecError {
+    /// The field, as it is called on the command line.
+    pub field: &'static str,
+    /// Its value.
+    pub value: String,
+    /// What would be right.
+    pub rule: &'static str,
+}
+
+impl RunSpec {
+    /// Checks every number; a spec that passes can be run.
+    pub fn validate(&self) -> Result<(), SpecError> {
+        let error = |field, value: f64, rule| Err(SpecError { field, value: format!("{value:?}"), rule });
+        let positive = |field, value: f64| {
+            if value.is_finite() && value > 0.0 {
+                Ok(())
+            } else {
+                error(field, value, "give a finite number above zero")
+            }
+        };
+        let finite = |field, value: f64| {
+            if value.is_finite() { Ok(()) } else { error(field, value, "give a finite number") }
+        };
+        positive("t-end", self.t_end)?;
+        for value in self.start {
+            finite("start", value)?;
+        }
+        match self.system {
+            SystemSpec::Caricature(c) => {
+                finite("alpha", c.alpha)?;
+                finite("beta", c.beta)?;
+                finite("v-plus", c.v_plus)?;
+                finite("v-minus", c.v_minus)?;
+            }
+            SystemSpec::Wheel(w) => {
+                positive("m", w.m)?;
+                positive("j", w.j)?;
+                positive("v_c", w.v_c)?;
+                for value in [w.d, w.gamma, w.k_w, w.r0, w.c_w, w.c_h, w.omega0, w.side_force, w.trail] {
+                    finite("a parameter of the wheel", value)?;
+                }
+            }
+        }
+        match self.switch {
+            SwitchSpec::Smoothed { eps, transition } => {
+                positive("eps", eps)?;
+                if let Transition::PerturbedTanh { sigma } = transition {
+                    finite("sigma", sigma)?;
+                }
+            }
+            SwitchSpec::Hysteretic { eps, eps_prime, phi0, .. } => {
+                positive("eps", eps)?;
+                positive("eps-prime", eps_prime)?;
+                finite("phi0", phi0)?;
+            }
+            SwitchSpec::Filippov { exit, funnel } => {
+                let wrong = |rule| Err(SpecError { field: "exit", value: format!("{exit:?}"), rule });
+                if exit.validate().is_err() {
+                    return wrong("times and lengths are finite and not below 0, probabilities between 0 and 1");
+                }
+                if (exit == ExitRule::All) != funnel.is_some() {
+                    return wrong("\"all\" and a description of the funnel go together");
+                }
+                if let Some(funnel) = funnel {
+                    positive("funnel-shortest", funnel.shortest)?;
+                    positive("funnel-longest", funnel.longest)?;
+                    positive("funnel-horizon", funnel.horizon)?;
+                    if funnel.times == 0 || funnel.times > 100_000 {
+                        return error("funnel-times", funnel.times as f64, "give a number from 1 to 100000");
+                    }
+                    if let Observation::Section { .. } = self.observe {
+                        return wrong("a funnel is recorded as paths; leave out --section");
+                    }
+                }
+                if self.method.name != Method::Dopri5 {
+                    return Err(SpecError {
+                        field: "method",
+                        value: self.method.name.name().into(),
+                        rule: "Filippov motion is integrated by dopri5 between events",
+                    });
+                }
+                if self.schedule != Schedule::default() {
+                    return Err(SpecError {
+                        field: "switch",
+                        value: "filippov".into(),
+                        rule: "restarts and kicks apply to smoothed and hysteretic runs; leave them out",
+                    });
+                }
+            }
+        }
+        positive("rtol", self.method.tolerance.rtol)?;
+        positive("atol", self.method.tolerance.atol)?;
+        let (finest, rule) = match self.method.name {
+            Method::TaylorExtended => (1e-32, "double-double arithmetic carries 32 digits; give 1e-32 or more"),
+            Method::Taylor => (1e-17, "f64 carries 16 digits; give 1e-17 or more"),
+            _ => (1e-15, "f64 carries 16 digits; give 1e-15 or more"),
+        };
+        if self.method.tolerance.rtol < finest {
+            return error("rtol", self.method.tolerance.rtol, rule);
+        }
+        match self.method.step_cap {
+            StepCap::None => {}
+            StepCap::Absolute(h) => positive("max-step", h)?,
+            StepCap::FractionOfSegment(f) => positive("max-step fraction", f)?,
+        }
+        if self.method.max_steps == 0 {
+            return error("max-steps", 0.0, "give at least one step");
+        }
+        if let Some(every) = self.schedule.restart_every {
+            positive("restart", every)?;
+            if self.t_end / every > 1e9 {
+                return error("restart", every, "that is more than 10^9 restarts; give a longer interval");
+            }
+        }
+        if let Some(kick) = self.schedule.kick {
+            positive("kick-every", kick.every)?;
+            if self.t_end / kick.every > 1e9 {
+                return error("kick-every", kick.every, "that is more than 10^9 kicks; give a longer interval");
+            }
+            if !(kick.size.is_finite() && kick.size >= 0.0) {
+                return error("kick-size", kick.size, "give a finite number, zero or above");
+            }
+        }
+        match self.observe {
+            Observation::Path { chord } => positive("chord", chord),
+            Observation::Section { coordinate, value } => {
+                if coordinate > 2 {
+                    return error("section", coordinate as f64, "the state has three components, 0, 1 and 2");
+                }
+                finite("section", value)
+            }
+        }
+    }
+}

@@ -1,0 +1,243 @@
+//! From recordings to a drawing: which points, lines and surfaces, in which colours and ranges.
+
+use super::{Camera, Panel, Picture, View, wording};
+use crate::analyse::{Crossing, Motion, Sample};
+use crate::draw::surface;
+use crate::integrate::filippov::{EventKind, Mode, Side};
+use crate::job::simulate::{Data, Future, Recording};
+use crate::job::spec::SystemSpec;
+use crate::record::Hash;
+use crate::render::sheet::{
+    Axis, ColumnWidth, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle, PlanePanel, Sheet,
+    SpacePanel, range_of,
+};
+use crate::render::style;
+
+/// The drawing of a picture of runs.
+pub fn sheet(picture: &Picture, recordings: &[Recording], spec: &Hash, data: &Hash) -> Sheet {
+    let runs: Vec<_> = picture.panels.iter().map(|p| &p.run).collect();
+    let mut sheet = dress(Sheet::new(ColumnWidth::Double, columns(picture), ""), picture, spec, data);
+    if picture.panels.iter().any(|p| matches!(p.run.system, SystemSpec::Wheel(_))) {
+        sheet = sheet.subtitle("reconstruction: the paper gives the form of the equations, not their coefficients");
+    }
+    for line in wording::small_print(picture.reading, &runs) {
+        sheet = sheet.footer(line);
+    }
+    match picture.view {
+        View::Section { horizontal, vertical } => section_panels(sheet, picture, recordings, [horizontal, vertical]),
+        View::Space { camera } => space_panels(sheet, picture, recordings, &camera),
+        View::Study(_) => sheet,
+    }
+}
+
+/// The drawing of a study: its own sheet, with the picture's heading and provenance.
+pub fn study_sheet(picture: &Picture, sheet: Sheet, spec: &Hash, data: &Hash) -> Sheet {
+    dress(sheet, picture, spec, data)
+}
+
+/// Heading, description, warnings and provenance: what every picture has.
+fn dress(mut sheet: Sheet, picture: &Picture, spec: &Hash, data: &Hash) -> Sheet {
+    sheet.description = wording::plain(&picture.caption);
+    sheet = sheet
+        .title(picture.title)
+        .provenance("Software", concat!("twofold ", env!("CARGO_PKG_VERSION")))
+        .provenance("Picture", &picture.name)
+        .provenance("Reading", picture.reading.map_or("none", |r| r.word()))
+        .provenance("Method", methods(picture))
+        .provenance("Spec-SHA256", spec.as_str())
+        .provenance("Data-SHA256", data.as_str());
+    if let Some(reading) = picture.reading {
+        sheet = sheet.subtitle(wording::reading(reading));
+    }
+    if !picture.alterations.is_empty() {
+        sheet = sheet.banner(format!("NOT THE PUBLISHED PICTURE: {}", picture.alterations.join("; ")));
+    }
+    sheet
+}
+
+/// Up to three panels stand side by side, four in a square.
+fn columns(picture: &Picture) -> usize {
+    match picture.panels.len() {
+        n @ 0..=3 => n.max(1),
+        4 => 2,
+        _ => 3,
+    }
+}
+
+fn methods(picture: &Picture) -> String {
+    let mut names: Vec<&str> = picture.panels.iter().map(|p| p.run.method.name.name()).collect();
+    names.dedup();
+    if names.is_empty() { "study".into() } else { names.join(", ") }
+}
+
+/// "(ii)"; nothing where there is only one panel.
+fn label(picture: &Picture, panel: &Panel) -> String {
+    if picture.panels.len() > 1 { format!("({})", panel.label) } else { String::new() }
+}
+
+/// Sections: the same axes in every panel, so that sizes can be compared.
+fn section_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording], axes: [usize; 2]) -> Sheet {
+    let all = || recordings.iter().flat_map(|r| crossings(&r.data));
+    let names = picture.panels[0].run.system.coordinates();
+    let axis = |i: usize| Axis::covering(format!("*{}*", greek(names[axes[i]])), all().map(|c| c.x[axes[i]]));
+    for (panel, recording) in picture.panels.iter().zip(recordings) {
+        let half = 0.5 * panel.run.t_end;
+        let points = |late: bool| {
+            crossings(&recording.data).iter().filter(|c| (c.t > half) == late).map(|c| axes.map(|i| c.x[i])).collect()
+        };
+        let chart = PlanePanel::new(axis(0), axis(1))
+            .dots(points(false), DotStyle::early())
+            .dots(points(true), DotStyle::late());
+        sheet = sheet.panel(label(picture, panel), panel.title.as_str(), chart);
+    }
+    let half = wording::number(0.5 * picture.panels[0].run.t_end);
+    sheet
+        .legend(LegendEntry::new(LegendKey::Dots(DotStyle::early()), format!("*t* ≤ {half}")))
+        .legend(LegendEntry::new(LegendKey::Dots(DotStyle::late()), format!("*t* > {half}")))
+}
+
+/// Paths in space: the same box in every panel.
+fn space_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording], camera: &Camera) -> Sheet {
+    let curves: Vec<Vec<Curve>> = recordings.iter().map(|r| curves(&r.data)).collect();
+    let ranges: [(f64, f64); 3] = std::array::from_fn(|i| {
+        let (low, high) = range_of(curves.iter().flatten().flat_map(|c| &c.points).map(|x| x[i]));
+        let margin = 0.04 * (high - low);
+        (low - margin, high + margin)
+    });
+    let names = picture.panels[0].run.system.coordinates();
+    let order = camera.axes;
+    let axis = |k: usize| {
+        let (low, high) = ranges[order[k]];
+        Axis::linear(format!("*{}*", greek(names[order[k]])), low, high)
+    };
+    let turn = |x: [f64; 3]| order.map(|i| x[i]);
+    for ((panel, recording), curves) in picture.panels.iter().zip(recordings).zip(&curves) {
+        let mut patches = surface::patches(&panel.run.system, &ranges, SURFACE_CELLS);
+        for corner in patches.iter_mut().flat_map(|p| p.corners.iter_mut()) {
+            *corner = turn(*corner);
+        }
+        let mut chart =
+            SpacePanel::new(axis(0), axis(1), axis(2)).camera(camera.azimuth, camera.elevation).surface(patches);
+        for curve in curves {
+            chart = chart.line(curve.points.iter().map(|x| turn(*x)).collect(), curve.style);
+        }
+        let exits: Vec<[f64; 3]> = exits(&recording.data).into_iter().map(turn).collect();
+        if !exits.is_empty() {
+            chart = chart.markers(exits, EXIT);
+        }
+        if let Some(point) = surface::singularity(&panel.run.system) {
+            chart = chart.markers(vec![turn(point)], SINGULARITY);
+        }
+        sheet = sheet.panel(label(picture, panel), panel.title.as_str(), chart);
+    }
+    let sheet = region_legend(sheet);
+    match recordings.first().map(|r| &r.data) {
+        Some(Data::Motion(_)) => sheet
+            .legend(LegendEntry::new(LegendKey::Line(SLIDING), "sliding"))
+            .legend(LegendEntry::new(LegendKey::Marker(EXIT), "exit")),
+        Some(Data::Funnel { futures, .. }) => sheet
+            .footer(returns(futures))
+            .legend(LegendEntry::new(LegendKey::Line(APPROACH), "the one way in"))
+            .legend(LegendEntry::new(LegendKey::Line(TO_PLUS), "ways out to *h* > 0"))
+            .legend(LegendEntry::new(LegendKey::Line(TO_MINUS), "ways out to *h* < 0")),
+        _ => sheet,
+    }
+}
+
+/// How many futures came back to the two-fold.
+fn returns(futures: &[Future]) -> String {
+    let comes_back = |f: &&Future| f.motion.events.iter().any(|e| matches!(e.kind, EventKind::TwoFoldReached { .. }));
+    let longest = futures.iter().filter_map(|f| Some(f.motion.samples().last()?.1.t - f.motion.samples().next()?.1.t));
+    format!(
+        "{} of {} futures come back to the two-fold within {} of leaving it",
+        futures.iter().filter(comes_back).count(),
+        futures.len(),
+        wording::number(longest.fold(0.0, f64::max).round())
+    )
+}
+
+/// A curve in space.
+struct Curve {
+    points: Vec<[f64; 3]>,
+    style: LineStyle,
+}
+
+/// What is drawn of a recording in space.
+fn curves(data: &Data) -> Vec<Curve> {
+    let points = |samples: &[Sample]| samples.iter().map(|s| s.x).collect::<Vec<_>>();
+    let motion = |motion: &Motion, flight: LineStyle, sliding: LineStyle| -> Vec<Curve> {
+        let style = |mode: &Mode| if mode.slides() { sliding } else { flight };
+        motion.pieces.iter().map(|(mode, samples)| Curve { points: points(samples), style: style(mode) }).collect()
+    };
+    match data {
+        Data::Section(_) => Vec::new(),
+        Data::Path(samples) => vec![Curve { points: points(samples), style: LineStyle::new(style::INK, PATH_PT) }],
+        Data::Motion(m) => motion(m, FLIGHT, SLIDING),
+        Data::Funnel { approach, futures } => {
+            let mut all = Vec::new();
+            for future in futures {
+                let style = if future.side == Side::Plus { TO_PLUS } else { TO_MINUS };
+                all.extend(motion(&future.motion, style, style));
+            }
+            all.extend(motion(approach, APPROACH, APPROACH));
+            all
+        }
+    }
+}
+
+/// Where a motion leaves repelling sliding.
+fn exits(data: &Data) -> Vec<[f64; 3]> {
+    match data {
+        Data::Motion(motion) => motion
+            .events
+            .iter()
+            .filter(|e| matches!(e.kind, EventKind::Exit { .. } | EventKind::ExitAtBoundary { .. }))
+            .map(|e| e.state.into())
+            .collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// What the colours of the surface mean.
+fn region_legend(sheet: Sheet) -> Sheet {
+    let area = |colour, text: &str| LegendEntry::new(LegendKey::Area(colour, style::SURFACE_OPACITY), text);
+    sheet
+        .legend(area(style::ATTRACTING, "attracting"))
+        .legend(area(style::REPELLING, "repelling"))
+        .legend(area(style::CROSSING, "crossing"))
+        .legend(LegendEntry::new(LegendKey::Marker(SINGULARITY), "two-fold singularity"))
+}
+
+/// Cells of the switching surface along each side.
+const SURFACE_CELLS: usize = 60;
+/// Width of a long path, in points: thinner than a curve, so that windings stay apart.
+const PATH_PT: f64 = 0.5;
+/// Free flight of a Filippov motion.
+const FLIGHT: LineStyle = LineStyle::new(style::INK, 0.6);
+/// Sliding, drawn apart from flight by width and colour.
+const SLIDING: LineStyle = LineStyle::new(style::GREEN, 1.6);
+/// The motion up to a set-valued point.
+const APPROACH: LineStyle = LineStyle::new(style::INK, 1.4);
+/// Futures on the side h > 0.
+const TO_PLUS: LineStyle = LineStyle::new(style::BLUE, 0.5);
+/// Futures on the side h < 0.
+const TO_MINUS: LineStyle = LineStyle::new(style::VERMILLION, 0.5);
+/// The end of repelling sliding.
+const EXIT: MarkerStyle = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::GREEN, size: 3.6 };
+/// The two-fold.
+const SINGULARITY: MarkerStyle = MarkerStyle::new(MarkerShape::Dot, style::MAGENTA);
+
+fn crossings(data: &Data) -> &[Crossing] {
+    match data {
+        Data::Section(crossings) => crossings,
+        _ => &[],
+    }
+}
+
+/// A coordinate's name as it is printed.
+fn greek(name: &str) -> &str {
+    match name {
+        "omega" => "ω",
+        other => other,
+    }
+}

@@ -1,0 +1,206 @@
+//! Words and numbers for people: small print, in the renderer's rich-text markup.
+
+use super::Reading;
+use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
+use crate::integrate::{Kick, StepCap};
+use crate::job::spec::{MethodSpec, RunSpec, SwitchSpec, SystemSpec};
+use crate::system::{Relaxation, Transition};
+
+/// A number as a printer would set it: 0.13, 10^{-5}, 1.05×10^{-8}, 200 000.
+pub fn number(value: f64) -> String {
+    let magnitude = value.abs();
+    if value == 0.0 {
+        return "0".into();
+    }
+    if (1e4..1e16).contains(&magnitude) && value == value.trunc() {
+        let digits = format!("{magnitude:.0}");
+        let mut grouped = String::new();
+        for (i, digit) in digits.chars().enumerate() {
+            if i > 0 && (digits.len() - i).is_multiple_of(3) {
+                grouped.push('\u{2009}');
+            }
+            grouped.push(digit);
+        }
+        return if value < 0.0 { format!("−{grouped}") } else { grouped };
+    }
+    if (1e-2..1e4).contains(&magnitude) {
+        return format!("{value}").replace('-', "−");
+    }
+    let text = format!("{value:.2e}");
+    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    let mantissa = mantissa.trim_end_matches('0').trim_end_matches('.');
+    let power = format!("10^{{{exponent}}}");
+    match mantissa {
+        "1" => power,
+        "-1" => format!("−{power}"),
+        _ => format!("{}×{power}", mantissa.replace('-', "−")),
+    }
+}
+
+/// "reconstructed reading: *α* = 0.1, *β* = 10^{-5}".
+pub fn reading(reading: Reading) -> String {
+    let c = reading.caricature();
+    format!("{} reading: *α* = {}, *β* = {}", reading.word(), number(c.alpha), number(c.beta))
+}
+
+/// The system and its parameters.
+pub fn system(system: &SystemSpec) -> String {
+    match system {
+        SystemSpec::Caricature(c) => format!(
+            "*α* = {}, *β* = {}, *v*_{{+}} = {}, *v*_{{−}} = {}",
+            number(c.alpha),
+            number(c.beta),
+            number(c.v_plus),
+            number(c.v_minus)
+        ),
+        SystemSpec::Wheel(w) => format!(
+            "wheel (reconstruction): *m* = {}, *J* = {}, *d* = {}, *γ* = π/4, *k*_{{w}} = {}, *c*_{{w}} = {}, *c*_{{h}} = {}, \
+             *ω*_{{0}} = {}, *F* = {}, *q* = {}, *V*_{{c}} = {}",
+            number(w.m),
+            number(w.j),
+            number(w.d),
+            number(w.k_w),
+            number(w.c_w),
+            number(w.c_h),
+            number(w.omega0),
+            number(w.side_force),
+            number(w.trail),
+            number(w.v_c)
+        ),
+    }
+}
+
+/// How the switch is modelled.
+pub fn switch(switch: &SwitchSpec) -> String {
+    match switch {
+        SwitchSpec::Smoothed { eps, transition: Transition::Tanh } => format!("tanh smoothing, *ε* = {}", number(*eps)),
+        SwitchSpec::Smoothed { eps, transition: Transition::PerturbedTanh { sigma } } => {
+            format!("perturbed tanh smoothing, *ε* = {}, *σ* = {}", number(*eps), number(*sigma))
+        }
+        SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. } => format!(
+            "hysteresis ({}), *ε* = {}, *ε*′ = {}",
+            match relaxation {
+                Relaxation::Literal => "literal",
+                Relaxation::Single => "single division",
+            },
+            number(*eps),
+            number(*eps_prime)
+        ),
+        SwitchSpec::Filippov { exit, .. } => format!("discontinuous (Filippov), exit {}", exit_rule(exit)),
+    }
+}
+
+/// An exit rule in words.
+pub fn exit_rule(rule: &ExitRule) -> String {
+    let to = |side: Side| match side {
+        Side::Plus => "*h* > 0",
+        Side::Minus => "*h* < 0",
+    };
+    match rule {
+        ExitRule::AtOnce { side } => format!("at once to {}", to(*side)),
+        ExitRule::AfterTime { time, side } => format!("after a time of {} to {}", number(*time), to(*side)),
+        ExitRule::AfterArc { arc, side } => format!("after an arc of {} to {}", number(*arc), to(*side)),
+        ExitRule::Random { law, plus_probability, seed, stream } => {
+            let law = match law {
+                SlidingLaw::Uniform { longest } => format!("uniform up to {}", number(*longest)),
+                SlidingLaw::Exponential { mean } => format!("exponential with mean {}", number(*mean)),
+            };
+            format!(
+                "after a random time ({law}) to a random side (*h* > 0 with probability {}; ChaCha8, seed {seed}, stream {stream})",
+                number(*plus_probability)
+            )
+        }
+        ExitRule::All => "all: the whole funnel".into(),
+    }
+}
+
+/// Error control: tolerances and step cap.
+pub fn control(method: &MethodSpec) -> String {
+    let tolerance = method.tolerance;
+    let tolerances = if tolerance.rtol == tolerance.atol {
+        format!("rtol = atol = {}", number(tolerance.rtol))
+    } else {
+        format!("rtol = {}, atol = {}", number(tolerance.rtol), number(tolerance.atol))
+    };
+    match method.step_cap {
+        StepCap::None => tolerances,
+        StepCap::Absolute(h) => format!("{tolerances}, steps up to {}", number(h)),
+        StepCap::FractionOfSegment(f) => format!("{tolerances}, steps up to {} of the interval", number(f)),
+    }
+}
+
+/// The method's name and its error control.
+pub fn method(method: &MethodSpec) -> String {
+    format!("{}, {}", method.name.name(), control(method))
+}
+
+/// Restarts and kicks of a run; empty if there are none.
+pub fn schedule(run: &RunSpec) -> String {
+    let restarts = run.schedule.restart_every.map(|every| format!("restarted every {}", number(every)));
+    let kicks = run.schedule.kick.map(|k| kicks(&k));
+    restarts.into_iter().chain(kicks).collect::<Vec<_>>().join(", ")
+}
+
+fn kicks(kick: &Kick) -> String {
+    format!("kicks of {} every {} (ChaCha8, seed {})", number(kick.size), number(kick.every), kick.seed)
+}
+
+/// What all runs of a picture have in common and how they differ, one line per subject, for its foot.
+pub fn small_print(reading: Option<Reading>, runs: &[&RunSpec]) -> Vec<String> {
+    let all = |say: &dyn Fn(&RunSpec) -> Option<String>, join: &str| {
+        let mut said: Vec<String> = Vec::new();
+        for text in runs.iter().filter_map(|r| say(r)) {
+            if !said.contains(&text) {
+                said.push(text);
+            }
+        }
+        said.join(join)
+    };
+    let mut lines: Vec<Vec<String>> = vec![
+        vec![
+            reading.map_or(String::new(), |r| format!("{} reading", r.word())),
+            all(&|r| Some(system(&r.system)), "; "),
+            all(&|r| Some(format!("*t* = 0 … {}", number(r.t_end))), "; "),
+        ],
+        vec![all(&|r| Some(switch(&r.switch)), "; ")],
+        vec![all(&|r| Some(r.method.name.name().to_owned()), ", "), all(&|r| Some(control(&r.method)), "; ")],
+        Vec::new(),
+    ];
+    let restarts = all(&|r| r.schedule.restart_every.map(number), ", ");
+    if !restarts.is_empty() {
+        lines[2].push(format!("restarted every {restarts}"));
+    }
+    lines[3].push(all(&|r| r.schedule.kick.map(|k| kicks(&k)), "; "));
+    lines
+        .into_iter()
+        .map(|line| line.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", "))
+        .filter(|line| !line.is_empty())
+        .collect()
+}
+
+/// Rich text without its markup, for readers without typesetting.
+pub fn plain(rich: &str) -> String {
+    rich.replace(['*', '{', '}'], "")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers() {
+        for (value, text) in [
+            (0.13, "0.13"),
+            (1e-5, "10^{-5}"),
+            (1.0536712e-8, "1.05×10^{-8}"),
+            (2e5, "200\u{2009}000"),
+            (-1.2, "−1.2"),
+            (1e-3, "10^{-3}"),
+            (150.0, "150"),
+            (0.0, "0"),
+            (-2.5e-4, "−2.5×10^{-4}"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! The paper's equations, one file each, and no time stepping.
+//!
+//! Two nouns carry everything. A [`VectorField`] is an ordinary autonomous differential equation x' = f(x). A
+//! [`PiecewiseSmooth`] system is two of them and a switching function h: f+ where h > 0, f- where h < 0. It is not a
+//! vector field: on h = 0 its motion is defined by Filippov's convention ([`filippov`]) and at a two-fold it is
+//! set-valued. Smoothing ([`Smoothed`]) and hysteresis ([`Hysteretic`]) turn the second into the first.
+//!
+//! Equations are generic over [`Scalar`], so that each is written once.
+
+pub mod caricature;
+pub mod filippov;
+pub mod hysteretic;
+pub mod normal_form;
+pub mod relay;
+pub mod reversed;
+pub mod smoothed;
+pub mod stick_slip;
+pub mod transition;
+pub mod wheel;
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::num::{Dual, Elementary};
+
+pub use caricature::Caricature;
+pub use hysteretic::{Hysteretic, Relaxation};
+pub use normal_form::TwoFoldNormalForm;
+pub use relay::{Feedback, Relay};
+pub use reversed::Reversed;
+pub use smoothed::Smoothed;
+pub use stick_slip::StickSlip;
+pub use transition::Transition;
+pub use wheel::Wheel;
+
+/// An autonomous ordinary differential equation x' = f(x) in `N` dimensions.
+pub trait VectorField<const N: usize>: Sync {
+    /// The right-hand side f(x).
+    fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
+}
+
+/// A system that switches between two smooth vector fields on the surface h = 0 (the paper's eq. 3).
+pub trait PiecewiseSmooth<const N: usize>: Sync {
+    /// The switching function h(x). The surface h = 0 must be regular: grad h not zero on it.
+    fn switching<S: Elementary>(&self, x: &SVector<S, N>) -> S;
+    /// The vector field f+ that holds where h > 0; smooth and defined on both sides.
+    fn plus<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
+    /// The vector field f- that holds where h < 0; smooth and defined on both sides.
+    fn minus<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
+}
+
+/// The point x as independent variables for differentiation.
+pub fn variables<S: Elementary, const N: usize>(x: &SVector<S, N>) -> SVector<Dual<S, N>, N> {
+    SVector::from_fn(|i, _| Dual::variable(x[i], i))
+}
+
+/// The Jacobian matrix df_i/dx_j, exact to rounding (forward differentiation of the equation itself).
+pub fn jacobian<F: VectorField<N>, const N: usize>(field: &F, x: &SVector<f64, N>) -> SMatrix<f64, N, N> {
+    let f = field.eval(&variables(x));
+    SMatrix::from_fn(|i, j| f[i].partials[j])
+}
