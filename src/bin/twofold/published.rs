@@ -14,7 +14,7 @@ use super::{Outcome, Problem};
 
 /// Computes every figure of which the folder holds a picture, and says for each picture which rung of the ladder holds.
 pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool) -> Result<Outcome, Problem> {
-    let published = read_tree(folder, &|path| path.ends_with(".png"))?;
+    let published = read_tree(folder, &|path| path.ends_with(".png"))?.files;
     let named = |name: &str| -> Vec<&FileBytes> {
         published.iter().filter(|f| f.name().strip_suffix(".png") == Some(name)).collect()
     };
