@@ -3,6 +3,7 @@
 use crate::integrate::filippov::{FilippovObserver, Mode, ModeEvent};
 use crate::integrate::{Flow, Observer, Step};
 
+use super::path::MOST_POINTS;
 use super::{PathRecorder, Sample};
 
 /// A recorded Filippov motion in three dimensions.
@@ -38,12 +39,14 @@ pub struct MotionRecorder {
     pieces: Vec<(Mode, PathRecorder)>,
     events: Vec<ModeEvent<3>>,
     new_piece: bool,
+    /// Points in the pieces before the last.
+    points: usize,
 }
 
 impl MotionRecorder {
     /// An empty recording; `chord` is the largest distance between polyline and dense output.
     pub fn new(chord: f64) -> Self {
-        Self { chord, pieces: Vec::new(), events: Vec::new(), new_piece: true }
+        Self { chord, pieces: Vec::new(), events: Vec::new(), new_piece: true, points: 0 }
     }
 
     /// What was recorded.
@@ -56,7 +59,9 @@ impl MotionRecorder {
 impl FilippovObserver<3> for MotionRecorder {
     fn step(&mut self, mode: Mode, step: &Step<'_, 3>) -> Flow {
         if self.new_piece || self.pieces.last().is_none_or(|(m, _)| *m != mode) {
-            self.pieces.push((mode, PathRecorder::starting(step.t0, &step.x0, self.chord)));
+            self.points += self.pieces.last().map_or(0, |(_, path)| path.len());
+            let path = PathRecorder::starting(step.t0, &step.x0, self.chord);
+            self.pieces.push((mode, path.at_most(MOST_POINTS.saturating_sub(self.points))));
             self.new_piece = false;
         }
         match self.pieces.last_mut() {

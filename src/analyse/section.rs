@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::path::first_three;
+use super::path::{MOST_POINTS, first_three};
 use crate::integrate::{Flow, Observer, Step, roots};
 
 /// The sense in which an orbit passes through the section plane.
@@ -75,6 +75,6 @@ impl<const N: usize> Observer<N> for SectionRecorder {
             before = if before < 0.0 { 1.0 } else { -1.0 };
             self.crossings.push(Crossing { t: step.time(theta), x: first_three(&step.at(theta)), direction });
         }
-        Flow::Continue
+        if self.crossings.len() < MOST_POINTS { Flow::Continue } else { Flow::Stop }
     }
 }

@@ -6,7 +6,7 @@ use super::step::{Stepper, Tolerance};
 use super::{Dopri5, Lsoda, Radau5, Taylor};
 
 /// An integration method.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// LSODA: Adams and BDF with automatic switching, the default NDSolve of the paper's day.

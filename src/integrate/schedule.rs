@@ -33,7 +33,7 @@ impl StepCap {
 }
 
 /// The law of a random perturbation "of size eps" (sec. 4.2 does not say which).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum KickLaw {
     /// Length exactly `size`, direction uniform on the sphere.

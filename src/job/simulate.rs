@@ -3,6 +3,7 @@
 use nalgebra::{SVector, vector};
 
 use super::spec::{FunnelSpec, MethodSpec, Observation, RunSpec, SpecError, SwitchSpec, SystemSpec};
+use crate::analyse::path::MOST_POINTS;
 use crate::analyse::{Crossing, Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder};
 use crate::integrate::filippov::{self, AllModes, ExitRule, FilippovError, FilippovSummary, FunnelGrid, Side};
 use crate::integrate::{Course, Failure, Observer, Statistics, Stepper, StopReason, Watch, WithStepper, drive};
@@ -82,6 +83,16 @@ pub enum RunError {
     /// The integration failed.
     #[error(transparent)]
     Integration(#[from] Failure),
+    /// More points than fit in memory.
+    #[error(
+        "more than {limit} points were recorded by t = {t}, the most that are kept in memory (0.6 GB): record passages through a plane instead of the path, give a larger chord, or an earlier end time"
+    )]
+    TooManyPoints {
+        /// Time reached.
+        t: f64,
+        /// The limit.
+        limit: usize,
+    },
     /// The Filippov motion could not go on.
     #[error(transparent)]
     Filippov(#[from] FilippovError),
@@ -90,10 +101,15 @@ pub enum RunError {
 /// Computes a run.
 pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, RunError> {
     spec.validate()?;
-    match spec.system {
+    let recording = match spec.system {
         SystemSpec::Caricature(system) => switch(spec, system, watch),
         SystemSpec::Wheel(system) => switch(spec, system, watch),
+    }?;
+    // The only observers here are recorders, which stop a run when they are full.
+    if recording.stop == StopReason::Observer {
+        return Err(RunError::TooManyPoints { t: recording.t, limit: MOST_POINTS });
     }
+    Ok(recording)
 }
 
 fn switch<P: PiecewiseSmooth<3> + Copy>(spec: &RunSpec, system: P, watch: &dyn Watch) -> Result<Recording, RunError> {

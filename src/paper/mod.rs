@@ -94,7 +94,7 @@ pub struct Camera {
 }
 
 /// The two readings of the paper's parameters, always shown side by side.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reading {
     /// As printed: alpha = 1e-3, beta = 1e-5. Its late motion is always one stable periodic orbit.

@@ -83,7 +83,8 @@ mod tests {
         assert_eq!(text, format!("\"{}\"", good.as_str()));
         assert_eq!(serde_json::from_str::<Hash>(&text).unwrap(), good);
         let upper = text.to_uppercase();
-        for bad in ["\"\"", "\"abc\"", &text.replace('b', "g"), &upper, &text.replace("ba", "b"), "\"\\u001b[2J\"", "1"] {
+        for bad in ["\"\"", "\"abc\"", &text.replace('b', "g"), &upper, &text.replace("ba", "b"), "\"\\u001b[2J\"", "1"]
+        {
             assert!(serde_json::from_str::<Hash>(bad).is_err(), "{bad}");
         }
         let error = Hash::try_from("\u{1b}".repeat(1000)).unwrap_err().to_string();

@@ -250,13 +250,28 @@ mod tests {
     #[test]
     fn names_cannot_leave_their_folder_or_steer_a_terminal() {
         let manifest = |figure: &str, name: &str, label: &str| {
-            let mut m = Manifest { version: VERSION, figure: figure.into(), made_by: "0".into(), pictures: vec![entry()] };
+            let mut m =
+                Manifest { version: VERSION, figure: figure.into(), made_by: "0".into(), pictures: vec![entry()] };
             m.pictures[0].name = name.into();
             m.pictures[0].panels[0].label = label.into();
             Manifest::parse(&String::from_utf8(m.to_json()).unwrap(), "m.json")
         };
         manifest("fig7", "fig7-printed", "a-i").unwrap();
-        for bad in ["", ".", "..", "../x", "/etc/x", "a/b", "a\\b", "C:x", ".hidden", "a\u{1b}[2Jb", "a\nb", "é", &"a".repeat(101)] {
+        for bad in [
+            "",
+            ".",
+            "..",
+            "../x",
+            "/etc/x",
+            "a/b",
+            "a\\b",
+            "C:x",
+            ".hidden",
+            "a\u{1b}[2Jb",
+            "a\nb",
+            "é",
+            &"a".repeat(101),
+        ] {
             for wrong in [manifest(bad, "p", "i"), manifest("fig7", bad, "i"), manifest("fig7", "p", bad)] {
                 let error = wrong.unwrap_err();
                 assert!(matches!(error, ManifestError::Name { .. }), "{bad}: {error}");

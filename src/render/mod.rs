@@ -30,7 +30,7 @@ mod svg;
 mod ticks;
 
 pub use encode::encode_png;
-pub use png_file::decode_png;
+pub use png_file::{decode_png, png_size};
 pub use provenance::{Format, Provenance, ProvenanceError, read_provenance};
 pub use raster::Pixels;
 pub use rich_text::RichTextError;
@@ -71,6 +71,14 @@ pub enum RenderError {
     /// The picture is higher than 8000 pixels.
     #[error("the picture is too large: give it fewer rows of panels, or a smaller aspect")]
     TooLarge,
+    /// A PNG file that claims more pixels than are decoded.
+    #[error("it claims {width} by {height} pixels, more than are read here")]
+    Claims {
+        /// Width.
+        width: u32,
+        /// Height.
+        height: u32,
+    },
     /// Drawing failed inside plotters.
     #[error("drawing failed: {0}")]
     Drawing(String),

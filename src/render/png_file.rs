@@ -119,9 +119,28 @@ impl ColourTable {
     }
 }
 
-/// Pixels of any PNG file of eight bits or fewer per channel, as opaque RGBA where the file has no transparency.
+/// The most pixels that are decoded: five times the largest picture that [`render`](super::render) makes.
+const MOST_PIXELS: u64 = 1 << 26;
+
+/// Width and height as a PNG file's first bytes claim them; nothing else of the file is looked at.
+pub fn png_size(bytes: &[u8]) -> Option<(u32, u32)> {
+    let header = bytes.strip_prefix(b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR")?;
+    let number = |at: usize| Some(u32::from_be_bytes(header.get(at..at + 4)?.try_into().ok()?));
+    Some((number(0)?, number(4)?))
+}
+
+/// Pixels of any PNG file, at eight bits per channel, as opaque RGBA where the file has no transparency.
+///
+/// # Errors
+/// If it is no PNG file, is damaged, or claims more than 67 million pixels: what it claims is checked before memory is asked for.
 pub fn decode_png(bytes: &[u8]) -> Result<Pixels, RenderError> {
-    let mut decoder = png::Decoder::new(Cursor::new(bytes));
+    if let Some((width, height)) = png_size(bytes)
+        && u64::from(width) * u64::from(height) > MOST_PIXELS
+    {
+        return Err(RenderError::Claims { width, height });
+    }
+    let limits = png::Limits { bytes: 4 * MOST_PIXELS as usize };
+    let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), limits);
     decoder.set_transformations(png::Transformations::normalize_to_color8());
     let mut reader = decoder.read_info()?;
     let size = reader.output_buffer_size().ok_or(RenderError::TooLarge)?;

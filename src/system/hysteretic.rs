@@ -8,7 +8,7 @@ use super::{PiecewiseSmooth, VectorField};
 use crate::num::Elementary;
 
 /// How eq. (10)'s two divisions by eps' are read.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Relaxation {
     /// Literally: psi's argument is already divided by eps', and psi(w) = (1 + tanh(w/eps'))/2 divides once more. phi

@@ -57,6 +57,9 @@ pub struct Funnel<const N: usize> {
     pub members: Vec<FunnelMember<N>>,
 }
 
+/// The most points that all members of a funnel have together: 0.6 GB.
+const MOST_POINTS: usize = 20_000_000;
+
 /// Follows the orbit of `x0` to the first point where its future is a set, then that set: [`ExitRule::All`].
 ///
 /// # Errors
@@ -186,7 +189,8 @@ where
     } else {
         Departure::Repelling
     };
-    let mut members = Vec::with_capacity(2 * grid.times);
+    let mut members = Vec::new();
+    let mut points = 0;
     for k in 0..grid.times {
         let fraction = if grid.times > 1 { k as f64 / (grid.times - 1) as f64 } else { 1.0 };
         let exit_time = grid.shortest * pow(grid.longest / grid.shortest, fraction);
@@ -203,6 +207,10 @@ where
             let until = family.t + grid.horizon;
             let summary =
                 engine::run_from(system, origin, until, settings, rule, &mut trajectory, &())?.within_budget()?;
+            points += trajectory.points().count();
+            if points > MOST_POINTS {
+                return Err(FilippovError::TooManyPoints { limit: MOST_POINTS, members: members.len() });
+            }
             members.push(FunnelMember { exit_time, side, trajectory, summary });
         }
     }

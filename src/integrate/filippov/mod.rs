@@ -302,6 +302,16 @@ pub enum FilippovError {
         /// Why.
         why: &'static str,
     },
+    /// The recorded futures are more than fits in memory.
+    #[error(
+        "more than {limit} points were recorded in the first {members} futures of the funnel: follow fewer of them, or each for a shorter time"
+    )]
+    TooManyPoints {
+        /// The limit.
+        limit: usize,
+        /// Futures that had been followed.
+        members: usize,
+    },
     /// The budget of events is used up.
     #[error(
         "{limit} events were not enough: stopped at t = {t}, state {state:?}; raise max_events if the run is meant to have so many"
