@@ -5,7 +5,7 @@ use nalgebra::{SVector, vector};
 use twofold::analyse::attractor::{Claim, Evidence, Question, SectionPoint, Thresholds, Verdict, classify};
 use twofold::analyse::floquet::{self, Plane, closed_orbit};
 use twofold::analyse::lyapunov::{self, largest};
-use twofold::integrate::{Dopri5, Flow, Ignore, Observer, Schedule, Step, StepCap, Tolerance, drive, roots};
+use twofold::integrate::{Course, Dopri5, Flow, Ignore, Observer, Step, StepCap, Tolerance, drive, roots};
 use twofold::num::Elementary;
 use twofold::num::random::RandomStream;
 use twofold::system::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
@@ -95,8 +95,9 @@ fn section_to<const N: usize, F: VectorField<N>>(
     let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
     let mut seen = Section { axis, value, shown, points: Vec::new() };
     let mut stepper = Dopri5::new(tolerance);
-    drive(field, x0, t_end, &mut stepper, &Schedule::default(), StepCap::Absolute(0.5), u64::MAX, &mut seen, &())
-        .unwrap();
+    let course = Course { step_cap: StepCap::Absolute(0.5), ..Course::to(t_end) };
+    let end = drive(field, x0, &course, &mut stepper, &mut seen, &()).unwrap();
+    assert_eq!(end.t, t_end);
     seen.points
 }
 
@@ -195,9 +196,7 @@ fn van_der_pol() {
     }
     let mut stepper = Dopri5::new(Tolerance { rtol: 1e-12, atol: 1e-12 });
     let x0 = vector![o.points[0][0], o.points[0][1], 0.0];
-    let schedule = Schedule::default();
-    let turn = drive(&WithDivergence, x0, o.period, &mut stepper, &schedule, StepCap::None, u64::MAX, &mut Ignore, &())
-        .unwrap();
+    let turn = drive(&WithDivergence, x0, &Course::to(o.period), &mut stepper, &mut Ignore, &()).unwrap();
     assert!((o.multipliers[0][0].ln() - turn.x[2]).abs() < 1e-5, "{o:?} {}", turn.x[2]);
 }
 

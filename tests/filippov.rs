@@ -2,12 +2,12 @@
 #![allow(clippy::disallowed_methods)] // exact solutions are compared to tolerances, not hashed
 
 use nalgebra::{SVector, vector};
-use twofold::integrate::Tolerance;
 use twofold::integrate::filippov::two_fold::SlidingAtTwoFold;
 use twofold::integrate::filippov::{
-    End, EventKind, ExitRule, FilippovError, FunnelGrid, Mode, Settings, Side, SlidingLaw, Trajectory, connect, funnel,
-    history, run,
+    EventKind, ExitRule, FilippovError, FunnelGrid, Mode, Settings, Side, SlidingLaw, Trajectory, connect, funnel,
+    history, run, run_watched,
 };
+use twofold::integrate::{StopReason, Tolerance, Watch};
 use twofold::system::filippov::Visibility;
 use twofold::system::{Caricature, Feedback, PiecewiseSmooth, Relay, StickSlip, TwoFoldNormalForm, Wheel};
 
@@ -48,7 +48,7 @@ fn sliding_time_to_the_two_fold_of_the_normal_form() {
         let exact = -((-1.2 * y - z) + (-y - 1.4 * z)) / det;
         let mut out = Trajectory::new(4);
         let end = run(&n, vector![0.0, y, z], 100.0, &Settings::default(), ExitRule::All, &mut out).unwrap();
-        assert_eq!(end.end, End::SetValued);
+        assert_eq!(end.stop, StopReason::SetValued);
         assert!((end.t - exact).abs() < 1e-11 * exact, "{y} {z}: {} {exact} {:e}", end.t, end.t - exact);
         assert!(end.x.amax() < 1e-14);
         assert!(drift(&n, &out) <= 1e-12);
@@ -94,7 +94,7 @@ fn caricature_passes_the_two_fold_several_times() {
         assert!(passages >= 3, "{passages}");
         assert!(drift(&c, &out) <= 1e-12, "{:e}", drift(&c, &out));
         assert!(wrong_side(&c, &out) <= 1e-12, "{:e}", wrong_side(&c, &out));
-        assert_eq!(end.end, End::Time);
+        assert_eq!(end.stop, StopReason::EndTime);
         // Pieces join without gaps, and the mode that an event announces is the mode of the piece that follows.
         for pair in out.pieces.windows(2) {
             assert_eq!(pair[0].points.last(), pair[1].points.first());
@@ -139,7 +139,7 @@ fn the_wheel_returns_to_its_singularity() {
     }
     assert!(drift(&w, &out) <= 1e-12, "{:e}", drift(&w, &out));
     assert!(wrong_side(&w, &out) <= 1e-12, "{:e}", wrong_side(&w, &out));
-    assert_eq!(end.end, End::Time);
+    assert_eq!(end.stop, StopReason::EndTime);
 }
 
 #[test]
@@ -172,7 +172,7 @@ fn time_along_the_invariant_curve_is_the_integrators() {
     let time = 0.5 * curve.time(-curve.radius);
     let mut out = Trajectory::new(1);
     let rule = ExitRule::AfterTime { time, side: Side::Minus };
-    run(&c, vector![0.0, 0.0, 0.0], 3.0, &Settings::default(), rule, &mut out).unwrap();
+    let _ = run(&c, vector![0.0, 0.0, 0.0], 3.0, &Settings::default(), rule, &mut out).unwrap();
     let exit = out.events.iter().find(|e| matches!(e.kind, EventKind::Exit { .. })).unwrap();
     assert!((exit.t - time).abs() < 1e-14);
     close(exit.state, curve.at(-0.5 * curve.radius.min(curve.sigma(time, curve.radius).abs() * 2.0)), 1e-12);
@@ -185,7 +185,7 @@ fn last_leg_error_is_within_its_estimate() {
     let arrival = |leg: f64| {
         let settings = Settings { leg, ..Settings::default() };
         let mut out = Trajectory::new(1);
-        run(&c, vector![0.0, 1.0, 0.2], 100.0, &settings, ExitRule::All, &mut out).unwrap();
+        let _ = run(&c, vector![0.0, 1.0, 0.2], 100.0, &settings, ExitRule::All, &mut out).unwrap();
         let error = |e: &EventKind| if let EventKind::TwoFoldReached { error, .. } = *e { Some(error) } else { None };
         out.events.iter().find_map(|e| error(&e.kind).map(|error| (e.t, error))).unwrap()
     };
@@ -271,7 +271,8 @@ fn repelling_sliding_ends_at_an_invisible_fold() {
     // v = w = 0: backwards p' = q, q' = p. From (p, q) = (1, -1/2): q = 0 at e^-s = 3^-1/2, t = 1.5 (1 - 3^-1/2),
     // p = (3/4)^1/2; there only h > 0 is left.
     let mut out = Trajectory::new(1);
-    run(&visible_pair(false, false), vector![0.0, -1.0, -0.5], 1.0, &Settings::default(), STAY, &mut out).unwrap();
+    let _ =
+        run(&visible_pair(false, false), vector![0.0, -1.0, -0.5], 1.0, &Settings::default(), STAY, &mut out).unwrap();
     let left = out
         .events
         .iter()
@@ -317,7 +318,7 @@ fn rules_do_what_they_say() {
     let speed = -mu * (y * y + z * z).sqrt() / (y + z);
     let exit = |rule: ExitRule| {
         let mut out = Trajectory::new(1);
-        run(&n, vector![0.0, 0.3, 0.5], 20.0, &Settings::default(), rule, &mut out).unwrap();
+        let _ = run(&n, vector![0.0, 0.3, 0.5], 20.0, &Settings::default(), rule, &mut out).unwrap();
         let departed = out.events.iter().find(|e| e.kind == EventKind::EnteredRepelling).unwrap().t;
         let e = *out.events.iter().find(|e| matches!(e.kind, EventKind::Exit { .. })).unwrap();
         let EventKind::Exit { to, time, arc, rule: recorded } = e.kind else { unreachable!() };
@@ -384,7 +385,7 @@ fn stick_slip_limit_cycle() {
     let period = low + (s.friction - x_land) / b;
 
     let mut out = Trajectory::new(4);
-    run(&s, vector![0.0, 0.0], 60.0, &Settings::default(), STAY, &mut out).unwrap();
+    let _ = run(&s, vector![0.0, 0.0], 60.0, &Settings::default(), STAY, &mut out).unwrap();
     let slips: Vec<_> = out.events.iter().filter(|e| e.kind == EventKind::LeftByTangency { to: Side::Minus }).collect();
     let lands: Vec<_> = out.events.iter().filter(|e| e.kind == EventKind::Landing { from: Side::Minus }).collect();
     assert!(slips.len() >= 4);
@@ -460,7 +461,7 @@ fn the_funnel_holds_every_exit() {
         }
         assert!(drift(&c, &m.trajectory) <= 1e-12);
     }
-    let back = f.members.iter().filter(|m| m.summary.end == End::Observer).count();
+    let back = f.members.iter().filter(|m| m.summary.stop == StopReason::Observer).count();
     assert!(back >= 5, "{back} of 10 came back to the two-fold");
 }
 
@@ -471,7 +472,7 @@ fn a_step_cap_changes_no_event() {
         let settings = Settings { max_step, ..Settings::default() };
         let mut out = Trajectory::new(1);
         let start = vector![0.69267, 0.0, 0.0];
-        run(system, start, t_end, &settings, ExitRule::All, &mut out).unwrap();
+        let _ = run(system, start, t_end, &settings, ExitRule::All, &mut out).unwrap();
         out.events.iter().map(|e| (format!("{:?}", e.kind).chars().take(12).collect(), e.t)).collect()
     }
     let (w, n) = (Wheel::default(), TwoFoldNormalForm::invisible(-0.5, -0.5));
@@ -510,7 +511,7 @@ fn a_step_that_straddles_two_crossings_misses_none() {
             let a = 0.05 + 0.37 * f64::from(k);
             let p = Parabola { a, b: a + gap };
             let mut out = Trajectory::new(1);
-            run(&p, vector![p.a * p.b, 0.0], 20.0, &Settings::default(), STAY, &mut out).unwrap();
+            let _ = run(&p, vector![p.a * p.b, 0.0], 20.0, &Settings::default(), STAY, &mut out).unwrap();
             assert_eq!(out.events.len(), 2, "gap {gap:e} a {a}: {:?}", out.events);
             let error = (out.events[0].t - p.a).abs().max((out.events[1].t - p.b).abs());
             assert!(error < 1e-13 * 20.0 / gap, "gap {gap:e} a {a}: {error:e}");
@@ -525,7 +526,7 @@ fn reversed_time_leads_back() {
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     let mut forward = Trajectory::new(1);
     let rule = ExitRule::AfterTime { time: 0.9, side: Side::Plus };
-    run(&c, vector![0.0, 0.0, 0.0], 2.0, &Settings::default(), rule, &mut forward).unwrap();
+    let _ = run(&c, vector![0.0, 0.0, 0.0], 2.0, &Settings::default(), rule, &mut forward).unwrap();
     let exit = forward.events.iter().find(|e| matches!(e.kind, EventKind::Exit { .. })).unwrap();
     let mut back = Trajectory::new(1);
     let end = run(&Reversed(c), exit.state, 5.0, &Settings::default(), ExitRule::All, &mut back).unwrap();
@@ -546,7 +547,8 @@ fn observers_of_ordinary_runs_work() {
     }
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     let mut seen = Joined::default();
-    run(&c, vector![0.2, 0.0, -1.0], 40.0, &Settings::default(), random(3, 0.5), &mut AllModes(&mut seen)).unwrap();
+    let _ =
+        run(&c, vector![0.2, 0.0, -1.0], 40.0, &Settings::default(), random(3, 0.5), &mut AllModes(&mut seen)).unwrap();
     assert_eq!((seen.0[0].0, seen.0.last().unwrap().1), (0.0, 40.0));
     assert!(seen.0.windows(2).all(|w| w[0].1 == w[1].0 && w[0].0 < w[0].1));
 }
@@ -556,7 +558,7 @@ fn interpolants_are_in_physical_time_and_on_the_surface() {
     // Between the ends of a sliding step too: |h| <= 1e-12 and the state at a time is the state of a run that ends there.
     let w = Wheel::default();
     let mut out = Trajectory::new(16);
-    run(&w, vector![0.69267, 0.0, 0.0], 3.0, &Settings::default(), ExitRule::All, &mut out).unwrap();
+    let _ = run(&w, vector![0.69267, 0.0, 0.0], 3.0, &Settings::default(), ExitRule::All, &mut out).unwrap();
     assert!(drift(&w, &out) <= 1e-12, "{:e}", drift(&w, &out));
     let sliding: Vec<_> =
         out.pieces.iter().filter(|p| p.mode == Mode::SlidingAttracting).flat_map(|p| &p.points).collect();
@@ -607,7 +609,7 @@ fn points_of_the_chaotic_set_are_connected_through_the_singularity() {
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     // Points of one orbit, taken from its free flight after the first visit.
     let mut orbit = Trajectory::new(2);
-    run(&c, vector![0.2, 0.0, -1.0], 90.0, &Settings::default(), random(3, 0.8), &mut orbit).unwrap();
+    let _ = run(&c, vector![0.2, 0.0, -1.0], 90.0, &Settings::default(), random(3, 0.8), &mut orbit).unwrap();
     let visit = orbit.events.iter().find(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).unwrap().t;
     let flights: Vec<_> = orbit.pieces.iter().filter(|p| !p.mode.slides() && p.points[0].0 > visit).collect();
     let mut connected = 0;
@@ -666,8 +668,9 @@ fn the_smoothed_reference_lies_within_eps() {
     for (name, alpha, rows) in [("crossings-printed.csv", 1e-3, 4), ("crossings-reconstructed.csv", 1e-1, 2)] {
         let c = Caricature::with_reinjection(alpha, 1e-5);
         let mut section = Section::default();
-        run(&c, vector![0.2, 0.0, -1.0], 50.0, &Settings::default(), ExitRule::All, &mut AllModes(&mut section))
-            .unwrap();
+        let _ =
+            run(&c, vector![0.2, 0.0, -1.0], 50.0, &Settings::default(), ExitRule::All, &mut AllModes(&mut section))
+                .unwrap();
         for (found, wanted) in section.0.iter().zip(reference(name, rows)) {
             for (f, w) in found.iter().zip(wanted) {
                 assert!((f - w).abs() < 2e-3 * (1.0 + w.abs()), "{name}: {found:?} {wanted:?}");
@@ -682,7 +685,7 @@ fn the_discontinuous_wheel_fills_a_box_like_the_smoothed_wheels() {
     // SCIENCE.md section 7, smoothed with eps = 1e-3, 30 < t < 230: r in [0.22, 0.79], v in [-6.2, 5.5], omega in [-8.0, 4.6].
     let w = Wheel::default();
     let mut out = Trajectory::new(2);
-    run(&w, vector![0.69267, 0.0, 0.0], 230.0, &Settings::default(), random(5, 0.05), &mut out).unwrap();
+    let _ = run(&w, vector![0.69267, 0.0, 0.0], 230.0, &Settings::default(), random(5, 0.05), &mut out).unwrap();
     let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
     for (_, x) in out.points().filter(|(t, _)| *t > 30.0) {
         for (b, v) in bounds.iter_mut().zip(x.iter()) {
@@ -696,4 +699,33 @@ fn the_discontinuous_wheel_fills_a_box_like_the_smoothed_wheels() {
         assert!((0.95..1.35).contains(&ratio), "{found:?} {smoothed:?}");
     }
     assert!(visits >= 50, "{visits}");
+}
+
+#[test]
+fn a_run_that_is_cut_short_says_why() {
+    struct Refuses;
+    impl Watch for Refuses {
+        fn reached(&self, _: f64) -> bool {
+            false
+        }
+    }
+    let n = TwoFoldNormalForm::invisible(-1.2, -1.4);
+    let start = vector![0.0, 0.3, 0.8];
+    let mut out = Trajectory::new(1);
+    let few = Settings { max_steps: 3, ..Settings::default() };
+    let poor = run(&n, start, 100.0, &few, ExitRule::All, &mut out).unwrap();
+    assert_eq!(poor.stop, StopReason::StepBudget);
+    assert!(poor.t < 100.0 && !out.pieces.is_empty(), "what was computed until then stands");
+    assert!(matches!(poor.within_budget(), Err(FilippovError::Stepping(_))));
+
+    let mut out = Trajectory::new(1);
+    let cut = run_watched(&n, start, 100.0, &Settings::default(), ExitRule::All, &mut out, &Refuses).unwrap();
+    assert_eq!(cut.stop, StopReason::Watch);
+
+    let mut out = Trajectory::new(1).until_events(1);
+    let seen = run(&n, start, 100.0, &Settings::default(), ExitRule::All, &mut out).unwrap();
+    assert_eq!(seen.stop, StopReason::Observer);
+    // A family is not made from runs that were cut short.
+    let grid = FunnelGrid { shortest: 0.1, longest: 1.0, times: 2, horizon: 5.0, until_two_fold: true, per_step: 1 };
+    assert!(matches!(funnel(&n, start, 100.0, &few, &grid), Err(FilippovError::Stepping(_))));
 }

@@ -134,8 +134,7 @@ fn end<const N: usize, F: VectorField<N>, M: Stepper<N>>(
     t_end: f64,
     mut stepper: M,
 ) -> SVector<f64, N> {
-    let schedule = Schedule::default();
-    drive(field, x0, t_end, &mut stepper, &schedule, StepCap::None, 1_000_000, &mut Ignore, &()).unwrap().x
+    drive(field, x0, &Course::to(t_end), &mut stepper, &mut Ignore, &()).unwrap().x
 }
 
 /// f64 Taylor, double-double Taylor and Dormand-Prince, all at 1e-12, meet.

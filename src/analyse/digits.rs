@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 
 use super::section::{Direction, SectionRecorder};
 use crate::integrate::{
-    Failure, Flow, Observer, Schedule, Step, StepCap, Stepper, Taylor, Tolerance, drive, roots::sign_changes,
+    Course, Failure, Flow, Observer, Step, StepCap, Stepper, Taylor, Tolerance, drive, roots::sign_changes,
 };
 use crate::num::elementary::log10;
 use crate::num::{Arithmetic, DoubleDouble, Scalar};
@@ -179,7 +179,8 @@ pub fn agreement<F: VectorField<3>, M: Stepper<3>>(
     let Some(last) = reference.last() else { return Ok(Vec::new()) };
     let mut until = Until { section: SectionRecorder::new(plane.coordinate, plane.value), crossings: reference.len() };
     let t_end = 2.0 * last.t.to_f64();
-    drive(field, x0, t_end, stepper, &Schedule::default(), cap, max_steps, &mut until, &())?;
+    let course = Course { step_cap: cap, max_steps, ..Course::to(t_end) };
+    let _ = drive(field, x0, &course, stepper, &mut until, &())?.within_budget()?;
     let pairs = reference.iter().zip(until.section.crossings()).enumerate();
     Ok(pairs
         .map(|(i, (want, got))| {

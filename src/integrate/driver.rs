@@ -1,9 +1,10 @@
 //! The one loop that runs a method over a schedule.
 
 use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
 
 use super::schedule::{Kicker, Schedule, StepCap};
-use super::step::{Failure, Flow, Statistics, Step, Stepper};
+use super::step::{Failure, Flow, Statistics, Step, Stepper, StopReason};
 use crate::system::VectorField;
 
 /// Receives a run as it happens.
@@ -36,8 +37,30 @@ impl Watch for () {
     }
 }
 
+/// How far a run goes and by what rules, whatever the equation and the method.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Course {
+    /// The end time; a run starts at 0.
+    pub t_end: f64,
+    /// Restarts and kicks.
+    pub schedule: Schedule,
+    /// The longest step.
+    pub step_cap: StepCap,
+    /// Most steps of the whole run; with them it ends as [`StopReason::StepBudget`].
+    pub max_steps: u64,
+}
+
+impl Course {
+    /// Straight to `t_end`: no restarts, no kicks, steps as long and as many as the method wants.
+    pub fn to(t_end: f64) -> Self {
+        Self { t_end, schedule: Schedule::default(), step_cap: StepCap::None, max_steps: u64::MAX }
+    }
+}
+
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq)]
+#[must_use = "a run may have been cut short: look at `stop`"]
 pub struct Summary<const N: usize> {
     /// Final time.
     pub t: f64,
@@ -47,18 +70,34 @@ pub struct Summary<const N: usize> {
     pub statistics: Statistics,
     /// The largest number of steps in one segment. NDSolve would have stopped at 10,000.
     pub most_steps_in_segment: u64,
+    /// Why it ended.
+    pub stop: StopReason,
 }
 
-/// Runs `stepper` from (0, x0) to `t_end` over `schedule`, at most `max_steps` steps.
-#[allow(clippy::too_many_arguments)]
+impl<const N: usize> Summary<N> {
+    /// This summary, unless the budget of steps ended the run.
+    ///
+    /// # Errors
+    /// [`Failure::TooManySteps`], for callers to whom a run cut short by its budget is worth nothing.
+    pub fn within_budget(self) -> Result<Self, Failure> {
+        match self.stop {
+            StopReason::StepBudget => {
+                Err(Failure::TooManySteps { t: self.t, limit: self.statistics.steps, state: Failure::state(&self.x) })
+            }
+            _ => Ok(self),
+        }
+    }
+}
+
+/// Runs `stepper` from (0, x0) over `course`.
+///
+/// # Errors
+/// What the method could not do. Running out of steps is no error but a [`StopReason`]: what was observed until then stands.
 pub fn drive<const N: usize, F, M, O>(
     field: &F,
     x0: SVector<f64, N>,
-    t_end: f64,
+    course: &Course,
     stepper: &mut M,
-    schedule: &Schedule,
-    cap: StepCap,
-    max_steps: u64,
     observer: &mut O,
     watch: &dyn Watch,
 ) -> Result<Summary<N>, Failure>
@@ -67,22 +106,29 @@ where
     M: Stepper<N>,
     O: Observer<N>,
 {
+    let Course { t_end, ref schedule, step_cap, max_steps } = *course;
     let mut kicker = schedule.kick.map(Kicker::new);
     let (mut t, mut x) = (0.0, x0);
     let mut most_steps_in_segment = 0;
+    let mut stop = StopReason::EndTime;
     'run: for segment in schedule.segments(0.0, t_end) {
         let steps_before = stepper.statistics().steps;
-        stepper.restart(field, t, x, segment.end, cap.for_segment(segment.end - t))?;
+        stepper.restart(field, t, x, segment.end, step_cap.for_segment(segment.end - t))?;
         while t < segment.end {
             let step = stepper.step(field)?;
             (t, x) = (step.t1, step.x1);
             let flow = observer.step(&step);
             let steps = stepper.statistics().steps;
-            if steps.is_multiple_of(4096) && !watch.reached(t) || flow == Flow::Stop {
-                break 'run;
+            if flow == Flow::Stop {
+                stop = StopReason::Observer;
+            } else if steps.is_multiple_of(4096) && !watch.reached(t) && t < t_end {
+                stop = StopReason::Watch;
+            } else if steps >= max_steps && t < t_end {
+                stop = StopReason::StepBudget;
             }
-            if steps >= max_steps && t < t_end {
-                return Err(Failure::TooManySteps { t, limit: max_steps, state: Failure::state(&x) });
+            if stop != StopReason::EndTime {
+                most_steps_in_segment = most_steps_in_segment.max(steps - steps_before);
+                break 'run;
             }
         }
         most_steps_in_segment = most_steps_in_segment.max(stepper.statistics().steps - steps_before);
@@ -93,5 +139,71 @@ where
         }
     }
     watch.reached(t);
-    Ok(Summary { t, x, statistics: stepper.statistics().clone(), most_steps_in_segment })
+    Ok(Summary { t, x, statistics: stepper.statistics().clone(), most_steps_in_segment, stop })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    use nalgebra::vector;
+
+    use super::*;
+    use crate::integrate::{Dopri5, Tolerance};
+    use crate::num::Elementary;
+
+    /// x'' = -x.
+    struct Turning;
+    impl VectorField<2> for Turning {
+        fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+            SVector::from([x[1], -x[0]])
+        }
+    }
+
+    /// Stops after so many steps.
+    struct After(u64);
+    impl Observer<2> for After {
+        fn step(&mut self, _: &Step<'_, 2>) -> Flow {
+            self.0 -= 1;
+            if self.0 == 0 { Flow::Stop } else { Flow::Continue }
+        }
+    }
+
+    struct Refuses(AtomicBool);
+    impl Watch for Refuses {
+        fn reached(&self, _: f64) -> bool {
+            self.0.store(true, Ordering::Relaxed);
+            false
+        }
+    }
+
+    fn run(course: Course, observer: &mut impl Observer<2>, watch: &dyn Watch) -> Summary<2> {
+        let mut stepper = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
+        drive(&Turning, vector![1.0, 0.0], &course, &mut stepper, observer, watch).unwrap()
+    }
+
+    #[test]
+    fn every_end_has_its_reason() {
+        let whole = run(Course::to(10.0), &mut Ignore, &());
+        assert_eq!((whole.stop, whole.t), (StopReason::EndTime, 10.0));
+        assert_eq!(whole.most_steps_in_segment, whole.statistics.steps);
+
+        let seen = run(Course::to(10.0), &mut After(7), &());
+        assert_eq!((seen.stop, seen.statistics.steps), (StopReason::Observer, 7));
+        assert!(seen.t < 10.0 && seen.most_steps_in_segment == 7);
+
+        let poor = run(Course { max_steps: 5, ..Course::to(10.0) }, &mut Ignore, &());
+        assert_eq!((poor.stop, poor.statistics.steps), (StopReason::StepBudget, 5));
+        assert!(matches!(poor.within_budget(), Err(Failure::TooManySteps { limit: 5, .. })));
+
+        let refuses = Refuses(AtomicBool::new(false));
+        let cut = run(Course { step_cap: StepCap::Absolute(1e-3), ..Course::to(10.0) }, &mut Ignore, &refuses);
+        assert_eq!((cut.stop, cut.statistics.steps), (StopReason::Watch, 4096));
+        assert!(cut.within_budget().is_ok(), "only the budget is an error");
+
+        // A budget that is just enough is enough, and a watch that refuses at the very end has cut nothing short.
+        let just = run(Course { max_steps: whole.statistics.steps, ..Course::to(10.0) }, &mut Ignore, &refuses);
+        assert_eq!(just.stop, StopReason::EndTime);
+        assert_eq!(just.x, whole.x);
+    }
 }

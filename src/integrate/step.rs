@@ -117,6 +117,22 @@ pub enum Flow {
     Stop,
 }
 
+/// Why a run ended. It is part of every summary, so that a run cut short is never taken for a whole one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StopReason {
+    /// The end time was reached.
+    EndTime,
+    /// The observer asked to stop: it has what it wanted.
+    Observer,
+    /// The watch asked to stop: somebody interrupted.
+    Watch,
+    /// The budget of steps is used up.
+    StepBudget,
+    /// The future is a set and nothing says which member to follow (Filippov motion only).
+    SetValued,
+}
+
 /// Why an integration could not go on. Each names the time and the state; the caller adds the run's name.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Failure {

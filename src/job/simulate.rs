@@ -4,11 +4,9 @@ use nalgebra::{SVector, vector};
 
 use super::spec::{FunnelSpec, Method, Observation, RunSpec, SpecError, SwitchSpec, SystemSpec};
 use crate::analyse::{Crossing, Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder};
-use crate::integrate::filippov::{
-    self, AllModes, ExitRule, FilippovError, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent, Side,
-};
+use crate::integrate::filippov::{self, AllModes, ExitRule, FilippovError, FilippovSummary, FunnelGrid, Side};
 use crate::integrate::{
-    Dopri5, Failure, Flow, Lsoda, Observer, Radau5, Statistics, Step, Stepper, Taylor, Watch, drive,
+    Course, Dopri5, Failure, Lsoda, Observer, Radau5, Statistics, Stepper, StopReason, Taylor, Watch, drive,
 };
 use crate::system::{Hysteretic, PiecewiseSmooth, Smoothed, VectorField};
 
@@ -25,6 +23,8 @@ pub struct Recording {
     pub statistics: Statistics,
     /// The largest number of steps between restarts; NDSolve's default limit is 10,000.
     pub most_steps_in_segment: u64,
+    /// Why it ended.
+    pub stop: StopReason,
 }
 
 /// Recorded points.
@@ -131,35 +131,21 @@ fn discontinuous<P: PiecewiseSmooth<3>>(
         x: summary.x.into(),
         most_steps_in_segment: summary.statistics.steps,
         statistics: summary.statistics,
+        stop: summary.stop,
     };
     match (spec.observe, funnel) {
         (Observation::Path { .. }, Some(funnel)) => futures(spec, system, x0, &settings, &funnel),
         (Observation::Path { chord }, None) => {
-            let mut recorder = Watched { inner: MotionRecorder::new(chord), watch };
-            let end = filippov::run(system, x0, spec.t_end, &settings, exit, &mut recorder)?;
-            Ok(recording(Data::Motion(recorder.inner.into_motion()), end))
+            let mut recorder = MotionRecorder::new(chord);
+            let end = filippov::run_watched(system, x0, spec.t_end, &settings, exit, &mut recorder, watch)?;
+            Ok(recording(Data::Motion(recorder.into_motion()), end.within_budget()?))
         }
         (Observation::Section { coordinate, value }, _) => {
             let mut recorder = SectionRecorder::new(coordinate, value);
-            let mut watched = Watched { inner: AllModes(&mut recorder), watch };
-            let end = filippov::run(system, x0, spec.t_end, &settings, exit, &mut watched)?;
-            Ok(recording(Data::Section(recorder.into_crossings()), end))
+            let mut all = AllModes(&mut recorder);
+            let end = filippov::run_watched(system, x0, spec.t_end, &settings, exit, &mut all, watch)?;
+            Ok(recording(Data::Section(recorder.into_crossings()), end.within_budget()?))
         }
-    }
-}
-
-/// A Filippov observer that also reports progress.
-struct Watched<'a, O> {
-    inner: O,
-    watch: &'a dyn Watch,
-}
-
-impl<O: FilippovObserver<3>> FilippovObserver<3> for Watched<'_, O> {
-    fn step(&mut self, mode: Mode, step: &Step<'_, 3>) -> Flow {
-        self.inner.step(mode, step)
-    }
-    fn event(&mut self, event: &ModeEvent<3>) -> Flow {
-        if self.watch.reached(event.t) { self.inner.event(event) } else { Flow::Stop }
     }
 }
 
@@ -199,6 +185,7 @@ fn futures<P: PiecewiseSmooth<3>>(
         x: found.point.into(),
         most_steps_in_segment: statistics.steps,
         statistics,
+        stop: StopReason::SetValued,
     })
 }
 
@@ -257,13 +244,15 @@ fn step<F: VectorField<N>, M: Stepper<N>, O: Observer<N>, const N: usize>(
     watch: &dyn Watch,
 ) -> Result<End, RunError> {
     let method = &spec.method;
-    let summary =
-        drive(field, x0, spec.t_end, &mut stepper, &spec.schedule, method.step_cap, method.max_steps, observer, watch)?;
+    let course =
+        Course { t_end: spec.t_end, schedule: spec.schedule, step_cap: method.step_cap, max_steps: method.max_steps };
+    let summary = drive(field, x0, &course, &mut stepper, observer, watch)?.within_budget()?;
     Ok(End {
         t: summary.t,
         x: [summary.x[0], summary.x[1], summary.x[2]],
         statistics: summary.statistics,
         most_steps_in_segment: summary.most_steps_in_segment,
+        stop: summary.stop,
     })
 }
 
@@ -273,11 +262,12 @@ struct End {
     x: [f64; 3],
     statistics: Statistics,
     most_steps_in_segment: u64,
+    stop: StopReason,
 }
 
 impl End {
     fn recording(self, data: Data) -> Recording {
-        let End { t, x, statistics, most_steps_in_segment } = self;
-        Recording { data, t, x, statistics, most_steps_in_segment }
+        let End { t, x, statistics, most_steps_in_segment, stop } = self;
+        Recording { data, t, x, statistics, most_steps_in_segment, stop }
     }
 }

@@ -37,7 +37,7 @@ pub fn tables(v: f64, w: f64) -> Result<Vec<Table>, RunError> {
         let mut trajectory = Trajectory::new(12).until_two_fold();
         // Long sliding: the portrait shows the sliding flow up to the region's edge, not a choice of exit.
         let rule = ExitRule::AfterTime { time: t_end, side: Side::Plus };
-        run(&system, start.into(), t_end, &settings, rule, &mut trajectory)?;
+        let _ = run(&system, start.into(), t_end, &settings, rule, &mut trajectory)?.within_budget()?;
         if let Some(piece) = trajectory.pieces.iter().find(|p| mode(p.mode)) {
             let inside = |x: &[f64; 3]| x[1].abs() <= 1.02 * REACH && x[2].abs() <= 1.02 * REACH;
             let points: Vec<[f64; 3]> =

@@ -5,12 +5,11 @@ use nalgebra::SVector;
 use super::exit::{Chooser, Plan};
 use super::flow::{FreeFlow, InPhysicalTime, SlidingFlow, Straight, Truncated, project};
 use super::two_fold::{AlongCurve, SlidingAtTwoFold, locate};
-use super::{
-    End, EventKind, ExitRule, FilippovError, FilippovObserver, FilippovSummary, Mode, ModeEvent, Settings, Side,
-};
+use super::{EventKind, ExitRule, FilippovError, FilippovObserver, FilippovSummary, Mode, ModeEvent, Settings, Side};
 use crate::integrate::dopri5::Dopri5;
+use crate::integrate::driver::Watch;
 use crate::integrate::roots::{Start, Zero, brent, first_zero};
-use crate::integrate::step::{Failure, Flow, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
+use crate::integrate::step::{Failure, Flow, Interpolant, Statistics, Step, Stepper, StopReason, Tolerance, finite};
 use crate::num::Dual;
 use crate::system::filippov::{gradient, lie_derivatives};
 use crate::system::{PiecewiseSmooth, VectorField, variables};
@@ -32,10 +31,40 @@ where
     O: FilippovObserver<N>,
     for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
 {
-    run_from(system, 0.0, x0, Departure::Anywhere, t_end, settings, rule, observer)
+    run_watched(system, x0, t_end, settings, rule, observer, &())
 }
 
-/// Where a run starts.
+/// [`run`], reporting to `watch` how far it has come; where `watch` refuses, the run ends as [`StopReason::Watch`].
+///
+/// # Errors
+/// See [`FilippovError`]; each names the time and the state.
+pub fn run_watched<P, O, const N: usize, const M: usize>(
+    system: &P,
+    x0: SVector<f64, N>,
+    t_end: f64,
+    settings: &Settings,
+    rule: ExitRule,
+    observer: &mut O,
+    watch: &dyn Watch,
+) -> Result<FilippovSummary<N>, FilippovError>
+where
+    P: PiecewiseSmooth<N>,
+    O: FilippovObserver<N>,
+    for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
+{
+    let origin = Origin { t: 0.0, x: x0, departure: Departure::Anywhere };
+    run_from(system, origin, t_end, settings, rule, observer, watch)
+}
+
+/// Where and when a run starts.
+#[derive(Clone, Debug)]
+pub(super) struct Origin<const N: usize> {
+    pub t: f64,
+    pub x: SVector<f64, N>,
+    pub departure: Departure<N>,
+}
+
+/// What is known of a run's start.
 #[derive(Clone, Debug)]
 pub(super) enum Departure<const N: usize> {
     /// Wherever the state is.
@@ -46,22 +75,21 @@ pub(super) enum Departure<const N: usize> {
     Repelling,
 }
 
-#[allow(clippy::too_many_arguments)]
 pub(super) fn run_from<P, O, const N: usize, const M: usize>(
     system: &P,
-    t0: f64,
-    x0: SVector<f64, N>,
-    departure: Departure<N>,
+    origin: Origin<N>,
     t_end: f64,
     settings: &Settings,
     rule: ExitRule,
     observer: &mut O,
+    watch: &dyn Watch,
 ) -> Result<FilippovSummary<N>, FilippovError>
 where
     P: PiecewiseSmooth<N>,
     O: FilippovObserver<N>,
     for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
 {
+    let Origin { t: t0, x: x0, departure } = origin;
     const { assert!(M == N + 1, "the sliding flow carries exactly one extra state") };
     rule.validate().map_err(FilippovError::Invalid)?;
     let tolerances = [settings.tolerance.rtol, settings.tolerance.atol, settings.max_step];
@@ -79,13 +107,15 @@ where
         settings,
         chooser: Chooser::new(rule),
         observer,
+        watch,
         t: t0,
         x: x0,
         t_end,
         events: 0,
         statistics: Statistics { highest_order: 5, ..Statistics::default() },
         zeno: Zeno::default(),
-        stopped: false,
+        stop: None,
+        steps_until_watch: STEPS_BETWEEN_WATCHES,
     };
     let mut state = match departure {
         Departure::Anywhere => engine.start()?,
@@ -94,11 +124,11 @@ where
         Departure::Repelling => engine.enter_repelling(None)?,
     };
     loop {
-        if engine.stopped {
-            return Ok(engine.summary(state.mode(), End::Observer));
+        if let Some(reason) = engine.stop {
+            return Ok(engine.summary(state.mode(), reason));
         }
         if engine.t >= engine.t_end {
-            return Ok(engine.summary(state.mode(), End::Time));
+            return Ok(engine.summary(state.mode(), StopReason::EndTime));
         }
         if engine.events > settings.max_events {
             return Err(FilippovError::TooManyEvents {
@@ -111,7 +141,7 @@ where
             State::Free { side, start } => engine.fly(side, start)?,
             State::Sliding(sliding) => engine.slide::<M>(sliding)?,
             State::TwoFold(local) => engine.depart(&local)?,
-            State::SetValued(mode) => return Ok(engine.summary(mode, End::SetValued)),
+            State::SetValued(mode) => return Ok(engine.summary(mode, StopReason::SetValued)),
         };
     }
 }
@@ -185,6 +215,9 @@ impl Zeno {
     }
 }
 
+/// A long stretch without events must not keep a watch waiting.
+const STEPS_BETWEEN_WATCHES: u32 = 4096;
+
 const DEGENERATE_END: &str =
     "sliding runs into a point where both Lie derivatives vanish and which is not a regular two-fold";
 
@@ -216,25 +249,35 @@ struct Engine<'a, P, O, const N: usize> {
     settings: &'a Settings,
     chooser: Chooser,
     observer: &'a mut O,
+    watch: &'a dyn Watch,
     t: f64,
     x: SVector<f64, N>,
     t_end: f64,
     events: u64,
     statistics: Statistics,
     zeno: Zeno,
-    stopped: bool,
+    stop: Option<StopReason>,
+    steps_until_watch: u32,
 }
 
 impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P, O, N> {
-    fn summary(self, mode: Option<Mode>, end: End) -> FilippovSummary<N> {
-        FilippovSummary { t: self.t, x: self.x, mode, end, events: self.events, statistics: self.statistics }
+    fn summary(self, mode: Option<Mode>, stop: StopReason) -> FilippovSummary<N> {
+        FilippovSummary { t: self.t, x: self.x, mode, stop, events: self.events, statistics: self.statistics }
     }
 
     fn event(&mut self, kind: EventKind, from: Option<Mode>, to: Option<Mode>) {
         self.events += 1;
         let event = ModeEvent { t: self.t, state: self.x, kind, from, to };
         if self.observer.event(&event) == Flow::Stop {
-            self.stopped = true;
+            self.stop.get_or_insert(StopReason::Observer);
+        }
+        self.ask_watch();
+    }
+
+    fn ask_watch(&mut self) {
+        self.steps_until_watch = STEPS_BETWEEN_WATCHES;
+        if !self.watch.reached(self.t) {
+            self.stop.get_or_insert(StopReason::Watch);
         }
     }
 
@@ -264,20 +307,14 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
     }
 
     /// Counts a finished piece's work.
-    fn count(&mut self, work: &Statistics) -> Result<(), FilippovError> {
+    fn count(&mut self, work: &Statistics) {
         self.statistics.steps += work.steps;
         self.statistics.rejected += work.rejected;
         self.statistics.evaluations += work.evaluations;
         self.statistics.restarts += work.restarts;
         if self.statistics.steps > self.settings.max_steps {
-            return Err(Failure::TooManySteps {
-                t: self.t,
-                limit: self.settings.max_steps,
-                state: Failure::state(&self.x),
-            }
-            .into());
+            self.stop.get_or_insert(StopReason::StepBudget);
         }
-        Ok(())
     }
 
     /// Hands a step to the observer and moves to its end.
@@ -285,10 +322,14 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
         if t1 > self.t {
             let step = Step { t0: self.t, t1, x0: self.x, x1, interpolant };
             if self.observer.step(mode, &step) == Flow::Stop {
-                self.stopped = true;
+                self.stop.get_or_insert(StopReason::Observer);
             }
         }
         (self.t, self.x) = (t1, x1);
+        self.steps_until_watch -= 1;
+        if self.steps_until_watch == 0 {
+            self.ask_watch();
+        }
     }
 
     /// The mode at the start of a run.
@@ -382,7 +423,7 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
                 None => {
                     let (t1, x1) = (step.t1, step.x1);
                     self.take(side.into(), t1, x1, step.interpolant);
-                    if self.stopped || self.t >= self.t_end {
+                    if self.stop.is_some() || self.t >= self.t_end {
                         break None;
                     }
                 }
@@ -412,9 +453,9 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
                 break None;
             }
         };
-        self.count(method.statistics())?;
+        self.count(method.statistics());
         match landed {
-            _ if self.stopped => Ok(State::Free { side, start: FlightStart::Away }),
+            _ if self.stop.is_some() => Ok(State::Free { side, start: FlightStart::Away }),
             None => Ok(State::Free { side, start: FlightStart::Away }),
             Some(zero) => {
                 let duration = self.t - t_start;
@@ -594,7 +635,7 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
             if idle >= IDLE_STEPS {
                 return Err(self.non_transversal(DEGENERATE_END));
             }
-            if self.stopped {
+            if self.stop.is_some() {
                 break Some(SlidingEnd::Time);
             }
             if method.statistics().steps > self.settings.max_steps {
@@ -628,11 +669,11 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
                 method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY)?;
             }
         };
-        self.count(method.statistics())?;
+        self.count(method.statistics());
         let from = Some(mode);
         match next {
             None => match local {
-                Some(fold) if self.t < self.t_end && !self.stopped => Ok(State::TwoFold(Box::new(fold))),
+                Some(fold) if self.t < self.t_end && self.stop.is_none() => Ok(State::TwoFold(Box::new(fold))),
                 Some(fold) if self.x == fold.point => Ok(State::TwoFold(Box::new(fold))),
                 _ => Ok(State::Sliding(sliding)),
             },
@@ -656,7 +697,7 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
             return Some(SlidingEnd::Time);
         }
         self.take(mode, t1, point, &straight);
-        if !self.stopped {
+        if self.stop.is_none() {
             self.event(EventKind::TwoFoldReached { leg, error }, Some(mode), None);
         }
         None

@@ -2,11 +2,10 @@
 
 use nalgebra::SVector;
 
-use super::engine::Departure;
+use super::engine::{Departure, Origin};
 use super::two_fold::SlidingAtTwoFold;
-use super::{
-    End, ExitRule, FilippovError, FilippovSummary, Settings, Side, SlidingFlow, Trajectory, engine, flow::project,
-};
+use super::{ExitRule, FilippovError, FilippovSummary, Settings, Side, SlidingFlow, Trajectory, engine, flow::project};
+use crate::integrate::StopReason;
 use crate::num::elementary::pow;
 use crate::system::filippov::{Region, region};
 use crate::system::{PiecewiseSmooth, Reversed, VectorField};
@@ -72,8 +71,8 @@ where
     for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
 {
     let mut approach = Trajectory::new(grid.per_step);
-    let there = super::run(system, x0, t_end, settings, ExitRule::All, &mut approach)?;
-    if there.end != End::SetValued {
+    let there = super::run(system, x0, t_end, settings, ExitRule::All, &mut approach)?.within_budget()?;
+    if there.stop != StopReason::SetValued {
         return Err(FilippovError::NoSuchExit {
             t: there.t,
             state: there.x.iter().copied().collect(),
@@ -113,8 +112,9 @@ where
     }
     // Reversed, repelling sliding attracts and its past is a future. It stops at its first event after the start.
     let mut back = Trajectory::new(per_step).until_events(2);
-    let end = super::run(&Reversed(system.clone()), on_surface, longest, settings, ExitRule::All, &mut back)?;
-    if end.end == End::Time {
+    let end = super::run(&Reversed(system.clone()), on_surface, longest, settings, ExitRule::All, &mut back)?
+        .within_budget()?;
+    if end.stop == StopReason::EndTime {
         return Err(refuse("its past is longer than the given time"));
     }
     Ok(back.turned(end.t))
@@ -141,15 +141,16 @@ where
     for<'a> SlidingFlow<'a, Reversed<P>, N>: VectorField<M>,
 {
     let mut path = Trajectory::new(per_step);
-    let there = super::run(system, a, longest, settings, ExitRule::All, &mut path)?;
+    let there = super::run(system, a, longest, settings, ExitRule::All, &mut path)?.within_budget()?;
     let mut past = Trajectory::new(per_step);
-    let back = super::run(&Reversed(system.clone()), b, longest, settings, ExitRule::All, &mut past)?;
+    let back =
+        super::run(&Reversed(system.clone()), b, longest, settings, ExitRule::All, &mut past)?.within_budget()?;
     let refuse =
         |x: &SVector<f64, N>, why| FilippovError::NoSuchExit { t: there.t, state: x.iter().copied().collect(), why };
-    if there.end != End::SetValued || there.mode.is_some() {
+    if there.stop != StopReason::SetValued || there.mode.is_some() {
         return Err(refuse(&there.x, "the future of the first point comes to no two-fold in the given time"));
     }
-    if back.end != End::SetValued || back.mode.is_some() {
+    if back.stop != StopReason::SetValued || back.mode.is_some() {
         return Err(refuse(&back.x, "the past of the second point comes from no two-fold in the given time"));
     }
     if (there.x - back.x).amax() > 1e-9 * (1.0 + there.x.amax()) {
@@ -189,16 +190,10 @@ where
                 trajectory = trajectory.until_two_fold();
             }
             let rule = ExitRule::AfterTime { time: exit_time, side };
-            let summary = engine::run_from(
-                system,
-                family.t,
-                family.point,
-                departure.clone(),
-                family.t + grid.horizon,
-                settings,
-                rule,
-                &mut trajectory,
-            )?;
+            let origin = Origin { t: family.t, x: family.point, departure: departure.clone() };
+            let until = family.t + grid.horizon;
+            let summary =
+                engine::run_from(system, origin, until, settings, rule, &mut trajectory, &())?.within_budget()?;
             members.push(FunnelMember { exit_time, side, trajectory, summary });
         }
     }

@@ -79,7 +79,7 @@ where
 {
     let Some(&last) = times.last() else { return Ok(Vec::new()) };
     let mut exact = AtTimes { times, states: Vec::new() };
-    let end = run(system, x0, last, settings, ExitRule::All, &mut exact)?;
+    let end = run(system, x0, last, settings, ExitRule::All, &mut exact)?.within_budget()?;
     if exact.states.len() < times.len() {
         return Err(FilippovError::NoSuchExit {
             t: end.t,

@@ -54,9 +54,9 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use super::driver::Observer;
-use super::step::{Failure, Flow, Statistics, Step, Tolerance};
+use super::step::{Failure, Flow, Statistics, Step, StopReason, Tolerance};
 
-pub use engine::run;
+pub use engine::{run, run_watched};
 pub use exit::{ExitRule, Side, SlidingLaw};
 pub use flow::SlidingFlow;
 pub use funnel::{Funnel, FunnelGrid, FunnelMember, connect, funnel, history};
@@ -221,20 +221,9 @@ impl Default for Settings {
     }
 }
 
-/// Why a run ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum End {
-    /// The end time was reached.
-    Time,
-    /// The observer asked to stop.
-    Observer,
-    /// The future is a set and the rule is [`ExitRule::All`].
-    SetValued,
-}
-
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq)]
+#[must_use = "a run may have been cut short: look at `stop`"]
 pub struct FilippovSummary<const N: usize> {
     /// Final time.
     pub t: f64,
@@ -242,12 +231,28 @@ pub struct FilippovSummary<const N: usize> {
     pub x: SVector<f64, N>,
     /// The mode in which the run ended; `None` at a two-fold.
     pub mode: Option<Mode>,
-    /// Why it ended.
-    pub end: End,
+    /// Why it ended; [`StopReason::SetValued`] only under the rule [`ExitRule::All`].
+    pub stop: StopReason,
     /// Number of events.
     pub events: u64,
     /// Work done, all modes together.
     pub statistics: Statistics,
+}
+
+impl<const N: usize> FilippovSummary<N> {
+    /// This summary, unless the budget of steps ended the run.
+    ///
+    /// # Errors
+    /// [`Failure::TooManySteps`], for callers to whom a run cut short by its budget is worth nothing.
+    pub fn within_budget(self) -> Result<Self, FilippovError> {
+        match self.stop {
+            StopReason::StepBudget => {
+                Err(Failure::TooManySteps { t: self.t, limit: self.statistics.steps, state: Failure::state(&self.x) }
+                    .into())
+            }
+            _ => Ok(self),
+        }
+    }
 }
 
 /// Why a Filippov run could not go on.
