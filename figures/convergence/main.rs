@@ -1,6 +1,8 @@
 //! The limit of a stiff switch: smoothed orbits beside the Filippov motion. Not a figure of the paper; it checks the paper's premise
 //! that smoothing is harmless away from the singularity, and that it decides nothing there.
 
+use std::sync::Arc;
+
 use nalgebra::SVector;
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -9,11 +11,12 @@ use twofold::cli;
 use twofold::integrate::Failure;
 use twofold::integrate::filippov::limit::{ConvergenceRow, convergence, observed_rate};
 use twofold::integrate::filippov::{EventKind, FilippovError, FunnelGrid, Mode, Settings, Side, funnel};
-use twofold::job::simulate::RunError;
-use twofold::job::table::{Entry, Table};
+use twofold::job::{AnyQuestion, JobError};
+use twofold::job::table::{Column, Entry, Table};
 use twofold::num::elementary::pow;
 use twofold::num::{Arithmetic, DoubleDouble, Scalar};
 use twofold::paper::wording::number;
+use twofold::paper::study::Computed;
 use twofold::paper::{Figure, Reading, Study};
 use twofold::render::sheet::*;
 use twofold::render::style;
@@ -142,18 +145,18 @@ fn nearest(
     Ok(Some(near))
 }
 
-fn compute(reading: Reading) -> Result<Vec<Table>, RunError> {
+fn compute(reading: Reading) -> Result<Vec<Table>, JobError> {
     let (system, x0, settings) = (reading.caricature(), SVector::from(START), Settings::default());
-    let mut before = Table::new("before", &["eps", "t", "mode", "distance"]);
+    let mut before = Table::new("before", [Column::numbers("eps"), Column::numbers("t"), Column::words("mode"), Column::numbers("distance")]);
     for row in convergence(&system, x0, &times(reading), &BEFORE, &settings)? {
         let mode = if row.mode == Mode::SlidingAttracting { "sliding" } else { "free" };
-        before.rows.push(vec![row.eps.into(), row.t.into(), mode.into(), row.distance.into()]);
+        before.push(vec![row.eps.into(), row.t.into(), mode.into(), row.distance.into()]);
     }
     let found = crossings(reading, &GRID)?;
-    let mut members = Table::new("funnel", &["exit_time", "side", "y", "z"]);
+    let mut members = Table::new("funnel", [Column::numbers("exit_time"), Column::words("side"), Column::numbers("y"), Column::numbers("z")]);
     let mut width = 0.0_f64;
     for (i, a) in found.members.iter().enumerate() {
-        members.rows.push(vec![a.exit_time.into(), side(a.side).into(), a.state[1].into(), a.state[2].into()]);
+        members.push(vec![a.exit_time.into(), side(a.side).into(), a.state[1].into(), a.state[2].into()]);
         for b in &found.members[..i] {
             width = width.max((a.state - b.state).norm());
         }
@@ -169,7 +172,7 @@ fn compute(reading: Reading) -> Result<Vec<Table>, RunError> {
         let mut row: Vec<Entry> = [eps, y, z, time].map(Entry::from).into();
         row.push(side(to).into());
         row.extend([distance, width, found.t_visit].map(Entry::from));
-        after.rows.push(row);
+        after.push(row);
     }
     Ok(vec![before, members, after])
 }
@@ -196,18 +199,18 @@ fn draw(tables: &[Table]) -> Sheet {
     let expected = LineStyle::new(style::SOFT_INK, style::CURVE_PT).dashed();
 
     let mut moments: Vec<f64> = Vec::new();
-    for row in &before.rows {
+    for row in before.rows() {
         if !moments.contains(&value(&row[1])) {
             moments.push(value(&row[1]));
         }
     }
     let mut approach = PlanePanel::new(
-        Axis::log_covering("*ε*", before.rows.iter().map(|r| value(&r[0]))),
-        with_room(12.0, before.rows.iter().map(|r| value(&r[3]))),
+        Axis::log_covering("*ε*", before.rows().iter().map(|r| value(&r[0]))),
+        with_room(12.0, before.rows().iter().map(|r| value(&r[3]))),
     );
     let mut rates = Vec::new();
     for (&t, (colour, shape)) in moments.iter().zip(LOOKS) {
-        let rows: Vec<_> = before.rows.iter().filter(|r| value(&r[1]) == t).collect();
+        let rows: Vec<_> = before.rows().iter().filter(|r| value(&r[1]) == t).collect();
         let points: Vec<[f64; 2]> = rows.iter().map(|r| [value(&r[0]), value(&r[3])]).collect();
         let marker = MarkerStyle { shape, colour, size: 4.0 };
         approach = approach.line(proportional(&points), expected).markers(points.clone(), marker);
@@ -222,11 +225,11 @@ fn draw(tables: &[Table]) -> Sheet {
     let approach = approach.legend_at(Corner::LowerRight);
 
     let crossings = |name: &'static str| -> Vec<[f64; 2]> {
-        let rows = members.rows.iter().filter(|r| r[1] == Entry::from(name));
+        let rows = members.rows().iter().filter(|r| r[1] == Entry::from(name));
         rows.map(|r| [value(&r[2]), value(&r[3])]).collect()
     };
-    let exits: Vec<[f64; 2]> = after.rows.iter().map(|r| [value(&r[1]), value(&r[2])]).collect();
-    let all = || members.rows.iter().map(|r| [value(&r[2]), value(&r[3])]).chain(exits.iter().copied());
+    let exits: Vec<[f64; 2]> = after.rows().iter().map(|r| [value(&r[1]), value(&r[2])]).collect();
+    let all = || members.rows().iter().map(|r| [value(&r[2]), value(&r[3])]).chain(exits.iter().copied());
     let (mut y, mut z) = (Axis::covering("*y*", all().map(|p| p[0])), Axis::covering("*z*", all().map(|p| p[1])));
     let (wide, high) = (y.upper - y.lower, z.upper - z.lower);
     let left = y.lower;
@@ -240,9 +243,9 @@ fn draw(tables: &[Table]) -> Sheet {
     }
     let ring = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::INK, size: 5.0 };
     inside = inside.markers(exits.clone(), ring).legend(LegendKey::Marker(ring), "smoothed");
-    for (row, &[y, z]) in after.rows.iter().zip(&exits) {
+    for (row, &[y, z]) in after.rows().iter().zip(&exits) {
         // To the right above the lowest branch, below on it, but not across the frame.
-        let mut places = members.rows.iter().map(|r| [value(&r[2]), value(&r[3])]);
+        let mut places = members.rows().iter().map(|r| [value(&r[2]), value(&r[3])]);
         let lowest = !places.any(|m| (m[0] - y).abs() < 0.08 * wide && m[1] < z - 0.06 * high);
         let text = number(value(&row[0]));
         inside = if lowest && y > left + 0.2 * wide {
@@ -252,8 +255,8 @@ fn draw(tables: &[Table]) -> Sheet {
         };
     }
 
-    let distances: Vec<[f64; 2]> = after.rows.iter().map(|r| [value(&r[0]), value(&r[5])]).collect();
-    let widths: Vec<[f64; 2]> = after.rows.iter().map(|r| [value(&r[0]), value(&r[6])]).collect();
+    let distances: Vec<[f64; 2]> = after.rows().iter().map(|r| [value(&r[0]), value(&r[5])]).collect();
+    let widths: Vec<[f64; 2]> = after.rows().iter().map(|r| [value(&r[0]), value(&r[6])]).collect();
     let near = MarkerStyle { shape: MarkerShape::Dot, colour: style::INK, size: 4.0 };
     let whole = LineStyle::new(style::GREEN, style::CURVE_PT);
     let last = PlanePanel::new(
@@ -266,9 +269,9 @@ fn draw(tables: &[Table]) -> Sheet {
     .legend(LegendKey::Marker(near), "to its nearest member")
     .legend_at(Corner::LowerRight);
 
-    let visit = after.rows.first().map_or(f64::NAN, |r| value(&r[7]));
+    let visit = after.rows().first().map_or(f64::NAN, |r| value(&r[7]));
     let nearest: Vec<String> = after
-        .rows
+        .rows()
         .iter()
         .map(|r| format!("{} for *ε* = {}", number((value(&r[3]) * 1e3).round() / 1e3), number(value(&r[0]))))
         .collect();
@@ -301,6 +304,10 @@ fn draw(tables: &[Table]) -> Sheet {
         ))
 }
 
+fn study(reading: Reading, compute: fn() -> Result<Vec<Table>, JobError>) -> Vec<AnyQuestion> {
+    vec![Arc::new(Computed { kind: "convergence", question: question(reading), cost: 4.0e5, compute })]
+}
+
 /// The figure's specification.
 pub fn figure() -> Figure {
     Figure::studied_in_both_readings(
@@ -311,8 +318,8 @@ pub fn figure() -> Figure {
                   the surface x = 0 far from the singularity, and where smoothed orbits cross it, in the plane of y and z. (c) Distance of \
                   each smoothed crossing to the nearest member, beside the width of the set.",
         [
-            Study { question: || question(Reading::Printed), compute: || compute(Reading::Printed), draw },
-            Study { question: || question(Reading::Reconstructed), compute: || compute(Reading::Reconstructed), draw },
+            Study { questions: || study(Reading::Printed, || compute(Reading::Printed)), draw: |answers| draw(&Study::tables(answers)) },
+            Study { questions: || study(Reading::Reconstructed, || compute(Reading::Reconstructed)), draw: |answers| draw(&Study::tables(answers)) },
         ],
     )
 }

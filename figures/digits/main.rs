@@ -3,6 +3,8 @@
 //! Left: how many digits of each passage through y = 0 a method gets right. Right: what the first visit to the singularity makes
 //! of a small disturbance, as a function of the stiffness.
 
+use std::sync::Arc;
+
 use nalgebra::SVector;
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -11,12 +13,13 @@ use twofold::analyse::digits::{
 };
 use twofold::cli;
 use twofold::integrate::{Dopri5, Failure, Lsoda, Radau5, StepCap, Taylor, Tolerance};
-use twofold::job::simulate::RunError;
+use twofold::job::{AnyQuestion, JobError};
 use twofold::job::spec::Method;
-use twofold::job::table::{Entry, Table};
+use twofold::job::table::{Column, Entry, Table};
 use twofold::num::elementary::{exp10, log10};
 use twofold::num::{Arithmetic, DoubleDouble, Scalar};
 use twofold::paper::wording::number;
+use twofold::paper::study::Computed;
 use twofold::paper::{Figure, Reading, Study};
 use twofold::render::sheet::*;
 use twofold::render::style;
@@ -103,7 +106,7 @@ fn extent(crossing: &ExtendedCrossing) -> f64 {
     crossing.x.map(|c| c.to_f64()).amax()
 }
 
-fn compute(reading: Reading) -> Result<Vec<Table>, RunError> {
+fn compute(reading: Reading) -> Result<Vec<Table>, JobError> {
     let (left, right) = rayon::join(|| digits(reading), || growth(reading));
     let mut tables = left?;
     tables.extend(right?);
@@ -114,9 +117,9 @@ fn compute(reading: Reading) -> Result<Vec<Table>, RunError> {
 fn digits(reading: Reading) -> Result<Vec<Table>, Failure> {
     let field = smoothed(reading, EPS);
     let exact = reference(&field, start(), SECTION, MOST_PASSAGES, T_END, false)?;
-    let mut visits = Table::new("visits", &["t", "distance"]);
+    let mut visits = Table::new("visits", [Column::numbers("t"), Column::numbers("distance")]);
     for crossing in exact.iter().filter(|c| extent(c) < NEAR) {
-        visits.rows.push(vec![crossing.t.to_f64().into(), extent(crossing).into()]);
+        visits.push(vec![crossing.t.to_f64().into(), extent(crossing).into()]);
     }
     let follow = |method, tolerance| -> Result<Vec<Agreement>, Failure> {
         let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
@@ -130,11 +133,11 @@ fn digits(reading: Reading) -> Result<Vec<Table>, Failure> {
             }
         }
     };
-    let mut rows = Table::new("agreement", &["method", "tolerance", "crossing", "t", "error", "digits"]);
+    let mut rows = Table::new("agreement", [Column::words("method"), Column::numbers("tolerance"), Column::numbers("crossing"), Column::numbers("t"), Column::numbers("error"), Column::numbers("digits")]);
     for (method, tolerance, _, _) in methods() {
         for a in follow(method, tolerance)? {
             let numbers = [tolerance, a.crossing as f64, a.t, a.error, -a.log10_error];
-            rows.rows.push(std::iter::once(method.name().into()).chain(numbers.map(Entry::from)).collect());
+            rows.push(std::iter::once(method.name().into()).chain(numbers.map(Entry::from)).collect());
         }
     }
     Ok(vec![rows, visits])
@@ -144,12 +147,12 @@ fn digits(reading: Reading) -> Result<Vec<Table>, Failure> {
 fn growth(reading: Reading) -> Result<Vec<Table>, Failure> {
     let found: Vec<Result<Vec<Vec<Entry>>, Failure>> =
         ladder(reading).par_iter().map(|&eps| grown(reading, eps)).collect();
-    let mut rows = Table::new("growth", &["eps", "made", "t", "t_visit", "t_exit", "x", "y", "z"]);
+    let mut rows = Table::new("growth", [Column::numbers("eps"), Column::words("made"), Column::numbers("t"), Column::numbers("t_visit"), Column::numbers("t_exit"), Column::numbers("x"), Column::numbers("y"), Column::numbers("z")]);
     for here in found {
-        rows.rows.extend(here?);
+        rows.extend(here?);
     }
-    let mut others = Table::new("outside", &["eps", "growth"]);
-    others.rows.extend(outside(reading).iter().map(|&(eps, factor)| vec![eps.into(), factor.into()]));
+    let mut others = Table::new("outside", [Column::numbers("eps"), Column::numbers("growth")]);
+    others.extend(outside(reading).iter().map(|&(eps, factor)| vec![eps.into(), factor.into()]));
     Ok(vec![rows, others])
 }
 
@@ -196,7 +199,7 @@ struct Series {
 /// The series of the right panel.
 fn series(growth: &Table) -> [Series; 3] {
     let pick = |made: &str, components: &[usize]| {
-        let rows = growth.rows.iter().filter(|r| r[1] == Entry::from(made));
+        let rows = growth.rows().iter().filter(|r| r[1] == Entry::from(made));
         rows.map(|r| [value(&r[0]), components.iter().map(|c| value(&r[5 + c])).fold(0.0, f64::max)]).collect()
     };
     [
@@ -249,14 +252,14 @@ fn draw(tables: &[Table]) -> Sheet {
     let [rows, visits, growth, others] = tables else { unreachable!("compute makes four tables") };
     let mut digits =
         PlanePanel::new(Axis::linear("*t*", 0.0, T_END), Axis::linear("digits that are right", -2.0, 17.0));
-    for visit in &visits.rows {
+    for visit in visits.rows() {
         let t = value(&visit[0]);
         digits = digits.line(vec![[t, -2.0], [t, 17.0]], LineStyle::new(style::MAGENTA, style::CURVE_PT).dashed());
     }
     let mut lines = Vec::new();
     for (method, tolerance, colour, shape) in methods().into_iter().rev() {
         let mine = |r: &&Vec<Entry>| r[0] == Entry::from(method.name()) && r[1] == Entry::from(tolerance);
-        let points: Vec<[f64; 2]> = rows.rows.iter().filter(mine).map(|r| [value(&r[3]), value(&r[5])]).collect();
+        let points: Vec<[f64; 2]> = rows.rows().iter().filter(mine).map(|r| [value(&r[3]), value(&r[5])]).collect();
         let (line, marker) = (LineStyle::new(colour, style::FRAME_PT), MarkerStyle { shape, colour, size: 3.2 });
         digits = digits.line(points.clone(), line).markers(points, marker);
         lines.push((LegendKey::LineMarker(line, marker), format!("{} {}", method.name(), number(tolerance))));
@@ -269,7 +272,7 @@ fn draw(tables: &[Table]) -> Sheet {
         .legend_at(Corner::UpperRight);
 
     let series = series(growth);
-    let outside: Vec<[f64; 2]> = others.rows.iter().map(|r| [value(&r[0]), value(&r[1])]).collect();
+    let outside: Vec<[f64; 2]> = others.rows().iter().map(|r| [value(&r[0]), value(&r[1])]).collect();
     let mut amplified =
         PlanePanel::new(Axis::log("*ε*", 6e-5, 1.6e-2), Axis::log("growth of a disturbance", 1e-4, 1e27));
     for (level, words, at, anchor) in [
@@ -307,10 +310,10 @@ fn footer(rows: &Table, visits: &Table, series: &[Series; 3]) -> Vec<String> {
             .to_owned()
             + &format!("Visit: a passage within {} of the singularity. Steps up to {}.", number(NEAR), number(MAX_STEP)),
     ];
-    if let Some(first) = visits.rows.first().map(|r| value(&r[0])) {
+    if let Some(first) = visits.rows().first().map(|r| value(&r[0])) {
         let around = methods().map(|(method, tolerance, _, _)| {
             let mine: Vec<_> = rows
-                .rows
+                .rows()
                 .iter()
                 .filter(|r| r[0] == Entry::from(method.name()) && r[1] == Entry::from(tolerance))
                 .map(|r| (value(&r[3]), value(&r[5])))
@@ -337,6 +340,10 @@ fn footer(rows: &Table, visits: &Table, series: &[Series; 3]) -> Vec<String> {
     lines
 }
 
+fn study(reading: Reading, compute: fn() -> Result<Vec<Table>, JobError>) -> Vec<AnyQuestion> {
+    vec![Arc::new(Computed { kind: "digits", question: question(reading), cost: 2.0e5, compute })]
+}
+
 /// The figure's specification.
 pub fn figure() -> Figure {
     Figure::studied_in_both_readings(
@@ -346,8 +353,8 @@ pub fn figure() -> Figure {
                   singularity. (b) Growth of a small disturbance until the exit from the first visit, against ε, for disturbances made \
                   near the singularity across and along the switching layer and for disturbances made at the start.",
         [
-            Study { question: || question(Reading::Printed), compute: || compute(Reading::Printed), draw },
-            Study { question: || question(Reading::Reconstructed), compute: || compute(Reading::Reconstructed), draw },
+            Study { questions: || study(Reading::Printed, || compute(Reading::Printed)), draw: |answers| draw(&Study::tables(answers)) },
+            Study { questions: || study(Reading::Reconstructed, || compute(Reading::Reconstructed)), draw: |answers| draw(&Study::tables(answers)) },
         ],
     )
 }

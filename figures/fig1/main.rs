@@ -1,8 +1,11 @@
 //! Fig. 1: the wheel assembly. A reconstruction: see `twofold::system::wheel`.
 
+use std::sync::Arc;
+
 use serde_json::json;
 use twofold::cli;
 use twofold::draw::sketch::assembly;
+use twofold::paper::study::Computed;
 use twofold::paper::{Figure, Picture, Study, View};
 use twofold::system::Wheel;
 
@@ -23,9 +26,15 @@ pub fn figure() -> Figure {
                       slip h along the wheel's axle is the switching function. Our own reconstruction."
                 .into(),
             view: View::Study(Study {
-                question: || json!({ "wheel": Wheel::default(), "r": R }),
-                compute: || Ok(assembly::tables(&Wheel::default(), R)),
-                draw: assembly::draw,
+                questions: || {
+                    vec![Arc::new(Computed {
+                        kind: "wheel-assembly",
+                        question: json!({ "wheel": Wheel::default(), "r": R }),
+                        cost: 1.0,
+                        compute: || Ok(assembly::tables(&Wheel::default(), R)),
+                    })]
+                },
+                draw: |answers| assembly::draw(&Study::tables(answers)),
             }),
             panels: Vec::new(),
             alterations: Vec::new(),

@@ -1,8 +1,11 @@
 //! Fig. 3: the two-fold (Teixeira) singularity of the normal form (4).
 
+use std::sync::Arc;
+
 use serde_json::json;
 use twofold::cli;
 use twofold::draw::sketch::portrait;
+use twofold::paper::study::Computed;
 use twofold::paper::{Figure, Picture, Study, View};
 
 /// The constants v, w < 0 with vw > 1: the paper's v+ and v-.
@@ -24,9 +27,15 @@ pub fn figure() -> Figure {
                       sliding repels."
                 .into(),
             view: View::Study(Study {
-                question: || json!({ "normal-form": { "v": V, "w": W } }),
-                compute: || portrait::tables(V, W),
-                draw: |tables| portrait::draw(tables, V, W),
+                questions: || {
+                    vec![Arc::new(Computed {
+                        kind: "two-fold-portrait",
+                        question: json!({ "normal-form": { "v": V, "w": W } }),
+                        cost: 10.0,
+                        compute: || portrait::tables(V, W),
+                    })]
+                },
+                draw: |answers| portrait::draw(&Study::tables(answers), V, W),
             }),
             panels: Vec::new(),
             alterations: Vec::new(),

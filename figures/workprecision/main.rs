@@ -6,11 +6,14 @@ mod data;
 #[allow(dead_code)]
 mod problems;
 
+use std::sync::Arc;
+
 use serde_json::{Value, json};
 use twofold::cli;
-use twofold::job::simulate::RunError;
-use twofold::job::table::{Entry, Table};
+use twofold::job::{AnyQuestion, JobError};
+use twofold::job::table::{Column, Entry, Table};
 use twofold::paper::wording::number;
+use twofold::paper::study::Computed;
 use twofold::paper::{Figure, Picture, Study, View};
 use twofold::record::Hash;
 use twofold::render::sheet::*;
@@ -48,11 +51,11 @@ fn question() -> Value {
     })
 }
 
-fn compute() -> Result<Vec<Table>, RunError> {
+fn compute() -> Result<Vec<Table>, JobError> {
     let columns = ["problem", "method", "rtol", "error", "evaluations", "jacobians", "steps"];
     let mut runs = Table::new("runs", &columns);
     for row in data::rows() {
-        runs.rows.push(vec![
+        runs.push(vec![
             row.problem.as_str().into(),
             row.method.into(),
             row.tolerance.into(),
@@ -62,9 +65,9 @@ fn compute() -> Result<Vec<Table>, RunError> {
             (row.steps as f64).into(),
         ]);
     }
-    let mut known = Table::new("references", &["problem", "uncertainty"]);
+    let mut known = Table::new("references", [Column::words("problem"), Column::numbers("uncertainty")]);
     for problem in data::reference().problems {
-        known.rows.push(vec![problem.name.as_str().into(), problem.uncertainty().into()]);
+        known.push(vec![problem.name.as_str().into(), problem.uncertainty().into()]);
     }
     Ok(vec![runs, known])
 }
@@ -77,7 +80,7 @@ fn run(row: &[Entry]) -> (&str, &str, [f64; 5]) {
 }
 
 fn draw(tables: &[Table]) -> Sheet {
-    let runs: Vec<_> = tables[0].rows.iter().map(|row| run(row)).collect();
+    let runs: Vec<_> = tables[0].rows().iter().map(|row| run(row)).collect();
     let mut sheet = Sheet::new(ColumnWidth::Double, 3, "").panel_aspect(0.72);
     for (i, (problem, heading)) in PANELS.iter().enumerate() {
         let here: Vec<_> = runs.iter().filter(|r| r.0 == *problem).collect();
@@ -88,7 +91,7 @@ fn draw(tables: &[Table]) -> Sheet {
         let (left, right) = (x.lower, x.upper);
         let mut chart = PlanePanel::new(x, y);
         if let Some([_, Entry::Number(limit)]) =
-            tables[1].rows.iter().find(|r| r[0] == Entry::from(*problem)).map(Vec::as_slice)
+            tables[1].rows().iter().find(|r| r[0] == Entry::from(*problem)).map(Vec::as_slice)
         {
             chart = chart
                 .line(vec![[left, *limit], [right, *limit]], LineStyle::new(style::SOFT_INK, style::FRAME_PT).dotted());
@@ -147,6 +150,10 @@ fn footer(runs: &[(&str, &str, [f64; 5])]) -> Vec<String> {
     ]
 }
 
+fn questions() -> Vec<AnyQuestion> {
+    vec![Arc::new(Computed { kind: "work-precision", question: question(), cost: 2e5, compute })]
+}
+
 /// The figure's specification.
 pub fn figure() -> Figure {
     Figure {
@@ -162,7 +169,7 @@ pub fn figure() -> Figure {
                       problems named smoothed and hysteretic are the paper's equations, in both readings of its parameters, from its start to \
                       t = 10."
                 .into(),
-            view: View::Study(Study { question, compute, draw }),
+            view: View::Study(Study { questions, draw: |answers| draw(&Study::tables(answers)) }),
             panels: Vec::new(),
             alterations: Vec::new(),
         }],

@@ -10,8 +10,9 @@ pub mod progress;
 
 use self::progress::Progress;
 use crate::job::spec::{Method, SpecError};
-use crate::paper::pipeline::{Computed, PictureRecord, PipelineError, compute};
-use crate::paper::{Alterations, Figure, Reading};
+use crate::job::{Desk, Store};
+use crate::paper::pipeline::{Computed, PictureRecord, PipelineError, compute, questions};
+use crate::paper::{Alterations, Figure, Picture, Reading};
 use crate::record::{FileError, write};
 
 /// Compute a figure of Jeffrey (2013) and write it as PNG, SVG and PDF, with its numbers as CSV.
@@ -39,6 +40,8 @@ struct Arguments {
     /// Another integration method; the picture is marked.
     #[arg(long, value_name = "METHOD")]
     method: Option<Method>,
+    #[command(flatten)]
+    store: StoreFlags,
     /// Print what was made, with hashes and statistics, as JSON on standard output.
     #[arg(long)]
     json: bool,
@@ -48,6 +51,24 @@ struct Arguments {
     /// Print the runs' specs as JSON and compute nothing; a single one can be given to `twofold run --spec`.
     #[arg(long)]
     print_spec: bool,
+}
+
+/// Where answers are kept, so that nothing is computed twice.
+#[derive(Clone, Debug, clap::Args)]
+pub struct StoreFlags {
+    /// Folder in which answers are kept for the next time.
+    #[arg(long, value_name = "DIR", default_value = "target/store")]
+    store: PathBuf,
+    /// Compute everything anew and keep nothing.
+    #[arg(long, conflicts_with = "store")]
+    fresh: bool,
+}
+
+impl StoreFlags {
+    /// The store that these flags ask for.
+    pub fn store(&self) -> Option<Store> {
+        (!self.fresh).then(|| Store::new(&self.store))
+    }
 }
 
 /// Which readings to make.
@@ -123,25 +144,32 @@ fn run(figure: Figure, arguments: Arguments) -> Result<(), CliError> {
         return print_specs(&figure);
     }
     let progress = Progress::new(arguments.quiet);
-    let folder = arguments.out.join(figure.id);
-    let records = in_pool(arguments.threads, || make(&figure, &folder, &progress))??;
+    let desk = Desk::new(arguments.store.store(), &progress);
+    let figures = [figure];
+    let records = in_pool(arguments.threads, || make(&figures, &arguments.out, &desk))??;
     if arguments.json {
         print(&serde_json::to_string_pretty(&records).expect("records are plain data"))?;
     }
     Ok(())
 }
 
-/// Computes every picture and writes each as soon as it is finished: a killed run loses nothing finished.
-pub fn make(figure: &Figure, folder: &Path, progress: &Progress) -> Result<Vec<PictureRecord>, CliError> {
-    let results: Vec<Result<PictureRecord, CliError>> = figure
-        .pictures
+/// Makes these figures, each in a folder of its own under `out`: all their questions first, side by side, the longest first; then the
+/// pictures. Answers that the desk's store keeps are not lost if this is killed.
+///
+/// # Errors
+///
+/// If a computation or a drawing failed or a file could not be written; what could be made is there all the same.
+pub fn make(figures: &[Figure], out: &Path, desk: &Desk<'_>) -> Result<Vec<PictureRecord>, CliError> {
+    desk.gather(&questions(figures.iter().flat_map(|f| &f.pictures)));
+    let pictures: Vec<(PathBuf, &Picture)> =
+        figures.iter().flat_map(|f| f.pictures.iter().map(|p| (out.join(f.id), p))).collect();
+    let results: Vec<Result<PictureRecord, CliError>> = pictures
         .par_iter()
-        .map(|picture| {
-            let mut computed = compute(picture, progress)?;
-            computed.judge(picture)?;
+        .map(|(folder, picture)| {
+            let computed = compute(picture, desk)?;
             write_picture(folder, &computed)?;
             let name = &computed.record.hashes.name;
-            progress.line(&format!("wrote {}", folder.join(format!("{name}.png")).display()));
+            desk.progress().line(&format!("wrote {}", folder.join(format!("{name}.png")).display()));
             Ok(computed.record)
         })
         .collect();

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::integrate::Watch;
+use crate::job;
 
 /// Shows how far runs have come.
 pub struct Progress {
@@ -31,8 +32,7 @@ impl Progress {
         Self { style }
     }
 
-    /// Begins to show a run that goes to `t_end`.
-    pub fn run(&self, name: String, t_end: f64) -> RunProgress<'_> {
+    fn run(&self, name: &str, t_end: f64) -> RunProgress<'_> {
         let bar = match &self.style {
             Style::Bars(bars) => {
                 let bar = bars.add(ProgressBar::new(RESOLUTION));
@@ -40,12 +40,12 @@ impl Progress {
                     ProgressStyle::with_template("{msg:<28} {wide_bar} {percent:>3} %  {eta:>4}")
                         .unwrap_or_else(|_| ProgressStyle::default_bar()),
                 );
-                bar.set_message(name.clone());
+                bar.set_message(name.to_owned());
                 Some(bar)
             }
             _ => None,
         };
-        RunProgress { progress: self, bar, name, t_end, begun: Instant::now() }
+        RunProgress { progress: self, bar, name: name.to_owned(), t_end, begun: Instant::now() }
     }
 
     /// One line for the user, above any bars.
@@ -73,9 +73,18 @@ pub struct RunProgress<'a> {
     begun: Instant,
 }
 
-impl RunProgress<'_> {
-    /// The run is over; `what` is said of it.
-    pub fn done(self, what: &str) {
+impl job::Progress for Progress {
+    fn begin<'a>(&'a self, label: &str, extent: f64) -> Box<dyn job::JobWatch + 'a> {
+        Box::new(self.run(label, extent))
+    }
+
+    fn line(&self, text: &str) {
+        Progress::line(self, text);
+    }
+}
+
+impl job::JobWatch for RunProgress<'_> {
+    fn done(self: Box<Self>, what: &str) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }

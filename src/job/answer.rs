@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use super::table::Table;
-use crate::integrate::Statistics;
+use crate::integrate::{Statistics, StopReason};
 use crate::record::Hash;
 use crate::record::hash::canonical_json;
 
@@ -22,7 +22,7 @@ pub struct Answer {
     pub stop: Stop,
 }
 
-/// Why a computation ended. An answer always says so: a run that was cut short never looks like one that was finished.
+/// Why a computation ended. An answer always says so: one that was cut short never looks like one that was finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stop {
@@ -30,6 +30,10 @@ pub enum Stop {
     Finished,
     /// What was looked for was found before the time was up.
     Found,
+    /// The future is a set, and the question names no member to follow.
+    SetValued,
+    /// The budget of steps was used up: what is there is what was done until then.
+    StepBudget,
     /// Asked to stop from outside: what is there is what was done until then.
     Interrupted,
 }
@@ -40,7 +44,21 @@ impl Stop {
         match self {
             Stop::Finished => "finished",
             Stop::Found => "found",
+            Stop::SetValued => "set-valued",
+            Stop::StepBudget => "step-budget",
             Stop::Interrupted => "interrupted",
+        }
+    }
+}
+
+impl From<StopReason> for Stop {
+    fn from(reason: StopReason) -> Self {
+        match reason {
+            StopReason::EndTime => Stop::Finished,
+            StopReason::Observer => Stop::Found,
+            StopReason::Watch => Stop::Interrupted,
+            StopReason::StepBudget => Stop::StepBudget,
+            StopReason::SetValued => Stop::SetValued,
         }
     }
 }

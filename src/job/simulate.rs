@@ -2,95 +2,18 @@
 
 use nalgebra::{SVector, vector};
 
-use super::spec::{FunnelSpec, Method, Observation, RunSpec, SpecError, SwitchSpec, SystemSpec};
-use crate::analyse::{Crossing, Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder};
-use crate::integrate::filippov::{self, AllModes, ExitRule, FilippovError, FilippovSummary, FunnelGrid, Side};
+use super::question::JobError;
+use super::recording::{Data, Future, Recording};
+use super::spec::{FunnelSpec, Method, Observation, RunSpec, SwitchSpec, SystemSpec};
+use crate::analyse::{Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder};
+use crate::integrate::filippov::{self, AllModes, ExitRule, FilippovSummary, FunnelGrid};
 use crate::integrate::{
-    Course, Dopri5, Failure, Lsoda, Observer, Radau5, Statistics, Stepper, StopReason, Taylor, Watch, drive,
+    Course, Dopri5, Lsoda, Observer, Radau5, Statistics, Stepper, StopReason, Taylor, Watch, drive,
 };
 use crate::system::{Hysteretic, PiecewiseSmooth, Smoothed, VectorField};
 
-/// What a run left behind.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Recording {
-    /// The recorded points.
-    pub data: Data,
-    /// Final time.
-    pub t: f64,
-    /// Final state (first three components).
-    pub x: [f64; 3],
-    /// Work done.
-    pub statistics: Statistics,
-    /// The largest number of steps between restarts; NDSolve's default limit is 10,000.
-    pub most_steps_in_segment: u64,
-    /// Why it ended.
-    pub stop: StopReason,
-}
-
-/// Recorded points.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Data {
-    /// A path.
-    Path(Vec<Sample>),
-    /// A Poincare section.
-    Section(Vec<Crossing>),
-    /// A Filippov motion: pieces by mode, and events.
-    Motion(Motion),
-    /// The approach to a set-valued point and its futures.
-    Funnel {
-        /// The motion up to there.
-        approach: Motion,
-        /// The futures, by exit time, plus before minus.
-        futures: Vec<Future>,
-    },
-}
-
-/// One future of a set-valued point.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Future {
-    /// Time of repelling sliding asked for.
-    pub exit_time: f64,
-    /// The side left to.
-    pub side: Side,
-    /// The motion from the set-valued point on.
-    pub motion: Motion,
-}
-
-impl Data {
-    /// Number of recorded points.
-    pub fn len(&self) -> usize {
-        match self {
-            Data::Path(samples) => samples.len(),
-            Data::Section(crossings) => crossings.len(),
-            Data::Motion(motion) => motion.len(),
-            Data::Funnel { approach, futures } => {
-                approach.len() + futures.iter().map(|f| f.motion.len()).sum::<usize>()
-            }
-        }
-    }
-
-    /// Whether nothing was recorded.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-}
-
-/// Why a run gave no recording.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum RunError {
-    /// The spec is wrong.
-    #[error(transparent)]
-    Spec(#[from] SpecError),
-    /// The integration failed.
-    #[error(transparent)]
-    Integration(#[from] Failure),
-    /// The Filippov motion could not go on.
-    #[error(transparent)]
-    Filippov(#[from] FilippovError),
-}
-
 /// Computes a run.
-pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, RunError> {
+pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, JobError> {
     spec.validate()?;
     match spec.system {
         SystemSpec::Caricature(system) => switch(spec, system, watch),
@@ -98,7 +21,7 @@ pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, RunError
     }
 }
 
-fn switch<P: PiecewiseSmooth<3> + Copy>(spec: &RunSpec, system: P, watch: &dyn Watch) -> Result<Recording, RunError> {
+fn switch<P: PiecewiseSmooth<3> + Copy>(spec: &RunSpec, system: P, watch: &dyn Watch) -> Result<Recording, JobError> {
     let x0 = SVector::from(spec.start);
     match spec.switch {
         SwitchSpec::Smoothed { eps, transition } => observe(spec, &Smoothed { system, transition, eps }, x0, watch),
@@ -118,7 +41,7 @@ fn discontinuous<P: PiecewiseSmooth<3>>(
     exit: ExitRule,
     funnel: Option<FunnelSpec>,
     watch: &dyn Watch,
-) -> Result<Recording, RunError> {
+) -> Result<Recording, JobError> {
     let settings = filippov::Settings {
         tolerance: spec.method.tolerance,
         max_step: spec.method.step_cap.for_segment(spec.t_end),
@@ -156,7 +79,7 @@ fn futures<P: PiecewiseSmooth<3>>(
     x0: SVector<f64, 3>,
     settings: &filippov::Settings,
     funnel: &FunnelSpec,
-) -> Result<Recording, RunError> {
+) -> Result<Recording, JobError> {
     let grid = FunnelGrid {
         shortest: funnel.shortest,
         longest: funnel.longest,
@@ -204,7 +127,7 @@ fn observe<F: VectorField<N>, const N: usize>(
     field: &F,
     x0: SVector<f64, N>,
     watch: &dyn Watch,
-) -> Result<Recording, RunError> {
+) -> Result<Recording, JobError> {
     match spec.observe {
         Observation::Path { chord } => {
             let mut recorder = PathRecorder::new(&x0, chord);
@@ -225,7 +148,7 @@ fn integrate<F: VectorField<N>, O: Observer<N>, const N: usize>(
     x0: SVector<f64, N>,
     observer: &mut O,
     watch: &dyn Watch,
-) -> Result<End, RunError> {
+) -> Result<End, JobError> {
     match spec.method.name {
         Method::Lsoda => step(spec, field, x0, Lsoda::new(spec.method.tolerance), observer, watch),
         Method::Dopri5 => step(spec, field, x0, Dopri5::new(spec.method.tolerance), observer, watch),
@@ -242,7 +165,7 @@ fn step<F: VectorField<N>, M: Stepper<N>, O: Observer<N>, const N: usize>(
     mut stepper: M,
     observer: &mut O,
     watch: &dyn Watch,
-) -> Result<End, RunError> {
+) -> Result<End, JobError> {
     let method = &spec.method;
     let course =
         Course { t_end: spec.t_end, schedule: spec.schedule, step_cap: method.step_cap, max_steps: method.max_steps };

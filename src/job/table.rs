@@ -209,6 +209,11 @@ impl Table {
         assert!(cells.next().is_none(), "table {}: a row with too many cells", self.name);
     }
 
+    /// Appends rows: see [`Table::push`].
+    pub fn extend(&mut self, rows: impl IntoIterator<Item = Vec<Entry>>) {
+        rows.into_iter().for_each(|row| self.push(row));
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.columns.first().map_or(0, Column::len)

@@ -5,7 +5,8 @@ use std::process::{Command, Stdio};
 
 use twofold::cli::progress::Progress;
 use twofold::cli::{in_pool, print};
-use twofold::paper::pipeline::compute;
+use twofold::job::Desk;
+use twofold::paper::pipeline::{compute, questions};
 use twofold::record::manifest::VERSION;
 use twofold::record::{self, Manifest};
 
@@ -42,6 +43,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
         return Ok(Outcome::Differs);
     }
     let progress = Progress::new(arguments.quiet);
+    let desk = Desk::new(None, &progress);
+    in_pool(arguments.threads, || desk.gather(&questions(figures.iter().flat_map(|f| &f.pictures))))?;
     let mut changed = Vec::new();
     for figure in &figures {
         let folder = arguments.expected.join(figure.id);
@@ -56,7 +59,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
             pictures: Vec::new(),
         };
         for picture in &figure.pictures {
-            let computed = in_pool(arguments.threads, || compute(picture, &progress))??;
+            let computed = compute(picture, &desk)?;
             let entry = computed.record.hashes;
             let what = match before.as_ref().and_then(|m| m.picture(&entry.name)) {
                 None => Some("new".to_owned()),

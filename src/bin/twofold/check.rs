@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use twofold::cli::progress::Progress;
 use twofold::cli::{in_pool, print};
-use twofold::paper::pipeline::{PictureRecord, compute};
+use twofold::job::Desk;
+use twofold::paper::pipeline::{PictureRecord, compute, questions};
 use twofold::record::{self, Manifest};
 
 use super::{Outcome, Problem, catalogue, published};
@@ -60,6 +61,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
         })
         .collect();
     let progress = Progress::new(arguments.quiet);
+    // A check never rests on a store: everything is computed here and now.
+    let desk = Desk::new(None, &progress);
+    in_pool(arguments.threads, || desk.gather(&questions(figures.iter().flat_map(|f| &f.pictures))))?;
     let mut failures = 0;
     let mut pictures = 0;
     for (figure, manifest) in figures.iter().zip(manifests) {
@@ -74,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
         };
         for picture in &figure.pictures {
             pictures += 1;
-            let actual = in_pool(arguments.threads, || compute(picture, &progress))??.record;
+            let actual = compute(picture, &desk)?.record;
             let line = compare(&manifest, &actual);
             failures += usize::from(line.is_err());
             print(&line.unwrap_or_else(|difference| difference))?;
@@ -105,7 +109,7 @@ fn compare(manifest: &Manifest, actual: &PictureRecord) -> Result<String, String
         return Err(format!("{name}: MISSING REFERENCE: the manifest does not list this picture"));
     };
     match expected.first_difference(&actual.hashes) {
-        None => Ok(format!("{name}: same (spec, data, pixels, PNG, SVG, PDF)")),
+        None => Ok(format!("{name}: same (spec, data, verdict, pixels, PNG, SVG, PDF)")),
         Some(difference) => {
             let panels = if difference.panels.is_empty() {
                 String::new()

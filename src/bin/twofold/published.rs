@@ -4,9 +4,10 @@ use std::path::Path;
 
 use twofold::cli::progress::Progress;
 use twofold::cli::{in_pool, print};
+use twofold::job::Desk;
 use twofold::compare::{Comparison, Limits, Rung, compare};
 use twofold::paper::Figure;
-use twofold::paper::pipeline::{Computed, compute, pixel_hash};
+use twofold::paper::pipeline::{Computed, compute, pixel_hash, questions};
 use twofold::record::{FileBytes, Hash, read_tree};
 use twofold::render::decode_png;
 
@@ -28,6 +29,9 @@ pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool) -> 
         .into());
     }
     let progress = Progress::new(quiet);
+    let desk = Desk::new(None, &progress);
+    let wanted = figures.iter().flat_map(|f| &f.pictures).filter(|p| !named(&p.name).is_empty());
+    in_pool(threads, || desk.gather(&questions(wanted)))?;
     let limits = Limits::default();
     let (mut checked, mut failures) = (0, 0);
     for picture in figures.iter().flat_map(|f| &f.pictures) {
@@ -36,7 +40,7 @@ pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool) -> 
             print(&format!("{}: not in the folder, not checked", picture.name))?;
             continue;
         }
-        let computed = in_pool(threads, || compute(picture, &progress))??;
+        let computed = compute(picture, &desk)?;
         for file in files {
             checked += 1;
             let (rung, why) = held(file, &computed, &limits);
