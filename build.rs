@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 
 /// The rooms whose sources decide what a computation yields, and what they are built from.
-const NUMERICS: [&str; 7] = ["src/num", "src/system", "src/integrate", "src/analyse", "src/job", "systems", "Cargo.lock"];
+const NUMERICS: [&str; 7] =
+    ["src/num", "src/system", "src/integrate", "src/analyse", "src/job", "systems", "Cargo.lock"];
 
 fn main() {
     let mut files = Vec::new();

@@ -5,7 +5,8 @@
 mod catalogue;
 
 use twofold::analyse::{Crossing, Direction};
-use twofold::job::simulate::{Data, simulate};
+use twofold::job::recording::Data;
+use twofold::job::simulate::simulate;
 use twofold::paper::Reading;
 
 /// The late half of every panel of fig. 7 in a reading.

@@ -729,3 +729,31 @@ fn a_run_that_is_cut_short_says_why() {
     let grid = FunnelGrid { shortest: 0.1, longest: 1.0, times: 2, horizon: 5.0, until_two_fold: true, per_step: 1 };
     assert!(matches!(funnel(&n, start, 100.0, &few, &grid), Err(FilippovError::Stepping(_))));
 }
+
+#[test]
+fn a_funnel_counts_the_work_of_its_approach() {
+    use twofold::job::simulate::simulate;
+    use twofold::job::spec::{FunnelSpec, Method, MethodSpec, Observation, RunSpec, SwitchSpec, SystemSpec};
+    let c = Caricature::with_reinjection(1e-1, 1e-5);
+    let (start, settings) = (vector![0.2, 0.0, -1.0], Settings { max_step: 5.0, ..Settings::default() });
+    let grid = FunnelGrid { shortest: 0.1, longest: 1.0, times: 2, horizon: 5.0, until_two_fold: true, per_step: 1 };
+    let alone = run(&c, start, 50.0, &settings, ExitRule::All, &mut Trajectory::new(1)).unwrap();
+    let family = funnel(&c, start, 50.0, &settings, &grid).unwrap();
+    assert_eq!(family.statistics, alone.statistics);
+    let futures: u64 = family.members.iter().map(|m| m.summary.statistics.steps).sum();
+
+    let FunnelGrid { shortest, longest, times, horizon, until_two_fold, .. } = grid;
+    let funnel = Some(FunnelSpec { shortest, longest, times, horizon, until_two_fold });
+    let spec = RunSpec {
+        system: SystemSpec::Caricature(c),
+        switch: SwitchSpec::Filippov { exit: ExitRule::All, funnel },
+        start: start.into(),
+        t_end: 50.0,
+        method: MethodSpec { tolerance: settings.tolerance, ..MethodSpec::ndsolve_defaults(Method::Dopri5) },
+        schedule: Default::default(),
+        observe: Observation::Path { chord: 1e-3 },
+    };
+    let recording = simulate(&spec, &()).unwrap();
+    assert_eq!(recording.statistics.steps, alone.statistics.steps + futures);
+    assert_eq!(recording.stop, StopReason::SetValued);
+}

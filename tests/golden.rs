@@ -9,8 +9,8 @@ use std::fs;
 use std::path::Path;
 
 use twofold::cli::in_pool;
-use twofold::cli::progress::Progress;
-use twofold::paper::pipeline::{Computed, compute};
+use twofold::job::Desk;
+use twofold::paper::pipeline::{Computed, compute, questions};
 use twofold::paper::{Alterations, Figure};
 use twofold::record::{Hash, Manifest};
 
@@ -29,11 +29,12 @@ const QUICK: [&str; 7] = ["fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "workp
 
 #[test]
 fn golden_quick_figures_have_the_committed_hashes() {
+    let desk = Desk::quiet();
     for figure in quick() {
         let expected = manifest(&figure);
         assert_eq!(expected.pictures.len(), figure.pictures.len(), "{}", figure.id);
         for picture in &figure.pictures {
-            let actual = compute(picture, &Progress::new(true)).unwrap().record.hashes;
+            let actual = compute(picture, &desk).unwrap().record.hashes;
             let difference = expected.picture(&picture.name).unwrap().first_difference(&actual);
             assert_eq!(difference, None, "{} differs", picture.name);
         }
@@ -71,11 +72,13 @@ fn short(figure: &Figure) -> Figure {
 
 fn all_hashes(threads: usize) -> Vec<String> {
     in_pool(threads, || {
-        catalogue::all()
+        let pictures: Vec<_> = catalogue::all().iter().flat_map(|f| short(f).pictures).collect();
+        let desk = Desk::quiet();
+        desk.gather(&questions(&pictures));
+        pictures
             .iter()
-            .flat_map(|f| short(f).pictures)
             .map(|p| {
-                let Computed { record, tables, .. } = compute(&p, &Progress::new(true)).unwrap();
+                let Computed { record, tables, .. } = compute(p, &desk).unwrap();
                 let tables: Vec<Hash> = tables.iter().map(|(_, bytes)| Hash::of(bytes)).collect();
                 format!("{:?} {tables:?}", record.hashes)
             })
@@ -97,7 +100,7 @@ fn a_changed_question_changes_every_layer_it_should() {
     let base = &short(&figure).pictures[0];
     let mut other = base.clone();
     other.panels[0].run.start[0] += 1e-6;
-    let hashes = |p| compute(p, &Progress::new(true)).unwrap().record.hashes;
+    let hashes = |p| compute(p, &Desk::quiet()).unwrap().record.hashes;
     let (a, b) = (hashes(base), hashes(&other));
     let difference = a.first_difference(&b).unwrap();
     assert_eq!(difference.layer, twofold::record::Layer::Spec);

@@ -54,7 +54,10 @@ impl Bench {
     }
 
     fn report(&self) -> Report {
-        assemble(&read_tree(&self.made(), &|_| true).unwrap(), &read_tree(&self.expected(), &|_| true).unwrap())
+        assemble(
+            &read_tree(&self.made(), &|_| true).unwrap().files,
+            &read_tree(&self.expected(), &|_| true).unwrap().files,
+        )
     }
 
     /// Changes the JSON of a committed manifest or of a record.
@@ -435,8 +438,12 @@ fn the_archive_metadata_describe_the_folder_as_it_is() {
         assert_eq!(file["contentSize"], bytes.len().to_string(), "{path}");
         described.insert(path.to_owned());
     }
-    let there: BTreeSet<String> =
-        read_tree(&bench.made(), &|p| p != "ro-crate-metadata.json").unwrap().into_iter().map(|f| f.path).collect();
+    let there: BTreeSet<String> = read_tree(&bench.made(), &|p| p != "ro-crate-metadata.json")
+        .unwrap()
+        .files
+        .into_iter()
+        .map(|f| f.path)
+        .collect();
     assert_eq!(described, there);
 }
 

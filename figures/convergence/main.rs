@@ -11,12 +11,12 @@ use twofold::cli;
 use twofold::integrate::Failure;
 use twofold::integrate::filippov::limit::{ConvergenceRow, convergence, observed_rate};
 use twofold::integrate::filippov::{EventKind, FilippovError, FunnelGrid, Mode, Settings, Side, funnel};
-use twofold::job::{AnyQuestion, JobError};
 use twofold::job::table::{Column, Entry, Table};
+use twofold::job::{AnyQuestion, JobError};
 use twofold::num::elementary::pow;
 use twofold::num::{Arithmetic, DoubleDouble, Scalar};
-use twofold::paper::wording::number;
 use twofold::paper::study::Computed;
+use twofold::paper::wording::number;
 use twofold::paper::{Figure, Reading, Study};
 use twofold::render::sheet::*;
 use twofold::render::style;
@@ -147,13 +147,19 @@ fn nearest(
 
 fn compute(reading: Reading) -> Result<Vec<Table>, JobError> {
     let (system, x0, settings) = (reading.caricature(), SVector::from(START), Settings::default());
-    let mut before = Table::new("before", [Column::numbers("eps"), Column::numbers("t"), Column::words("mode"), Column::numbers("distance")]);
+    let mut before = Table::new(
+        "before",
+        [Column::numbers("eps"), Column::numbers("t"), Column::words("mode"), Column::numbers("distance")],
+    );
     for row in convergence(&system, x0, &times(reading), &BEFORE, &settings)? {
         let mode = if row.mode == Mode::SlidingAttracting { "sliding" } else { "free" };
         before.push(vec![row.eps.into(), row.t.into(), mode.into(), row.distance.into()]);
     }
     let found = crossings(reading, &GRID)?;
-    let mut members = Table::new("funnel", [Column::numbers("exit_time"), Column::words("side"), Column::numbers("y"), Column::numbers("z")]);
+    let mut members = Table::new(
+        "funnel",
+        [Column::numbers("exit_time"), Column::words("side"), Column::numbers("y"), Column::numbers("z")],
+    );
     let mut width = 0.0_f64;
     for (i, a) in found.members.iter().enumerate() {
         members.push(vec![a.exit_time.into(), side(a.side).into(), a.state[1].into(), a.state[2].into()]);
@@ -163,8 +169,9 @@ fn compute(reading: Reading) -> Result<Vec<Table>, JobError> {
     }
     let exits: Vec<Result<Option<SVector<f64, 3>>, Failure>> =
         AFTER.par_iter().map(|&eps| smoothed(reading, eps, &found)).collect();
-    let columns = ["eps", "y", "z", "nearest_exit_time", "nearest_side", "distance", "width", "t_visit"];
-    let mut after = Table::new("after", &columns);
+    let columns = ["eps", "y", "z", "nearest_exit_time", "nearest_side", "distance", "width", "t_visit"]
+        .map(|name| if name == "nearest_side" { Column::words(name) } else { Column::numbers(name) });
+    let mut after = Table::new("after", columns);
     for (eps, exit) in AFTER.into_iter().zip(exits) {
         let Some(x) = exit? else { continue };
         let Some((time, to, distance)) = nearest(reading, &found, &x)? else { continue };
@@ -196,21 +203,22 @@ fn with_room(room: f64, distances: impl Iterator<Item = f64>) -> Axis {
 
 fn draw(tables: &[Table]) -> Sheet {
     let [before, members, after] = tables else { unreachable!("compute makes three tables") };
+    let (before, members, after) = (before.rows(), members.rows(), after.rows());
     let expected = LineStyle::new(style::SOFT_INK, style::CURVE_PT).dashed();
 
     let mut moments: Vec<f64> = Vec::new();
-    for row in before.rows() {
+    for row in &before {
         if !moments.contains(&value(&row[1])) {
             moments.push(value(&row[1]));
         }
     }
     let mut approach = PlanePanel::new(
-        Axis::log_covering("*ε*", before.rows().iter().map(|r| value(&r[0]))),
-        with_room(12.0, before.rows().iter().map(|r| value(&r[3]))),
+        Axis::log_covering("*ε*", before.iter().map(|r| value(&r[0]))),
+        with_room(12.0, before.iter().map(|r| value(&r[3]))),
     );
     let mut rates = Vec::new();
     for (&t, (colour, shape)) in moments.iter().zip(LOOKS) {
-        let rows: Vec<_> = before.rows().iter().filter(|r| value(&r[1]) == t).collect();
+        let rows: Vec<_> = before.iter().filter(|r| value(&r[1]) == t).collect();
         let points: Vec<[f64; 2]> = rows.iter().map(|r| [value(&r[0]), value(&r[3])]).collect();
         let marker = MarkerStyle { shape, colour, size: 4.0 };
         approach = approach.line(proportional(&points), expected).markers(points.clone(), marker);
@@ -225,11 +233,11 @@ fn draw(tables: &[Table]) -> Sheet {
     let approach = approach.legend_at(Corner::LowerRight);
 
     let crossings = |name: &'static str| -> Vec<[f64; 2]> {
-        let rows = members.rows().iter().filter(|r| r[1] == Entry::from(name));
+        let rows = members.iter().filter(|r| r[1] == Entry::from(name));
         rows.map(|r| [value(&r[2]), value(&r[3])]).collect()
     };
-    let exits: Vec<[f64; 2]> = after.rows().iter().map(|r| [value(&r[1]), value(&r[2])]).collect();
-    let all = || members.rows().iter().map(|r| [value(&r[2]), value(&r[3])]).chain(exits.iter().copied());
+    let exits: Vec<[f64; 2]> = after.iter().map(|r| [value(&r[1]), value(&r[2])]).collect();
+    let all = || members.iter().map(|r| [value(&r[2]), value(&r[3])]).chain(exits.iter().copied());
     let (mut y, mut z) = (Axis::covering("*y*", all().map(|p| p[0])), Axis::covering("*z*", all().map(|p| p[1])));
     let (wide, high) = (y.upper - y.lower, z.upper - z.lower);
     let left = y.lower;
@@ -243,9 +251,9 @@ fn draw(tables: &[Table]) -> Sheet {
     }
     let ring = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::INK, size: 5.0 };
     inside = inside.markers(exits.clone(), ring).legend(LegendKey::Marker(ring), "smoothed");
-    for (row, &[y, z]) in after.rows().iter().zip(&exits) {
+    for (row, &[y, z]) in after.iter().zip(&exits) {
         // To the right above the lowest branch, below on it, but not across the frame.
-        let mut places = members.rows().iter().map(|r| [value(&r[2]), value(&r[3])]);
+        let mut places = members.iter().map(|r| [value(&r[2]), value(&r[3])]);
         let lowest = !places.any(|m| (m[0] - y).abs() < 0.08 * wide && m[1] < z - 0.06 * high);
         let text = number(value(&row[0]));
         inside = if lowest && y > left + 0.2 * wide {
@@ -255,8 +263,8 @@ fn draw(tables: &[Table]) -> Sheet {
         };
     }
 
-    let distances: Vec<[f64; 2]> = after.rows().iter().map(|r| [value(&r[0]), value(&r[5])]).collect();
-    let widths: Vec<[f64; 2]> = after.rows().iter().map(|r| [value(&r[0]), value(&r[6])]).collect();
+    let distances: Vec<[f64; 2]> = after.iter().map(|r| [value(&r[0]), value(&r[5])]).collect();
+    let widths: Vec<[f64; 2]> = after.iter().map(|r| [value(&r[0]), value(&r[6])]).collect();
     let near = MarkerStyle { shape: MarkerShape::Dot, colour: style::INK, size: 4.0 };
     let whole = LineStyle::new(style::GREEN, style::CURVE_PT);
     let last = PlanePanel::new(
@@ -269,9 +277,8 @@ fn draw(tables: &[Table]) -> Sheet {
     .legend(LegendKey::Marker(near), "to its nearest member")
     .legend_at(Corner::LowerRight);
 
-    let visit = after.rows().first().map_or(f64::NAN, |r| value(&r[7]));
+    let visit = after.first().map_or(f64::NAN, |r| value(&r[7]));
     let nearest: Vec<String> = after
-        .rows()
         .iter()
         .map(|r| format!("{} for *ε* = {}", number((value(&r[3]) * 1e3).round() / 1e3), number(value(&r[0]))))
         .collect();
@@ -318,8 +325,14 @@ pub fn figure() -> Figure {
                   the surface x = 0 far from the singularity, and where smoothed orbits cross it, in the plane of y and z. (c) Distance of \
                   each smoothed crossing to the nearest member, beside the width of the set.",
         [
-            Study { questions: || study(Reading::Printed, || compute(Reading::Printed)), draw: |answers| draw(&Study::tables(answers)) },
-            Study { questions: || study(Reading::Reconstructed, || compute(Reading::Reconstructed)), draw: |answers| draw(&Study::tables(answers)) },
+            Study {
+                questions: || study(Reading::Printed, || compute(Reading::Printed)),
+                draw: |answers| draw(&Study::tables(answers)),
+            },
+            Study {
+                questions: || study(Reading::Reconstructed, || compute(Reading::Reconstructed)),
+                draw: |answers| draw(&Study::tables(answers)),
+            },
         ],
     )
 }

@@ -13,13 +13,13 @@ use twofold::analyse::digits::{
 };
 use twofold::cli;
 use twofold::integrate::{Dopri5, Failure, Lsoda, Radau5, StepCap, Taylor, Tolerance};
-use twofold::job::{AnyQuestion, JobError};
 use twofold::job::spec::Method;
 use twofold::job::table::{Column, Entry, Table};
+use twofold::job::{AnyQuestion, JobError};
 use twofold::num::elementary::{exp10, log10};
 use twofold::num::{Arithmetic, DoubleDouble, Scalar};
-use twofold::paper::wording::number;
 use twofold::paper::study::Computed;
+use twofold::paper::wording::number;
 use twofold::paper::{Figure, Reading, Study};
 use twofold::render::sheet::*;
 use twofold::render::style;
@@ -133,11 +133,21 @@ fn digits(reading: Reading) -> Result<Vec<Table>, Failure> {
             }
         }
     };
-    let mut rows = Table::new("agreement", [Column::words("method"), Column::numbers("tolerance"), Column::numbers("crossing"), Column::numbers("t"), Column::numbers("error"), Column::numbers("digits")]);
+    let mut rows = Table::new(
+        "agreement",
+        [
+            Column::words("method"),
+            Column::numbers("tolerance"),
+            Column::numbers("crossing"),
+            Column::numbers("t"),
+            Column::numbers("error"),
+            Column::numbers("digits"),
+        ],
+    );
     for (method, tolerance, _, _) in methods() {
         for a in follow(method, tolerance)? {
             let numbers = [tolerance, a.crossing as f64, a.t, a.error, -a.log10_error];
-            rows.push(std::iter::once(method.name().into()).chain(numbers.map(Entry::from)).collect());
+            rows.push(std::iter::once(method.name().into()).chain(numbers.map(Entry::from)).collect::<Vec<_>>());
         }
     }
     Ok(vec![rows, visits])
@@ -147,7 +157,19 @@ fn digits(reading: Reading) -> Result<Vec<Table>, Failure> {
 fn growth(reading: Reading) -> Result<Vec<Table>, Failure> {
     let found: Vec<Result<Vec<Vec<Entry>>, Failure>> =
         ladder(reading).par_iter().map(|&eps| grown(reading, eps)).collect();
-    let mut rows = Table::new("growth", [Column::numbers("eps"), Column::words("made"), Column::numbers("t"), Column::numbers("t_visit"), Column::numbers("t_exit"), Column::numbers("x"), Column::numbers("y"), Column::numbers("z")]);
+    let mut rows = Table::new(
+        "growth",
+        [
+            Column::numbers("eps"),
+            Column::words("made"),
+            Column::numbers("t"),
+            Column::numbers("t_visit"),
+            Column::numbers("t_exit"),
+            Column::numbers("x"),
+            Column::numbers("y"),
+            Column::numbers("z"),
+        ],
+    );
     for here in found {
         rows.extend(here?);
     }
@@ -199,7 +221,7 @@ struct Series {
 /// The series of the right panel.
 fn series(growth: &Table) -> [Series; 3] {
     let pick = |made: &str, components: &[usize]| {
-        let rows = growth.rows().iter().filter(|r| r[1] == Entry::from(made));
+        let rows = growth.rows().into_iter().filter(|r| r[1] == Entry::from(made));
         rows.map(|r| [value(&r[0]), components.iter().map(|c| value(&r[5 + c])).fold(0.0, f64::max)]).collect()
     };
     [
@@ -353,8 +375,14 @@ pub fn figure() -> Figure {
                   singularity. (b) Growth of a small disturbance until the exit from the first visit, against ε, for disturbances made \
                   near the singularity across and along the switching layer and for disturbances made at the start.",
         [
-            Study { questions: || study(Reading::Printed, || compute(Reading::Printed)), draw: |answers| draw(&Study::tables(answers)) },
-            Study { questions: || study(Reading::Reconstructed, || compute(Reading::Reconstructed)), draw: |answers| draw(&Study::tables(answers)) },
+            Study {
+                questions: || study(Reading::Printed, || compute(Reading::Printed)),
+                draw: |answers| draw(&Study::tables(answers)),
+            },
+            Study {
+                questions: || study(Reading::Reconstructed, || compute(Reading::Reconstructed)),
+                draw: |answers| draw(&Study::tables(answers)),
+            },
         ],
     )
 }

@@ -10,10 +10,10 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 use twofold::cli;
-use twofold::job::{AnyQuestion, JobError};
 use twofold::job::table::{Column, Entry, Table};
-use twofold::paper::wording::number;
+use twofold::job::{AnyQuestion, JobError};
 use twofold::paper::study::Computed;
+use twofold::paper::wording::number;
 use twofold::paper::{Figure, Picture, Study, View};
 use twofold::record::Hash;
 use twofold::render::sheet::*;
@@ -53,7 +53,10 @@ fn question() -> Value {
 
 fn compute() -> Result<Vec<Table>, JobError> {
     let columns = ["problem", "method", "rtol", "error", "evaluations", "jacobians", "steps"];
-    let mut runs = Table::new("runs", &columns);
+    let mut runs = Table::new(
+        "runs",
+        columns.map(|c| if matches!(c, "problem" | "method") { Column::words(c) } else { Column::numbers(c) }),
+    );
     for row in data::rows() {
         runs.push(vec![
             row.problem.as_str().into(),
@@ -80,7 +83,8 @@ fn run(row: &[Entry]) -> (&str, &str, [f64; 5]) {
 }
 
 fn draw(tables: &[Table]) -> Sheet {
-    let runs: Vec<_> = tables[0].rows().iter().map(|row| run(row)).collect();
+    let rows = tables[0].rows();
+    let runs: Vec<_> = rows.iter().map(|row| run(row)).collect();
     let mut sheet = Sheet::new(ColumnWidth::Double, 3, "").panel_aspect(0.72);
     for (i, (problem, heading)) in PANELS.iter().enumerate() {
         let here: Vec<_> = runs.iter().filter(|r| r.0 == *problem).collect();

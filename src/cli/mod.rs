@@ -19,6 +19,13 @@ use crate::record::{FileError, write};
 #[derive(Clone, Debug, Parser)]
 #[command(version, about, long_about = None)]
 struct Arguments {
+    #[command(flatten)]
+    flags: FigureFlags,
+}
+
+/// How figures are made.
+#[derive(Clone, Debug, clap::Args)]
+pub struct FigureFlags {
     /// Folder to write to; a folder named after the figure is made in it.
     #[arg(long, value_name = "DIR", default_value = "target/figures")]
     out: PathBuf,
@@ -129,7 +136,7 @@ pub enum CliError {
 
 /// Runs a figure binary: parses the command line, computes, writes.
 pub fn main(figure: Figure) -> ExitCode {
-    match run(figure, Arguments::parse()) {
+    match run(vec![figure], &Arguments::parse().flags) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
@@ -138,14 +145,18 @@ pub fn main(figure: Figure) -> ExitCode {
     }
 }
 
-fn run(figure: Figure, arguments: Arguments) -> Result<(), CliError> {
-    let figure = select(figure, &arguments)?;
+/// Computes these figures and writes them, as the flags say.
+///
+/// # Errors
+///
+/// See [`CliError`].
+pub fn run(figures: Vec<Figure>, arguments: &FigureFlags) -> Result<(), CliError> {
+    let figures = figures.into_iter().map(|f| select(f, arguments)).collect::<Result<Vec<_>, _>>()?;
     if arguments.print_spec {
-        return print_specs(&figure);
+        return print_specs(&figures);
     }
     let progress = Progress::new(arguments.quiet);
     let desk = Desk::new(arguments.store.store(), &progress);
-    let figures = [figure];
     let records = in_pool(arguments.threads, || make(&figures, &arguments.out, &desk))??;
     if arguments.json {
         print(&serde_json::to_string_pretty(&records).expect("records are plain data"))?;
@@ -191,7 +202,7 @@ fn write_picture(folder: &Path, computed: &Computed) -> Result<(), FileError> {
 }
 
 /// The pictures and panels that were asked for, altered as asked for, and checked.
-fn select(mut figure: Figure, arguments: &Arguments) -> Result<Figure, CliError> {
+fn select(mut figure: Figure, arguments: &FigureFlags) -> Result<Figure, CliError> {
     if let Some(only) = &arguments.only {
         let label = only.trim_start_matches('(').trim_end_matches(')');
         let known: Vec<String> = figure.pictures.iter().flat_map(|p| &p.panels).map(|p| p.label.clone()).collect();
@@ -216,10 +227,10 @@ fn select(mut figure: Figure, arguments: &Arguments) -> Result<Figure, CliError>
 }
 
 /// One spec alone, or several under their names.
-fn print_specs(figure: &Figure) -> Result<(), CliError> {
-    let specs: Vec<_> = figure
-        .pictures
+fn print_specs(figures: &[Figure]) -> Result<(), CliError> {
+    let specs: Vec<_> = figures
         .iter()
+        .flat_map(|figure| &figure.pictures)
         .flat_map(|picture| {
             picture.panels.iter().map(move |panel| (format!("{}-{}", picture.name, panel.label), panel.run))
         })

@@ -108,6 +108,34 @@ pub struct Statistics {
     pub highest_order: u64,
 }
 
+impl std::ops::AddAssign<&Statistics> for Statistics {
+    /// Counts add; the highest order is the higher one.
+    fn add_assign(&mut self, more: &Statistics) {
+        let Statistics {
+            steps,
+            rejected,
+            evaluations,
+            jacobians,
+            factorisations,
+            convergence_failures,
+            method_switches,
+            stiff_steps,
+            restarts,
+            highest_order,
+        } = more;
+        self.steps += steps;
+        self.rejected += rejected;
+        self.evaluations += evaluations;
+        self.jacobians += jacobians;
+        self.factorisations += factorisations;
+        self.convergence_failures += convergence_failures;
+        self.method_switches += method_switches;
+        self.stiff_steps += stiff_steps;
+        self.restarts += restarts;
+        self.highest_order = self.highest_order.max(*highest_order);
+    }
+}
+
 /// Whether an observer wants more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flow {

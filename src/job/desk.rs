@@ -152,9 +152,8 @@ mod tests {
                 13 => return Err(JobError::Other("unlucky".into())),
                 n @ 0..2 => n,
                 n => {
-                    let before = |k| -> Result<u64, JobError> {
-                        Ok(desk.ask(&Fibonacci(n - k, self.1))?.fact("value")?)
-                    };
+                    let before =
+                        |k| -> Result<u64, JobError> { Ok(desk.ask(&Fibonacci(n - k, self.1))?.fact("value")?) };
                     before(1)? + before(2)?
                 }
             };

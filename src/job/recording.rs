@@ -105,7 +105,8 @@ impl Recording {
             Data::Motion(motion) => motion_tables(&names, &[Member { motion, future: None }]),
             Data::Funnel { approach, futures } => {
                 let mut members = vec![Member { motion: approach, future: None }];
-                members.extend(futures.iter().map(|f| Member { motion: &f.motion, future: Some((f.exit_time, f.side)) }));
+                members
+                    .extend(futures.iter().map(|f| Member { motion: &f.motion, future: Some((f.exit_time, f.side)) }));
                 motion_tables(&names, &members)
             }
         };
@@ -167,10 +168,7 @@ impl Recording {
 }
 
 fn point_columns(names: &[&str; 3]) -> Vec<Column> {
-    std::iter::once(&"t")
-        .chain(names)
-        .map(|name| Column::new(name, PURE, super::table::Kind::Number))
-        .collect()
+    std::iter::once(&"t").chain(names).map(|name| Column::new(name, PURE, super::table::Kind::Number)).collect()
 }
 
 fn point(t: f64, x: [f64; 3]) -> Vec<Entry> {
@@ -231,9 +229,17 @@ fn mode_of(word: &str) -> Option<Mode> {
 }
 
 fn motion_tables(names: &[&str; 3], members: &[Member<'_>]) -> Vec<Table> {
-    let future = || [Column::integers("future"), Column::new("exit_time", PURE, super::table::Kind::Number), Column::words("exit_side")];
-    let mut points =
-        Table::new("motion", point_columns(names).into_iter().chain([Column::words("mode"), Column::integers("piece")]).chain(future()));
+    let future = || {
+        [
+            Column::integers("future"),
+            Column::new("exit_time", PURE, super::table::Kind::Number),
+            Column::words("exit_side"),
+        ]
+    };
+    let mut points = Table::new(
+        "motion",
+        point_columns(names).into_iter().chain([Column::words("mode"), Column::integers("piece")]).chain(future()),
+    );
     let mut events = Table::new(
         "events",
         point_columns(names)
@@ -305,7 +311,9 @@ fn members_of(names: &[&str; 3], points: &Table, events: &Table) -> Result<Membe
     let mut last_piece = None;
     let futures = points.integers("future").iter().zip(points.numbers("exit_time")).zip(points.words("exit_side"));
     let modes = points.words("mode").zip(points.integers("piece"));
-    for ((sample, (mode, piece)), ((future, exit_time), side)) in samples(names, points).into_iter().zip(modes).zip(futures) {
+    for ((sample, (mode, piece)), ((future, exit_time), side)) in
+        samples(names, points).into_iter().zip(modes).zip(futures)
+    {
         let mode = mode_of(mode).ok_or_else(|| wrong("an unknown mode"))?;
         let member = member(&mut members, *future, *exit_time, side).ok_or_else(|| wrong("futures out of order"))?;
         if last_piece != Some((*future, *piece)) {

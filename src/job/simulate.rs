@@ -4,12 +4,10 @@ use nalgebra::{SVector, vector};
 
 use super::question::JobError;
 use super::recording::{Data, Future, Recording};
-use super::spec::{FunnelSpec, Method, Observation, RunSpec, SwitchSpec, SystemSpec};
+use super::spec::{FunnelSpec, MethodSpec, Observation, RunSpec, SwitchSpec, SystemSpec};
 use crate::analyse::{Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder};
 use crate::integrate::filippov::{self, AllModes, ExitRule, FilippovSummary, FunnelGrid};
-use crate::integrate::{
-    Course, Dopri5, Lsoda, Observer, Radau5, Statistics, Stepper, StopReason, Taylor, Watch, drive,
-};
+use crate::integrate::{Course, Observer, Statistics, Stepper, StopReason, Watch, WithStepper, drive};
 use crate::system::{Hysteretic, PiecewiseSmooth, Smoothed, VectorField};
 
 /// Computes a run.
@@ -89,13 +87,11 @@ fn futures<P: PiecewiseSmooth<3>>(
         per_step: POINTS_PER_STEP,
     };
     let found = filippov::funnel(system, x0, spec.t_end, settings, &grid)?;
-    let mut statistics = Statistics::default();
+    let mut statistics = found.statistics.clone();
+    let mut most_steps_in_segment = statistics.steps;
     for member in &found.members {
-        statistics.steps += member.summary.statistics.steps;
-        statistics.rejected += member.summary.statistics.rejected;
-        statistics.evaluations += member.summary.statistics.evaluations;
-        statistics.restarts += member.summary.statistics.restarts;
-        statistics.highest_order = member.summary.statistics.highest_order;
+        statistics += &member.summary.statistics;
+        most_steps_in_segment = most_steps_in_segment.max(member.summary.statistics.steps);
     }
     let futures = found
         .members
@@ -106,7 +102,7 @@ fn futures<P: PiecewiseSmooth<3>>(
         data: Data::Funnel { approach: motion(found.approach), futures },
         t: found.t,
         x: found.point.into(),
-        most_steps_in_segment: statistics.steps,
+        most_steps_in_segment,
         statistics,
         stop: StopReason::SetValued,
     })
@@ -149,34 +145,33 @@ fn integrate<F: VectorField<N>, O: Observer<N>, const N: usize>(
     observer: &mut O,
     watch: &dyn Watch,
 ) -> Result<End, JobError> {
-    match spec.method.name {
-        Method::Lsoda => step(spec, field, x0, Lsoda::new(spec.method.tolerance), observer, watch),
-        Method::Dopri5 => step(spec, field, x0, Dopri5::new(spec.method.tolerance), observer, watch),
-        Method::Radau5 => step(spec, field, x0, Radau5::new(spec.method.tolerance), observer, watch),
-        Method::Taylor => step(spec, field, x0, Taylor::new(spec.method.tolerance), observer, watch),
-        Method::TaylorExtended => step(spec, field, x0, Taylor::extended(spec.method.tolerance), observer, watch),
-    }
+    let MethodSpec { name, tolerance, step_cap, max_steps } = spec.method;
+    let course = Course { t_end: spec.t_end, schedule: spec.schedule, step_cap, max_steps };
+    name.with_stepper(tolerance, Drive { field, x0, course, observer, watch })
 }
 
-fn step<F: VectorField<N>, M: Stepper<N>, O: Observer<N>, const N: usize>(
-    spec: &RunSpec,
-    field: &F,
+/// A run that waits for its method.
+struct Drive<'a, F, O, const N: usize> {
+    field: &'a F,
     x0: SVector<f64, N>,
-    mut stepper: M,
-    observer: &mut O,
-    watch: &dyn Watch,
-) -> Result<End, JobError> {
-    let method = &spec.method;
-    let course =
-        Course { t_end: spec.t_end, schedule: spec.schedule, step_cap: method.step_cap, max_steps: method.max_steps };
-    let summary = drive(field, x0, &course, &mut stepper, observer, watch)?.within_budget()?;
-    Ok(End {
-        t: summary.t,
-        x: [summary.x[0], summary.x[1], summary.x[2]],
-        statistics: summary.statistics,
-        most_steps_in_segment: summary.most_steps_in_segment,
-        stop: summary.stop,
-    })
+    course: Course,
+    observer: &'a mut O,
+    watch: &'a dyn Watch,
+}
+
+impl<F: VectorField<N>, O: Observer<N>, const N: usize> WithStepper<N> for Drive<'_, F, O, N> {
+    type Answer = Result<End, JobError>;
+    fn with<M: Stepper<N>>(self, mut stepper: M) -> Self::Answer {
+        let Self { field, x0, course, observer, watch } = self;
+        let summary = drive(field, x0, &course, &mut stepper, observer, watch)?.within_budget()?;
+        Ok(End {
+            t: summary.t,
+            x: [summary.x[0], summary.x[1], summary.x[2]],
+            statistics: summary.statistics,
+            most_steps_in_segment: summary.most_steps_in_segment,
+            stop: summary.stop,
+        })
+    }
 }
 
 /// The end of a run, before its data join it.

@@ -5,6 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
+pub use crate::integrate::Method;
 use crate::integrate::filippov::ExitRule;
 use crate::integrate::{Schedule, StepCap, Tolerance};
 use crate::num::elementary::exp10;
@@ -107,35 +108,6 @@ impl SwitchSpec {
     /// The hysteretic system of sec. 4.3 with eps' = 10 eps and phi(0) = 1.
     pub fn hysteretic(eps: f64, relaxation: Relaxation) -> Self {
         SwitchSpec::Hysteretic { eps, eps_prime: 10.0 * eps, relaxation, phi0: 1.0 }
-    }
-}
-
-/// An integration method.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum Method {
-    /// LSODA: Adams and BDF with automatic switching, the default NDSolve of the paper's day.
-    Lsoda,
-    /// Dormand-Prince 5(4).
-    Dopri5,
-    /// Radau IIA of order 5.
-    Radau5,
-    /// Taylor series that resolve the layer, in f64.
-    Taylor,
-    /// The same in double-double arithmetic, about 32 digits: the reference.
-    TaylorExtended,
-}
-
-impl Method {
-    /// The name on the command line and in small print.
-    pub fn name(self) -> &'static str {
-        match self {
-            Method::Lsoda => "lsoda",
-            Method::Dopri5 => "dopri5",
-            Method::Radau5 => "radau5",
-            Method::Taylor => "taylor",
-            Method::TaylorExtended => "taylor-extended",
-        }
     }
 }
 

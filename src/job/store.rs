@@ -126,6 +126,7 @@ impl Store {
         }
         let found = crate::record::read_tree(&self.folder, &|path| path.ends_with(&format!(".{ENDING}")))?;
         Ok(found
+            .files
             .into_iter()
             .map(|file| Entry {
                 current: read(&file.bytes).is_ok_and(|(h, _)| h.numerics == NUMERICS),
@@ -174,12 +175,8 @@ fn read(bytes: &[u8]) -> Result<(Header, Answer), String> {
         usize::try_from(length).ok().and_then(|n| content.split_at_checked(n)).ok_or("its header is cut short")?;
     let header: Header = serde_json::from_slice(header).map_err(|e| e.to_string())?;
     let tables = encode::from_bits(tables).map_err(|e| e.to_string())?;
-    let answer = Answer {
-        tables,
-        facts: header.facts.clone(),
-        statistics: header.statistics.clone(),
-        stop: header.stop,
-    };
+    let answer =
+        Answer { tables, facts: header.facts.clone(), statistics: header.statistics.clone(), stop: header.stop };
     Ok((header, answer))
 }
 

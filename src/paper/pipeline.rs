@@ -164,10 +164,8 @@ pub fn compute(picture: &Picture, desk: &Desk<'_>) -> Result<Computed, PipelineE
         })
         .collect();
     let joined = |hash: fn(&PanelEntry) -> Option<&Hash>| {
-        let hashes: Vec<String> = entries
-            .iter()
-            .map(|e| format!("{} {}", e.label, hash(e).map_or("none", Hash::as_str)))
-            .collect();
+        let hashes: Vec<String> =
+            entries.iter().map(|e| format!("{} {}", e.label, hash(e).map_or("none", Hash::as_str))).collect();
         Hash::of(hashes.join("\n").as_bytes())
     };
     let (spec, data) = (joined(|e| Some(&e.spec)), joined(|e| Some(&e.data)));
@@ -209,7 +207,8 @@ pub fn compute(picture: &Picture, desk: &Desk<'_>) -> Result<Computed, PipelineE
                 (true, other) => format!("{label}-{other}"),
                 (false, other) => other.to_owned(),
             };
-            let about = json!({ "kind": question.kind(), "question_sha256": question_hash(&**question), "stop": answer.stop });
+            let about =
+                json!({ "kind": question.kind(), "question_sha256": question_hash(&**question), "stop": answer.stop });
             let bytes = encode::csv(table, &about);
             table_records.push(TableRecord {
                 file: format!("{}-{ending}.csv", picture.name),

@@ -8,8 +8,8 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::{Picture, Reading};
-use crate::analyse::attractor::Evidence;
 pub use crate::analyse::attractor::Claim as SectionClaim;
+use crate::analyse::attractor::Evidence;
 use crate::analyse::tangle::Shared;
 use crate::job::{AnyQuestion, Classification, Desk, JobError, PathComparison};
 

@@ -1,13 +1,21 @@
 //! Files are written to a temporary name beside their place and renamed: a reader, or a run that is killed, never sees
 //! half a file, and an existing file stays until its successor is whole.
+//!
+//! What is not a regular file (a pipe, a terminal, an open descriptor such as /dev/stdout) is written to and never replaced. A
+//! symbolic link is followed, and what it leads to is replaced, not the link. A temporary file is locked by the process that
+//! writes it, so that another process can tell those of the dead from those of the living and remove them.
 
-use std::fs;
-use std::io::{self, Write};
+use std::collections::BTreeSet;
+use std::fs::{self, File, Metadata, OpenOptions, TryLockError};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use tempfile::NamedTempFile;
 
 /// A file or folder that could not be read or written.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot {action} {}: {source}{}", path.display(), advice(source))]
+#[error("cannot {action} {}: {source}", path.display())]
 pub struct FileError {
     /// What was tried.
     pub action: &'static str,
@@ -17,18 +25,6 @@ pub struct FileError {
     pub source: io::Error,
 }
 
-fn advice(error: &io::Error) -> &'static str {
-    match error.kind() {
-        io::ErrorKind::PermissionDenied => "; choose a place you may write to with --out",
-        io::ErrorKind::StorageFull => "; free some space or choose another place with --out",
-        io::ErrorKind::ReadOnlyFilesystem => "; choose a writable place with --out",
-        io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists => {
-            "; a part of this path is a file, choose another place with --out"
-        }
-        _ => "",
-    }
-}
-
 impl FileError {
     fn new(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> FileError {
         let path = path.to_path_buf();
@@ -36,32 +32,245 @@ impl FileError {
     }
 }
 
-/// Writes `bytes` to `path`, making its folder; all or nothing.
+/// Writes `bytes` to `path`, making its folder; all or nothing. A file that is replaced keeps its permissions; a new one can be read by
+/// everybody.
+///
+/// # Errors
+/// If the place cannot be written, is a folder, or is a file that is protected against writing; what was there is unharmed.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
-    // A device or a pipe (/dev/stdout) is written to, not replaced; a link's target is replaced, not the link.
-    let real = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
-    if fs::metadata(&real).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
-        return fs::OpenOptions::new()
-            .write(true)
-            .open(&real)
+    match place(path).map_err(FileError::new("write", path))? {
+        // Appending, because an open descriptor's file may hold what came before us, and a pipe does not mind.
+        Place::Stream => OpenOptions::new()
+            .append(true)
+            .open(path)
             .and_then(|mut f| f.write_all(bytes))
-            .map_err(FileError::new("write", path));
+            .map_err(FileError::new("write", path)),
+        Place::File { at, old } => {
+            let folder = folder_of(&at);
+            fs::create_dir_all(folder).map_err(FileError::new("create the folder", folder))?;
+            let temporary = Temporary::new_in(folder).map_err(FileError::new("write in", folder))?;
+            temporary
+                .file()
+                .write_all(bytes)
+                .and_then(|()| temporary.file().sync_data())
+                .and_then(|()| like(temporary.file(), old.as_ref()))
+                .and_then(|()| temporary.persist(&at))
+                .map_err(FileError::new("write", path))
+        }
     }
-    let path = real.as_path();
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    fs::create_dir_all(folder).map_err(FileError::new("create the folder", folder))?;
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".twofold-");
-    // Temporary files are private by default; a published file is not, whatever the umask.
+}
+
+/// Tries whether [`write`] can write to `path`, and leaves everything as it is: for use before a long computation.
+///
+/// # Errors
+/// As [`write`].
+pub fn try_place(path: &Path) -> Result<(), FileError> {
+    match place(path).map_err(FileError::new("write", path))? {
+        // Opening a pipe would wait for its reader.
+        Place::Stream => Ok(()),
+        Place::File { at, .. } => try_folder(folder_of(&at)),
+    }
+}
+
+/// Tries whether files can be made in `folder`, or if it is not there, in the nearest folder above it that is.
+///
+/// # Errors
+/// If they cannot.
+pub fn try_folder(folder: &Path) -> Result<(), FileError> {
+    let there = folder.ancestors().find(|f| f.as_os_str().is_empty() || fs::metadata(f).is_ok());
+    let there = there.filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    Temporary::new_in(there).map(drop).map_err(FileError::new("write in", there))
+}
+
+/// Where bytes go.
+enum Place {
+    /// Something that is written to as it stands.
+    Stream,
+    /// A regular file, or a place where none is yet.
+    File { at: PathBuf, old: Option<Metadata> },
+}
+
+/// More links than any system follows.
+const MOST_LINKS: usize = 40;
+
+/// Follows links to the end.
+fn place(path: &Path) -> io::Result<Place> {
+    let mut at = path.to_path_buf();
+    for followed in 0..MOST_LINKS {
+        if is_descriptor(&at) {
+            return Ok(Place::Stream);
+        }
+        let found = match fs::symlink_metadata(&at) {
+            Ok(found) => found,
+            Err(e) if e.kind() == io::ErrorKind::NotFound => {
+                if followed > 0 && !folder_of(&at).is_dir() {
+                    let why = format!("it is a link into a folder that is not there, {}", folder_of(&at).display());
+                    return Err(io::Error::new(io::ErrorKind::NotFound, why));
+                }
+                return Ok(Place::File { at, old: None });
+            }
+            Err(e) => return Err(e),
+        };
+        if found.is_symlink() {
+            at = folder_of(&at).join(fs::read_link(&at)?);
+        } else if found.is_dir() {
+            return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder"));
+        } else if !found.is_file() {
+            return Ok(Place::Stream);
+        } else if found.permissions().readonly() {
+            return Err(io::Error::new(io::ErrorKind::PermissionDenied, "the file is protected against writing"));
+        } else {
+            return Ok(Place::File { at, old: Some(found) });
+        }
+    }
+    Err(io::Error::other("links that lead to each other"))
+}
+
+/// Whether the path names an open descriptor of a process: what stands behind it is somebody's open file.
+fn is_descriptor(path: &Path) -> bool {
+    let folder = fs::canonicalize(folder_of(path)).unwrap_or_default();
+    folder == Path::new("/dev/fd") || folder.starts_with("/proc") && folder.ends_with("fd")
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Gives a new file the permissions of the one it replaces; those of a published file, whatever the umask, if it replaces none.
+fn like(file: &File, old: Option<&Metadata>) -> io::Result<()> {
     #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
-    let mut file = builder.tempfile_in(folder).map_err(FileError::new("write in", folder))?;
-    file.write_all(bytes).and_then(|()| file.as_file().sync_data()).map_err(FileError::new("write", path))?;
-    #[cfg(unix)]
-    file.as_file()
-        .set_permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644))
-        .map_err(FileError::new("set the permissions of", path))?;
-    file.persist(path).map_err(|e| FileError::new("write", path)(e.error))?;
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let mode = old.map_or(0o644, |m| m.permissions().mode() & 0o7777);
+        file.set_permissions(fs::Permissions::from_mode(mode))
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = (file, old);
+        Ok(())
+    }
+}
+
+const PREFIX: &str = ".twofold-";
+const SUFFIX: &str = ".tmp";
+/// Random characters between them.
+const RANDOM: usize = 6;
+
+/// What this process has under way, for [`abandon`].
+static UNDER_WAY: Mutex<UnderWay> = Mutex::new(UnderWay { temporaries: BTreeSet::new(), swept: BTreeSet::new() });
+
+struct UnderWay {
+    temporaries: BTreeSet<PathBuf>,
+    swept: BTreeSet<PathBuf>,
+}
+
+fn under_way() -> MutexGuard<'static, UnderWay> {
+    UNDER_WAY.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A file that is being written: locked, known to [`abandon`], removed when dropped.
+struct Temporary {
+    file: NamedTempFile,
+    known: Known,
+}
+
+/// An entry in [`UNDER_WAY`].
+struct Known(PathBuf);
+
+impl Drop for Known {
+    fn drop(&mut self) {
+        under_way().temporaries.remove(&self.0);
+    }
+}
+
+impl Temporary {
+    /// Makes one. The first of a folder also removes what dead processes left there.
+    fn new_in(folder: &Path) -> io::Result<Self> {
+        let first = under_way().swept.insert(folder.to_path_buf());
+        if first {
+            sweep(folder);
+        }
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(PREFIX).suffix(SUFFIX).rand_bytes(RANDOM);
+        for _ in 0..16 {
+            let temporary = {
+                let mut mine = under_way();
+                let file = builder.tempfile_in(folder)?;
+                mine.temporaries.insert(file.path().to_path_buf());
+                Self { known: Known(file.path().to_path_buf()), file }
+            };
+            // Another process that sweeps may have come between making and locking.
+            match temporary.file().try_lock() {
+                Ok(()) if temporary.file.path().exists() => return Ok(temporary),
+                Ok(()) | Err(TryLockError::WouldBlock) => {}
+                // No locks on this file system: then nobody can take it for a dead process's either.
+                Err(TryLockError::Error(_)) => return Ok(temporary),
+            }
+        }
+        Err(io::Error::other("other processes keep removing the temporary files in it"))
+    }
+
+    fn file(&self) -> &File {
+        self.file.as_file()
+    }
+
+    /// Puts the file in its place.
+    fn persist(self, place: &Path) -> io::Result<()> {
+        let Self { file, known } = self;
+        let mine = under_way();
+        let done = file.persist(place);
+        drop(mine);
+        drop(known);
+        done.map(drop).map_err(|e| e.error)
+    }
+}
+
+/// Removes the temporary files that dead processes left in `folder`, and says how many. Those of living ones are locked and stay.
+pub fn sweep(folder: &Path) -> usize {
+    let Ok(entries) = fs::read_dir(folder) else { return 0 };
+    let stale = |entry: &fs::DirEntry| {
+        let name = entry.file_name();
+        let ours = name
+            .to_str()
+            .and_then(|n| n.strip_prefix(PREFIX))
+            .and_then(|n| n.strip_suffix(SUFFIX))
+            .is_some_and(|n| n.len() == RANDOM && n.bytes().all(|b| b.is_ascii_alphanumeric()));
+        ours && entry.file_type().is_ok_and(|t| t.is_file())
+    };
+    let mut removed = 0;
+    for entry in entries.flatten().filter(stale) {
+        let Ok(file) = OpenOptions::new().read(true).write(true).open(entry.path()) else { continue };
+        // The lock is held until the file is gone: its maker, if it lives, sees one or the other.
+        if file.try_lock().is_ok() && fs::remove_file(entry.path()).is_ok() {
+            removed += 1;
+        }
+    }
+    removed
+}
+
+/// Removes the temporary files of this process. Afterwards no write of this process begins or ends any more (it waits for ever): only
+/// for a process that is about to leave.
+pub fn abandon() {
+    let mine = under_way();
+    for path in &mine.temporaries {
+        // What cannot be removed now is swept by a later run.
+        let _ = fs::remove_file(path);
+    }
+    std::mem::forget(mine);
+}
+
+/// Whether files that were written are still there with their lengths: another process may have removed them since.
+///
+/// # Errors
+/// The first that is not.
+pub fn still_there(files: &[(PathBuf, u64)]) -> Result<(), FileError> {
+    for (path, length) in files {
+        let found = fs::metadata(path).map_err(FileError::new("find again", path))?;
+        if found.len() != *length {
+            let why = io::Error::other(format!("it has {} bytes instead of {length}", found.len()));
+            return Err(FileError::new("find unchanged", path)(why));
+        }
+    }
     Ok(())
 }
 
@@ -73,28 +282,74 @@ pub fn remove(path: &Path) -> Result<(), FileError> {
     }
 }
 
-/// Reads a whole file.
+/// The largest file that [`read`] reads: the largest table of a full-length figure has some 20 MB.
+pub const LARGEST: u64 = 512 << 20;
+
+/// The largest text that [`read_text`] reads: a spec has 1 kB, a manifest 10.
+pub const LARGEST_TEXT: u64 = 16 << 20;
+
+/// Reads a whole file of at most [`LARGEST`] bytes.
+///
+/// # Errors
+/// If it cannot be read, or is larger.
 pub fn read(path: &Path) -> Result<Vec<u8>, FileError> {
-    fs::read(path).map_err(FileError::new("read", path))
+    File::open(path).and_then(|f| at_most(f, LARGEST)).map_err(FileError::new("read", path))
 }
 
-/// Reads a whole text file.
+/// Reads a whole text file of at most [`LARGEST_TEXT`] bytes.
+///
+/// # Errors
+/// If it cannot be read, is larger, or is not UTF-8.
 pub fn read_text(path: &Path) -> Result<String, FileError> {
-    fs::read_to_string(path).map_err(FileError::new("read", path))
+    File::open(path).and_then(text).map_err(FileError::new("read", path))
+}
+
+/// Reads a whole text of at most [`LARGEST_TEXT`] bytes from a stream; its `name` is for the message.
+///
+/// # Errors
+/// As [`read_text`].
+pub fn read_text_from(stream: impl Read, name: &str) -> Result<String, FileError> {
+    text(stream).map_err(FileError::new("read", Path::new(name)))
+}
+
+fn text(stream: impl Read) -> io::Result<String> {
+    String::from_utf8(at_most(stream, LARGEST_TEXT)?)
+        .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text"))
+}
+
+/// Everything in a stream. The stream is not asked how long it is: a device would not know.
+fn at_most(stream: impl Read, limit: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    stream.take(limit + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > limit {
+        let why = format!("it is larger than {} MiB, the most that is read here", limit >> 20);
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, why));
+    }
+    Ok(bytes)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> =
+            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
     #[test]
     fn replaces_whole_and_leaves_no_litter() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a/b.txt");
-        write(&path, b"one").unwrap();
+        write(&path, b"the first and longer one").unwrap();
+        let reader = File::open(&path).unwrap();
         write(&path, b"two").unwrap();
         assert_eq!(read(&path).unwrap(), b"two");
-        assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
+        assert_eq!(names(path.parent().unwrap()), ["b.txt"]);
+        // Who had the old file open still has it whole: it was replaced, not written over.
+        assert_eq!(at_most(reader, 100).unwrap(), b"the first and longer one");
     }
 
     #[test]
@@ -102,17 +357,155 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let blocker = folder.path().join("blocker");
         write(&blocker, b"").unwrap();
-        let error = write(&blocker.join("x.png"), b"").unwrap_err().to_string();
-        assert!(error.contains("blocker") && error.contains("--out"), "{error}");
+        for error in [write(&blocker.join("x.png"), b"").unwrap_err(), try_place(&blocker.join("x.png")).unwrap_err()] {
+            assert!(error.to_string().contains("blocker"), "{error}");
+        }
+        let error = write(folder.path(), b"").unwrap_err().to_string();
+        assert!(error.contains("is a folder"), "{error}");
+        assert_eq!(names(folder.path()), ["blocker"]);
+    }
+
+    #[test]
+    fn a_place_is_tried_without_a_trace() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a/b/c.txt");
+        try_place(&path).unwrap();
+        try_folder(path.parent().unwrap()).unwrap();
+        assert!(names(folder.path()).is_empty());
+        write(&path, b"x").unwrap();
+        try_place(&path).unwrap();
+        assert_eq!(read(&path).unwrap(), b"x");
     }
 
     #[cfg(unix)]
     #[test]
-    fn permissions_do_not_depend_on_the_umask() {
+    fn permissions_are_kept_and_else_do_not_depend_on_the_umask() {
         use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x");
+        let mode = || fs::metadata(&path).unwrap().permissions().mode() & 0o7777;
         write(&path, b"x").unwrap();
-        assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o644);
+        assert_eq!(mode(), 0o644);
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).unwrap();
+        write(&path, b"secret").unwrap();
+        assert_eq!((mode(), read(&path).unwrap().as_slice()), (0o600, &b"secret"[..]));
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o444)).unwrap();
+        let error = write(&path, b"y").unwrap_err().to_string();
+        assert!(error.contains("protected against writing"), "{error}");
+        assert!(try_place(&path).is_err());
+        assert_eq!(read(&path).unwrap(), b"secret");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_stay_and_lead_to_the_new_file() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("elsewhere")).unwrap();
+        fs::write(at("elsewhere/old"), b"old").unwrap();
+        symlink("elsewhere/old", at("first")).unwrap();
+        symlink("first", at("second")).unwrap();
+        write(&at("second"), b"new").unwrap();
+        assert_eq!(fs::read(at("elsewhere/old")).unwrap(), b"new");
+        // A link to nothing makes the file that it names.
+        symlink("elsewhere/not-yet", at("third")).unwrap();
+        write(&at("third"), b"made").unwrap();
+        assert_eq!(fs::read(at("elsewhere/not-yet")).unwrap(), b"made");
+        for link in ["first", "second", "third"] {
+            assert!(fs::symlink_metadata(at(link)).unwrap().is_symlink(), "{link} was replaced");
+        }
+        assert_eq!(names(&at("elsewhere")), ["not-yet", "old"]);
+        // A link into nowhere, and links in a circle.
+        symlink("nowhere/x", at("fourth")).unwrap();
+        let error = write(&at("fourth"), b"").unwrap_err().to_string();
+        assert!(error.contains("a link into a folder that is not there"), "{error}");
+        symlink("sixth", at("fifth")).unwrap();
+        symlink("fifth", at("sixth")).unwrap();
+        let error = try_place(&at("sixth")).unwrap_err().to_string();
+        assert!(error.contains("lead to each other"), "{error}");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn an_open_descriptor_is_appended_to() {
+        use std::os::fd::AsRawFd;
+        let folder = tempfile::tempdir().unwrap();
+        let log = folder.path().join("log");
+        fs::write(&log, b"keep\n").unwrap();
+        let open = OpenOptions::new().write(true).open(&log).unwrap();
+        let descriptor = format!("/proc/self/fd/{}", open.as_raw_fd());
+        write(Path::new(&descriptor), b"more\n").unwrap();
+        let link = folder.path().join("link");
+        std::os::unix::fs::symlink(&descriptor, &link).unwrap();
+        write(&link, b"and more\n").unwrap();
+        assert_eq!(fs::read(&log).unwrap(), b"keep\nmore\nand more\n");
+        assert_eq!(names(folder.path()), ["link", "log"]);
+    }
+
+    #[test]
+    fn the_dead_are_swept_and_the_living_are_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for name in [".twofold-aB3dE6.tmp", ".twofold-aB3dE6", ".twofold-my-notes.tmp", "aB3dE6.tmp"] {
+            fs::write(at(name), b"half").unwrap();
+        }
+        let living = at(".twofold-Living.tmp");
+        let held = File::create(&living).unwrap();
+        held.lock().unwrap();
+        write(&at("x"), b"x").unwrap();
+        let left = [".twofold-Living.tmp", ".twofold-aB3dE6", ".twofold-my-notes.tmp", "aB3dE6.tmp", "x"];
+        assert_eq!(names(folder.path()), left);
+        drop(held);
+        assert_eq!(sweep(folder.path()), 1);
+        assert!(!living.exists());
+    }
+
+    /// Writers while others sweep all the time: nothing is lost, nothing stays.
+    #[test]
+    fn sweeping_never_takes_a_living_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let done = std::sync::atomic::AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            for _ in 0..2 {
+                scope.spawn(|| {
+                    while !done.load(std::sync::atomic::Ordering::Relaxed) {
+                        sweep(folder.path());
+                    }
+                });
+            }
+            let writers: Vec<_> = (0..2)
+                .map(|w| {
+                    let folder = folder.path();
+                    scope.spawn(move || (0..200).all(|i| write(&folder.join(format!("{w}-{i}")), b"whole").is_ok()))
+                })
+                .collect();
+            let whole = writers.into_iter().map(|w| w.join().unwrap()).collect::<Vec<_>>();
+            done.store(true, std::sync::atomic::Ordering::Relaxed);
+            assert_eq!(whole, [true, true]);
+        });
+        let names = names(folder.path());
+        assert_eq!(names.len(), 400, "{names:?}");
+        assert!(names.iter().all(|n| read(&folder.path().join(n)).unwrap() == b"whole"));
+    }
+
+    #[test]
+    fn what_was_removed_or_cut_meanwhile_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x");
+        fs::write(&path, b"1234").unwrap();
+        still_there(&[(path.clone(), 4)]).unwrap();
+        assert!(still_there(&[(path.clone(), 5)]).unwrap_err().to_string().contains("4 bytes instead of 5"));
+        fs::remove_file(&path).unwrap();
+        assert!(still_there(&[(path, 4)]).is_err());
+    }
+
+    #[test]
+    fn reading_is_bounded_and_wants_text() {
+        assert_eq!(at_most(&b"1234"[..], 4).unwrap(), b"1234");
+        assert_eq!(at_most(io::repeat(0), 4).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
+        let error = read_text_from(io::repeat(b' '), "endless").unwrap_err().to_string();
+        assert!(error.contains("endless") && error.contains("16 MiB"), "{error}");
+        assert!(read_text_from(&b"\xff"[..], "x").unwrap_err().to_string().contains("not UTF-8"));
     }
 }

@@ -1,6 +1,7 @@
 //! A folder's files, in an order that does not depend on the file system.
 
 use std::fs;
+use std::io;
 use std::path::Path;
 
 use super::files::{self, FileError};
@@ -26,44 +27,80 @@ impl FileBytes {
     }
 }
 
+/// A folder's files, and what was met and not read.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Tree {
+    /// Sorted by path.
+    pub files: Vec<FileBytes>,
+    /// Wanted names behind which there is nothing: links to files that are gone. Sorted.
+    pub dangling: Vec<String>,
+}
+
 /// How deep folders are looked into: a figure's files are one folder down.
 const DEPTH: usize = 4;
 
+/// The most that is read of a folder: all full-length figures have some 250 MB.
+const LARGEST_TREE: u64 = 4 << 30;
+
 /// Reads every file under `folder` whose path inside it is `wanted`, sorted by path. Hidden files and folders are passed over, and
 /// so are names that are not Unicode.
-pub fn read_tree(folder: &Path, wanted: &dyn Fn(&str) -> bool) -> Result<Vec<FileBytes>, FileError> {
-    let mut found = Vec::new();
-    walk(folder, "", DEPTH, wanted, &mut found)?;
-    found.sort_by(|a: &FileBytes, b| a.path.cmp(&b.path));
-    Ok(found)
+///
+/// # Errors
+/// If the folder or a file cannot be read, or there is more of them than fits in memory.
+pub fn read_tree(folder: &Path, wanted: &dyn Fn(&str) -> bool) -> Result<Tree, FileError> {
+    let mut walk = Walk { wanted, tree: Tree::default(), bytes: 0 };
+    walk.folder(folder, "", DEPTH)?;
+    let mut tree = walk.tree;
+    tree.files.sort_by(|a, b| a.path.cmp(&b.path));
+    tree.dangling.sort();
+    Ok(tree)
 }
 
-fn walk(
-    folder: &Path,
-    prefix: &str,
-    depth: usize,
-    wanted: &dyn Fn(&str) -> bool,
-    found: &mut Vec<FileBytes>,
-) -> Result<(), FileError> {
-    let list = |source| FileError { action: "list", path: folder.to_path_buf(), source };
-    for entry in fs::read_dir(folder).map_err(list)? {
-        let entry = entry.map_err(list)?;
-        let Ok(name) = entry.file_name().into_string() else { continue };
-        if name.starts_with('.') {
-            continue;
-        }
-        let path = entry.path();
-        let inside = format!("{prefix}{name}");
-        let kind = fs::metadata(&path).map_err(|source| FileError { action: "read", path: path.clone(), source })?;
-        if kind.is_dir() {
-            if depth > 0 {
-                walk(&path, &format!("{inside}/"), depth - 1, wanted, found)?;
+struct Walk<'a> {
+    wanted: &'a dyn Fn(&str) -> bool,
+    tree: Tree,
+    bytes: u64,
+}
+
+impl Walk<'_> {
+    fn folder(&mut self, folder: &Path, prefix: &str, depth: usize) -> Result<(), FileError> {
+        let list = |source| FileError { action: "list", path: folder.to_path_buf(), source };
+        for entry in fs::read_dir(folder).map_err(list)? {
+            let entry = entry.map_err(list)?;
+            let Ok(name) = entry.file_name().into_string() else { continue };
+            if name.starts_with('.') {
+                continue;
             }
-        } else if kind.is_file() && wanted(&inside) {
-            found.push(FileBytes { path: inside, bytes: files::read(&path)? });
+            let path = entry.path();
+            let inside = format!("{prefix}{name}");
+            let kind = match fs::metadata(&path) {
+                Ok(kind) => kind,
+                // A link to nothing, or a file that was removed since its folder was listed.
+                Err(e) if e.kind() == io::ErrorKind::NotFound => {
+                    if (self.wanted)(&inside) {
+                        self.tree.dangling.push(inside);
+                    }
+                    continue;
+                }
+                Err(source) => return Err(FileError { action: "read", path, source }),
+            };
+            if kind.is_dir() {
+                if depth > 0 {
+                    self.folder(&path, &format!("{inside}/"), depth - 1)?;
+                }
+            } else if kind.is_file() && (self.wanted)(&inside) {
+                let bytes = files::read(&path)?;
+                self.bytes += bytes.len() as u64;
+                if self.bytes > LARGEST_TREE {
+                    let why = format!("the files in it have more than {} GiB", LARGEST_TREE >> 30);
+                    let source = io::Error::new(io::ErrorKind::FileTooLarge, why);
+                    return Err(FileError { action: "read", path: folder.to_path_buf(), source });
+                }
+                self.tree.files.push(FileBytes { path: inside, bytes });
+            }
         }
+        Ok(())
     }
-    Ok(())
 }
 
 #[cfg(test)]
@@ -76,11 +113,23 @@ mod tests {
         for name in ["b.txt", "a/c.txt", "a/b.png", ".hidden/x.txt", ".y.txt"] {
             files::write(&folder.path().join(name), name.as_bytes()).unwrap();
         }
-        let found = read_tree(folder.path(), &|p| p.ends_with(".txt")).unwrap();
+        let found = read_tree(folder.path(), &|p| p.ends_with(".txt")).unwrap().files;
         let paths: Vec<&str> = found.iter().map(|f| f.path.as_str()).collect();
         assert_eq!(paths, ["a/c.txt", "b.txt"]);
         assert_eq!((found[0].folder(), found[0].name(), found[0].bytes.as_slice()), ("a", "c.txt", &b"a/c.txt"[..]));
         assert_eq!(found[1].folder(), "");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_to_nothing_are_told_apart() {
+        let folder = tempfile::tempdir().unwrap();
+        files::write(&folder.path().join("a.txt"), b"a").unwrap();
+        for name in ["b.txt", "b.png"] {
+            std::os::unix::fs::symlink("nowhere", folder.path().join(name)).unwrap();
+        }
+        let tree = read_tree(folder.path(), &|p| p.ends_with(".txt")).unwrap();
+        assert_eq!((tree.files.len(), tree.dangling), (1, vec!["b.txt".to_owned()]));
     }
 
     #[test]

@@ -7,8 +7,33 @@ use sha2::{Digest, Sha256};
 
 /// A SHA-256 digest.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(transparent)]
+#[serde(try_from = "String", into = "String")]
 pub struct Hash(String);
+
+/// A text that is no digest.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0:?} is not a SHA-256: 64 digits of 0-9 and a-f")]
+pub struct NotAHash(String);
+
+impl TryFrom<String> for Hash {
+    type Error = NotAHash;
+
+    fn try_from(text: String) -> Result<Self, NotAHash> {
+        let digit = |b: u8| b.is_ascii_digit() || (b'a'..=b'f').contains(&b);
+        if text.len() == 64 && text.bytes().all(digit) {
+            Ok(Hash(text))
+        } else {
+            // What stands there may be long; its beginning tells enough.
+            Err(NotAHash(text.chars().take(80).collect()))
+        }
+    }
+}
+
+impl From<Hash> for String {
+    fn from(hash: Hash) -> String {
+        hash.0
+    }
+}
 
 impl Hash {
     /// The digest of some bytes.
@@ -49,5 +74,20 @@ mod tests {
     #[test]
     fn known_digest() {
         assert_eq!(Hash::of(b"abc").as_str(), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+    }
+
+    #[test]
+    fn only_digests_are_read() {
+        let good = Hash::of(b"abc");
+        let text = serde_json::to_string(&good).unwrap();
+        assert_eq!(text, format!("\"{}\"", good.as_str()));
+        assert_eq!(serde_json::from_str::<Hash>(&text).unwrap(), good);
+        let upper = text.to_uppercase();
+        for bad in ["\"\"", "\"abc\"", &text.replace('b', "g"), &upper, &text.replace("ba", "b"), "\"\\u001b[2J\"", "1"]
+        {
+            assert!(serde_json::from_str::<Hash>(bad).is_err(), "{bad}");
+        }
+        let error = Hash::try_from("\u{1b}".repeat(1000)).unwrap_err().to_string();
+        assert!(!error.contains('\u{1b}') && error.len() < 1000, "{error}");
     }
 }

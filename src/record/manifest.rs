@@ -119,6 +119,25 @@ pub enum ManifestError {
         /// Its version.
         found: u64,
     },
+    /// A name that no figure, picture or panel can have.
+    #[error(
+        "{name} names something {bad:?}: a name has letters, digits, \".\", \"_\" and \"-\", at most {LONGEST_NAME} of them, and does not begin with \".\""
+    )]
+    Name {
+        /// Where it came from.
+        name: String,
+        /// What it names so.
+        bad: String,
+    },
+}
+
+/// The longest name of a figure, picture or panel.
+const LONGEST_NAME: usize = 100;
+
+/// Whether a name can stand in a path and on a terminal: it cannot leave its folder, hide, or steer anything.
+pub fn is_plain_name(name: &str) -> bool {
+    let plain = |b: u8| b.is_ascii_alphanumeric() || matches!(b, b'.' | b'_' | b'-');
+    !name.is_empty() && name.len() <= LONGEST_NAME && !name.starts_with('.') && name.bytes().all(plain)
 }
 
 impl Manifest {
@@ -132,7 +151,13 @@ impl Manifest {
         {
             return Err(ManifestError::Version { name: name.to_owned(), found });
         }
-        serde_json::from_value(value).map_err(syntax)
+        let manifest: Self = serde_json::from_value(value).map_err(syntax)?;
+        let pictures = manifest.pictures.iter();
+        let names = pictures.flat_map(|p| std::iter::once(&p.name).chain(p.panels.iter().map(|q| &q.label)));
+        match std::iter::once(&manifest.figure).chain(names).find(|n| !is_plain_name(n)) {
+            Some(bad) => Err(ManifestError::Name { name: name.to_owned(), bad: bad.chars().take(200).collect() }),
+            None => Ok(manifest),
+        }
     }
 
     /// The manifest as indented JSON with a final newline.
@@ -231,6 +256,39 @@ mod tests {
         let error = Manifest::parse("not json", "m.json").unwrap_err().to_string();
         assert!(error.contains("m.json is not a manifest"), "{error}");
         assert!(Manifest::parse("[1]", "m.json").is_err());
+    }
+
+    #[test]
+    fn names_cannot_leave_their_folder_or_steer_a_terminal() {
+        let manifest = |figure: &str, name: &str, label: &str| {
+            let mut m =
+                Manifest { version: VERSION, figure: figure.into(), made_by: "0".into(), pictures: vec![entry()] };
+            m.pictures[0].name = name.into();
+            m.pictures[0].panels[0].label = label.into();
+            Manifest::parse(&String::from_utf8(m.to_json()).unwrap(), "m.json")
+        };
+        manifest("fig7", "fig7-printed", "a-i").unwrap();
+        for bad in [
+            "",
+            ".",
+            "..",
+            "../x",
+            "/etc/x",
+            "a/b",
+            "a\\b",
+            "C:x",
+            ".hidden",
+            "a\u{1b}[2Jb",
+            "a\nb",
+            "é",
+            &"a".repeat(101),
+        ] {
+            for wrong in [manifest(bad, "p", "i"), manifest("fig7", bad, "i"), manifest("fig7", "p", bad)] {
+                let error = wrong.unwrap_err();
+                assert!(matches!(error, ManifestError::Name { .. }), "{bad}: {error}");
+                assert!(!error.to_string().contains('\u{1b}'));
+            }
+        }
     }
 
     #[test]

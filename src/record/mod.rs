@@ -8,6 +8,6 @@ pub mod hash;
 pub mod manifest;
 
 pub use files::{FileError, write};
-pub use folder::{FileBytes, read_tree};
+pub use folder::{FileBytes, Tree, read_tree};
 pub use hash::Hash;
 pub use manifest::{Layer, Manifest, PanelEntry, PictureEntry};

@@ -88,7 +88,7 @@ fn manifests(folder: &Path) -> Result<Vec<Manifest>, Problem> {
         return Ok(Vec::new());
     }
     let mut all = Vec::new();
-    for file in read_tree(folder, &|path| path.ends_with("/expected.json"))? {
+    for file in read_tree(folder, &|path| path.ends_with("/expected.json"))?.files {
         let name = folder.join(&file.path).display().to_string();
         all.push(Manifest::parse(&String::from_utf8_lossy(&file.bytes), &name)?);
     }

@@ -5,6 +5,7 @@ mod bless;
 #[path = "../../../figures/catalogue.rs"]
 mod catalogue;
 mod check;
+mod figure;
 mod inspect;
 mod published;
 mod report;
@@ -26,6 +27,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Run(Box<run::Arguments>),
+    Figure(figure::Arguments),
     Sweep(Box<sweep::Arguments>),
     Check(check::Arguments),
     Bless(bless::Arguments),
@@ -47,6 +49,7 @@ type Problem = Box<dyn std::error::Error>;
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Run(arguments) => run::run(&arguments),
+        Command::Figure(arguments) => figure::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Bless(arguments) => bless::run(&arguments),

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use twofold::cli::progress::Progress;
 use twofold::cli::{in_pool, print};
-use twofold::job::Desk;
 use twofold::compare::{Comparison, Limits, Rung, compare};
+use twofold::job::Desk;
 use twofold::paper::Figure;
 use twofold::paper::pipeline::{Computed, compute, pixel_hash, questions};
 use twofold::record::{FileBytes, Hash, read_tree};
@@ -15,7 +15,7 @@ use super::{Outcome, Problem};
 
 /// Computes every figure of which the folder holds a picture, and says for each picture which rung of the ladder holds.
 pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool) -> Result<Outcome, Problem> {
-    let published = read_tree(folder, &|path| path.ends_with(".png"))?;
+    let published = read_tree(folder, &|path| path.ends_with(".png"))?.files;
     let named = |name: &str| -> Vec<&FileBytes> {
         published.iter().filter(|f| f.name().strip_suffix(".png") == Some(name)).collect()
     };

@@ -27,7 +27,8 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
     let folder = &arguments.figures;
     let made = read_tree(folder, &|_| true)
-        .map_err(|e| format!("{e}; run `make figures` first, or name another --figures"))?;
+        .map_err(|e| format!("{e}; run `make figures` first, or name another --figures"))?
+        .files;
     let report = assemble(&made, &references(&arguments.expected)?);
     if report.figures.is_empty() {
         return Err(format!(
@@ -58,7 +59,7 @@ pub fn references(folder: &Path) -> Result<Vec<FileBytes>, Problem> {
     if !folder.exists() {
         return Ok(Vec::new());
     }
-    Ok(read_tree(folder, &|path| path.ends_with(".json") || path.ends_with(".png"))?)
+    Ok(read_tree(folder, &|path| path.ends_with(".json") || path.ends_with(".png"))?.files)
 }
 
 fn stands_in(page: &Path, folder: &Path) -> bool {

@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
+use serde_json::json;
 use twofold::cli::print_bytes;
 use twofold::cli::progress::Progress;
 use twofold::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use twofold::integrate::{Kick, KickLaw, Schedule, StepCap, Tolerance};
-use twofold::job::encode;
-use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
+use twofold::job::{Desk, Question, Run, encode};
 use twofold::paper::Reading;
 use twofold::record;
 use twofold::system::{Relaxation, Transition, Wheel};
@@ -200,16 +200,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
         return deliver(arguments, &text);
     }
     let progress = Progress::new(arguments.quiet);
-    let watch = progress.run("run".into(), spec.t_end);
-    let result = simulate(&spec, &watch);
-    match &result {
-        Ok(r) => watch.done(&format!("{} steps, {} points", r.statistics.steps, r.data.len())),
-        Err(_) => watch.done("failed"),
-    }
-    let recording = result?;
+    let run = Run(spec);
+    let answer = Desk::new(None, &progress).ask(&run)?;
+    let about = json!({ "kind": run.kind(), "question": run.json(), "stop": answer.stop });
     let bytes = match arguments.format {
-        Format::Csv => encode::csv(&spec, &recording.data),
-        Format::Json => encode::json(&spec, &recording),
+        Format::Csv => encode::csv(&answer.tables[0], &about),
+        Format::Json => encode::json(&answer, &about),
     };
     deliver(arguments, &bytes)
 }

@@ -8,9 +8,8 @@ use rayon::prelude::*;
 use twofold::analyse::attractor::{Evidence, Verdict};
 use twofold::cli::progress::Progress;
 use twofold::cli::{in_pool, print_bytes};
-use twofold::job::simulate::{Data, simulate};
 use twofold::job::spec::{Observation, RunSpec};
-use twofold::paper::verdict::section_evidence;
+use twofold::job::{Classification, Desk};
 use twofold::record;
 
 use super::run::RunFlags;
@@ -48,8 +47,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
         spec.observe = Observation::Section { coordinate: 1, value: 0.0 };
     }
     let progress = Progress::new(arguments.quiet);
+    let desk = Desk::new(None, &progress);
     let rows: Vec<Result<(f64, Evidence), ThreadProblem>> = in_pool(arguments.threads, || {
-        (1..=arguments.runs).into_par_iter().map(|k| one(&spec, f64::from(k) * arguments.shift, k, &progress)).collect()
+        (1..=arguments.runs).into_par_iter().map(|k| one(&spec, f64::from(k) * arguments.shift, &desk)).collect()
     })?;
     let mut text = String::from("shift,verdict,period,captured_at,rate,summary\n");
     let mut counts: BTreeMap<String, u32> = BTreeMap::new();
@@ -87,13 +87,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
 /// An error that may cross threads.
 type ThreadProblem = Box<dyn std::error::Error + Send + Sync>;
 
-fn one(spec: &RunSpec, shift: f64, k: u32, progress: &Progress) -> Result<(f64, Evidence), ThreadProblem> {
+fn one(spec: &RunSpec, shift: f64, desk: &Desk<'_>) -> Result<(f64, Evidence), ThreadProblem> {
     let mut shifted = *spec;
     shifted.start[0] += shift;
-    let watch = progress.run(format!("run {k}"), spec.t_end);
-    let recording = simulate(&shifted, &watch);
-    watch.done(if recording.is_ok() { "done" } else { "failed" });
-    let recording = recording?;
-    let Data::Section(crossings) = &recording.data else { return Err("a sweep needs a section".into()) };
-    Ok((shift, section_evidence(&shifted, &recording, crossings)?))
+    Ok((shift, Classification::of(shifted).ask(desk)?))
 }

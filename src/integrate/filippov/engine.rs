@@ -308,10 +308,7 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
 
     /// Counts a finished piece's work.
     fn count(&mut self, work: &Statistics) {
-        self.statistics.steps += work.steps;
-        self.statistics.rejected += work.rejected;
-        self.statistics.evaluations += work.evaluations;
-        self.statistics.restarts += work.restarts;
+        self.statistics += work;
         if self.statistics.steps > self.settings.max_steps {
             self.stop.get_or_insert(StopReason::StepBudget);
         }

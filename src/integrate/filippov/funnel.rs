@@ -5,7 +5,7 @@ use nalgebra::SVector;
 use super::engine::{Departure, Origin};
 use super::two_fold::SlidingAtTwoFold;
 use super::{ExitRule, FilippovError, FilippovSummary, Settings, Side, SlidingFlow, Trajectory, engine, flow::project};
-use crate::integrate::StopReason;
+use crate::integrate::{Statistics, StopReason};
 use crate::num::elementary::pow;
 use crate::system::filippov::{Region, region};
 use crate::system::{PiecewiseSmooth, Reversed, VectorField};
@@ -51,6 +51,8 @@ pub struct Funnel<const N: usize> {
     pub point: SVector<f64, N>,
     /// Whether it is a two-fold (or else a point of the repelling region).
     pub at_two_fold: bool,
+    /// Work of the approach.
+    pub statistics: Statistics,
     /// The futures: by exit time, plus before minus.
     pub members: Vec<FunnelMember<N>>,
 }
@@ -80,7 +82,14 @@ where
         });
     }
     let point = project(system, &there.x);
-    let mut family = Funnel { approach, t: there.t, point, at_two_fold: there.mode.is_none(), members: Vec::new() };
+    let mut family = Funnel {
+        approach,
+        t: there.t,
+        point,
+        at_two_fold: there.mode.is_none(),
+        statistics: there.statistics,
+        members: Vec::new(),
+    };
     family.members = members_of(system, &family, settings, grid, None)?;
     Ok(family)
 }

@@ -1,0 +1,105 @@
+//! Methods by name: the one place where a name becomes a stepper.
+
+use serde::{Deserialize, Serialize};
+
+use super::step::{Stepper, Tolerance};
+use super::{Dopri5, Lsoda, Radau5, Taylor};
+
+/// An integration method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// LSODA: Adams and BDF with automatic switching, the default NDSolve of the paper's day.
+    Lsoda,
+    /// Dormand-Prince 5(4).
+    Dopri5,
+    /// Radau IIA of order 5.
+    Radau5,
+    /// Taylor series that resolve the layer, in f64.
+    Taylor,
+    /// The same in double-double arithmetic, about 32 digits: the reference.
+    TaylorExtended,
+}
+
+/// Something that can be done with any stepper. A trait, because a stepper's type depends on the method.
+pub trait WithStepper<const N: usize> {
+    /// What comes of it.
+    type Answer;
+    /// Does it.
+    fn with<M: Stepper<N>>(self, stepper: M) -> Self::Answer;
+}
+
+impl Method {
+    /// Every method.
+    pub const ALL: [Method; 5] =
+        [Method::Lsoda, Method::Dopri5, Method::Radau5, Method::Taylor, Method::TaylorExtended];
+
+    /// The name on the command line, in files and in small print.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Lsoda => "lsoda",
+            Method::Dopri5 => "dopri5",
+            Method::Radau5 => "radau5",
+            Method::Taylor => "taylor",
+            Method::TaylorExtended => "taylor-extended",
+        }
+    }
+
+    /// Gives a fresh stepper of this method to `user`.
+    pub fn with_stepper<U: WithStepper<N>, const N: usize>(self, tolerance: Tolerance, user: U) -> U::Answer {
+        match self {
+            Method::Lsoda => user.with(Lsoda::new(tolerance)),
+            Method::Dopri5 => user.with(Dopri5::new(tolerance)),
+            Method::Radau5 => user.with(Radau5::new(tolerance)),
+            Method::Taylor => user.with(Taylor::new(tolerance)),
+            Method::TaylorExtended => user.with(Taylor::extended(tolerance)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::vector;
+
+    use super::*;
+    use crate::integrate::{Course, Ignore, Statistics, drive};
+    use crate::num::Elementary;
+    use crate::system::VectorField;
+    use nalgebra::SVector;
+
+    #[test]
+    fn names_are_those_of_files() {
+        for method in Method::ALL {
+            assert_eq!(serde_json::to_string(&method).unwrap(), format!("{:?}", method.name()));
+        }
+    }
+
+    /// x' = x^2 from 1: x = 1/(1 - t).
+    struct Growing;
+    impl VectorField<1> for Growing {
+        fn eval<S: Elementary>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
+            vector![x[0] * x[0]]
+        }
+    }
+
+    struct ToOneHalf;
+    impl WithStepper<1> for ToOneHalf {
+        type Answer = (f64, Statistics);
+        fn with<M: Stepper<1>>(self, mut stepper: M) -> Self::Answer {
+            let end = drive(&Growing, vector![1.0], &Course::to(0.5), &mut stepper, &mut Ignore, &()).unwrap();
+            (end.x[0], end.statistics)
+        }
+    }
+
+    #[test]
+    fn each_name_is_its_own_method() {
+        let tolerance = Tolerance { rtol: 1e-10, atol: 1e-10 };
+        let found = Method::ALL.map(|m| m.with_stepper(tolerance, ToOneHalf));
+        for (x, s) in &found {
+            assert!((x - 2.0).abs() < 1e-8, "{x} {s:?}");
+        }
+        for (i, a) in found.iter().enumerate() {
+            assert!(found[..i].iter().all(|b| a.1 != b.1 || a.0 != b.0), "two names do the same work: {found:?}");
+        }
+    }
+}
