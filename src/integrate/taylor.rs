@@ -14,8 +14,8 @@ use nalgebra::SVector;
 
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
 use crate::num::elementary::{exp, ln, pow};
-use crate::num::series::{Constants, FromDecimal, Program, Solution};
-use crate::num::{DoubleDouble, Scalar};
+use crate::num::series::{Constants, Solution};
+use crate::num::{DoubleDouble, FromDecimal, Scalar, Tape};
 use crate::system::VectorField;
 
 /// How far a step inside a layer may move the argument of its tanh.
@@ -59,7 +59,7 @@ pub struct Taylor<const N: usize, S = f64> {
     tolerance: Tolerance,
     statistics: Statistics,
     constants: Constants,
-    solution: Solution<S, N>,
+    solution: Solution<S>,
     order: usize,
     t: S,
     x: SVector<S, N>,
@@ -116,7 +116,7 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
             tolerance,
             statistics: Statistics { highest_order: order as u64, ..Statistics::default() },
             constants: Constants::Binary,
-            solution: Solution::new(order, Program::default(), Constants::Binary),
+            solution: Solution::new(order, &Tape::default(), Constants::Binary),
             order,
             t: S::zero(),
             x: zero,
@@ -167,8 +167,7 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
     }
 
     fn record<F: VectorField<N>>(&mut self, field: &F) {
-        let program = Program::record(|x| field.eval(x));
-        self.solution.set_program(program, self.constants);
+        self.solution.set_tape(&field.tape(), self.constants);
         self.statistics.evaluations += 1;
     }
 
@@ -284,7 +283,7 @@ impl<const N: usize, S: Precision> Stepper<N> for Taylor<N, S> {
 
     fn step<F: VectorField<N>>(&mut self, _: &F) -> Result<Step<'_, N>, Failure> {
         let (t0, x0) = (self.t.to_f64(), self.x.map(S::to_f64));
-        self.solution.expand(&self.x);
+        self.solution.expand(self.x.as_slice());
         // One evaluation of the series costs about as much as one of the right-hand side per degree.
         self.statistics.evaluations += self.order as u64;
 

@@ -84,24 +84,42 @@ impl DoubleDouble {
             return Self::from_f64(value);
         }
         // Rust prints the shortest digits that read back as the same number, on every platform.
-        let text = format!("{value:e}");
-        let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+        Self::from_digits(&format!("{value:e}")).unwrap_or(Self::from_f64(value))
+    }
+
+    /// The decimal number written as `text`: digits, point, exponent. `None` if it is not one. Digits beyond the 32nd or so are
+    /// rounded.
+    pub fn from_digits(text: &str) -> Option<Self> {
+        let (digits, exponent) = match text.split_once(['e', 'E']) {
+            Some((digits, exponent)) => (digits, exponent.parse::<i32>().ok()?),
+            None => (text, 0),
+        };
+        let unsigned = digits.strip_prefix(['-', '+']).unwrap_or(digits);
+        let mut exponent = exponent.clamp(-2000, 2000);
         let mut number = Self::zero();
-        let mut exponent: i32 = exponent.parse().unwrap_or(0);
-        let mut after_point = false;
-        for c in digits.chars() {
-            if let Some(digit) = c.to_digit(10) {
-                // At most 17 digits: exact.
-                number = number.times_f64(10.0).plus_f64(f64::from(digit));
-                exponent -= i32::from(after_point);
-            } else {
-                after_point |= c == '.';
+        let (mut after_point, mut any) = (false, false);
+        for c in unsigned.chars() {
+            match c {
+                '0'..='9' => {
+                    // Exact up to 31 digits.
+                    number = number.times_f64(10.0).plus_f64(f64::from(c as u8 - b'0'));
+                    exponent -= i32::from(after_point);
+                    any = true;
+                }
+                '.' if !after_point => after_point = true,
+                _ => return None,
             }
+        }
+        if !any {
+            return None;
+        }
+        if number.high == 0.0 {
+            return Some(number);
         }
         let ten = Self::from_f64(10.0);
         let power = (0..exponent.abs()).fold(Self::one(), |power, _| power * ten);
         let number = if exponent < 0 { number / power } else { number * power };
-        if value < 0.0 { -number } else { number }
+        Some(if digits.starts_with('-') { -number } else { number })
     }
 
     /// The nearest `f64`.
@@ -319,6 +337,62 @@ impl Elementary for DoubleDouble {
     fn cos(self) -> Self {
         self.sin_cos().1
     }
+    fn ln(self) -> Self {
+        if !(self.high > 0.0 && self.high.is_finite()) {
+            return Self::from_f64(super::elementary::ln(self.high));
+        }
+        if (self.high - 1.0).abs() < 0.1 {
+            // 2 atanh z, z = (x - 1)/(x + 1): keeps the relative precision where the logarithm is small. |z| < 0.053.
+            let z = (self - Self::one()) / (self + Self::one());
+            let square = z * z;
+            let (mut power, mut sum) = (z, z);
+            for n in 1..14 {
+                power = power * square;
+                sum += power / Self::from_f64(f64::from(2 * n + 1));
+            }
+            return sum.times_f64(2.0);
+        }
+        // One Newton step of exp(y) = x from the f64 logarithm doubles its 53 bits.
+        let y = Self::from_f64(super::elementary::ln(self.high));
+        // exp(-y) leaves the range before x does: through exp(-y/2).
+        let root = (-y).times_f64(0.5).exp();
+        y + (self * root * root - Self::one())
+    }
+    fn atan(self) -> Self {
+        if self.high.is_nan() || self.high == 0.0 {
+            return self;
+        }
+        if self.high.abs() > 1e33 {
+            // pi/2 - 1/x, and 1/x is below the last digit.
+            return if self.high < 0.0 { -Self::HALF_PI } else { Self::HALF_PI };
+        }
+        // One Newton step of tan(y) = x from the f64 arc tangent.
+        let y = Self::from_f64(super::elementary::atan(self.high));
+        let (sin, cos) = y.sin_cos();
+        y + (self * cos - sin) / (cos + self * sin)
+    }
+    fn erf(self) -> Self {
+        // 1 - erf x < exp(-x^2)/x: beyond this the nearest number is +-1.
+        if self.high.abs() >= 8.7 {
+            return Self::from_f64(1.0_f64.copysign(self.high));
+        }
+        if self.high.is_nan() {
+            return self;
+        }
+        // erf x = 2/sqrt(pi) exp(-x^2) sum of 2^n x^(2n+1)/(1 3 5 ... (2n+1)): no cancellation (Abramowitz & Stegun 7.1.6).
+        let square = self * self;
+        let (mut term, mut sum) = (self, self);
+        let mut n = 1.0;
+        while term.high.abs() > 1e-34 * sum.high.abs() {
+            term = (term * square).times_f64(2.0) / Self::from_f64(2.0 * n + 1.0);
+            sum += term;
+            n += 1.0;
+        }
+        (-square).exp() * sum * (Self::from_f64(2.0) / Self::PI.sqrt())
+    }
+    fn pi() -> Self {
+        Self::PI
+    }
     fn sign(self) -> Self {
         Self::from_f64(self.high.sign())
     }
@@ -375,6 +449,22 @@ mod tests {
         is(dd(10.0).cos(), -0.8390715290764524, -1.4147119988953418e-17);
         is(dd(-22.5).sin(), 0.4871745124605095, 3.1743994890493315e-18);
         is(dd(-22.5).cos(), -0.8733046400935156, -1.3966221885427957e-17);
+        is(dd(2.0).ln(), 0.6931471805599453, 2.3190468138462996e-17);
+        is(dd(10.0).ln(), 2.302585092994046, -2.1707562233822494e-16);
+        is(dd(1.0625).ln(), 0.06062462181643484, 2.6424025938726934e-18);
+        is(dd(0.9990234375).ln(), -0.0009770396478266127, -4.348919509358116e-20);
+        is(dd(1e-300).ln(), -690.7755278982137, -2.3670096176709832e-14);
+        is(dd(1e+300).ln(), 690.7755278982137, 2.3747660028800243e-14);
+        is(dd(1.0).atan(), 0.7853981633974483, 3.061616997868383e-17);
+        is(dd(0.25).atan(), 0.24497866312686414, 1.0698755618734451e-17);
+        is(dd(-3.0).atan(), -1.2490457723982544, 2.196203799612311e-18);
+        is(dd(10000000000.0).atan(), 1.5707963266948965, 6.950637705727703e-17);
+        is(dd(1e-05).atan(), 9.999999999666668e-06, -4.575803486027043e-22);
+        is(dd(0.5).erf(), 0.5204998778130465, 1.900077467916287e-17);
+        is(dd(0.001).erf(), 0.0011283787909692365, -7.88735357945236e-20);
+        is(dd(-2.0).erf(), -0.9953222650189527, -2.20719858329765e-17);
+        is(dd(5.0).erf(), 0.9999999999984626, -2.294992711807301e-17);
+        is(dd(8.0).erf(), 1.0, -1.1224297172982926e-29);
     }
 
     #[test]
@@ -459,6 +549,21 @@ mod tests {
         }
 
         #[test]
+        fn logarithm_arc_tangent_error_function(a in any(), b in any()) {
+            prop_assume!(a.high.abs() > 1e-3 && b.high.abs() > 1e-3);
+            let sum = a.abs().ln() + b.abs().ln();
+            prop_assert!(((a * b).abs().ln() - sum).high.abs() < 64.0 * U * (1.0 + sum.high.abs()));
+            let t = a.atan();
+            prop_assert!(gap(t.sin(), a * t.cos()) < 32.0 * U);
+            prop_assert_eq!((-a).erf(), -a.erf());
+            // The derivative, by a difference that double-double precision affords.
+            let h = dd(1e-10);
+            let slope = ((a + h).erf() - (a - h).erf()) / dd(2e-10);
+            let want = (-(a * a)).exp() * dd(2.0) / DoubleDouble::PI.sqrt();
+            prop_assert!((slope - want).high.abs() < 1e-18, "{:?} {:?}", slope, want);
+        }
+
+        #[test]
         fn tanh_doubles(a in any(), small in -0.2..0.2_f64) {
             for a in [a, dd(small)] {
                 prop_assume!(a.high != 0.0);
@@ -474,6 +579,8 @@ mod tests {
             for (extended, plain) in [
                 (dd(a).exp(), Elementary::exp(a)), (dd(a).sin(), Elementary::sin(a)),
                 (dd(a).cos(), Elementary::cos(a)), (dd(a).tanh(), Elementary::tanh(a)),
+                (dd(a).atan(), Elementary::atan(a)), (dd(a).erf(), Elementary::erf(a)),
+                (dd(a).abs().ln(), Elementary::ln(a.abs())),
             ] {
                 prop_assert!((extended.to_f64() - plain).abs() <= 4e-16 * plain.abs().max(1e-10), "{extended:?} {plain}");
             }

@@ -152,6 +152,19 @@ impl<S: Elementary, const N: usize> Elementary for Dual<S, N> {
         let r = self.value.sqrt();
         self.chain(r, S::from_f64(0.5) / r)
     }
+    fn ln(self) -> Self {
+        self.chain(self.value.ln(), S::one() / self.value)
+    }
+    fn atan(self) -> Self {
+        self.chain(self.value.atan(), S::one() / (S::one() + self.value * self.value))
+    }
+    fn erf(self) -> Self {
+        let slope = (-(self.value * self.value)).exp() * (S::from_f64(2.0) / S::pi().sqrt());
+        self.chain(self.value.erf(), slope)
+    }
+    fn pi() -> Self {
+        Self::constant(S::pi())
+    }
     fn sign(self) -> Self {
         Self::constant(self.value.sign())
     }
@@ -163,7 +176,12 @@ mod tests {
     use proptest::prelude::*;
 
     fn sample<S: Scalar>(x: S, y: S) -> S {
-        (x * y).sin() + (x / (y * y + S::one())).tanh() - (y - x).exp() * (x * x + S::one()).sqrt() + y.cos()
+        (x * y).sin() + (x / (y * y + S::one())).tanh() - (y - x).exp() * (x * x + S::one()).sqrt()
+            + y.cos()
+            + (x * x + S::one()).ln() * y.atan()
+            - (x - y).erf()
+            + (x + S::pi()).power(3).scale(0.01)
+            + (x * x + S::one()).power(-2)
     }
 
     proptest! {

@@ -33,6 +33,18 @@ pub fn ln(x: f64) -> f64 {
     libm::log(x)
 }
 
+/// Arc tangent, in radians, in [-pi/2, pi/2].
+#[inline]
+pub fn atan(x: f64) -> f64 {
+    libm::atan(x)
+}
+
+/// Error function, 2/sqrt(pi) times the integral of exp(-s^2) from 0 to x.
+#[inline]
+pub fn erf(x: f64) -> f64 {
+    libm::erf(x)
+}
+
 /// Base-10 logarithm.
 #[inline]
 pub fn log10(x: f64) -> f64 {
@@ -96,5 +108,7 @@ mod tests {
         // One ulp above the correctly rounded e: libm promises an error below one ulp, not correct rounding.
         assert_eq!(exp(1.0).to_bits(), std::f64::consts::E.to_bits() + 1);
         assert_eq!(ln(2.0).to_bits(), std::f64::consts::LN_2.to_bits());
+        assert_eq!(atan(1.0).to_bits(), std::f64::consts::FRAC_PI_4.to_bits());
+        assert_eq!(erf(0.5).to_bits(), 0.520_499_877_813_046_5_f64.to_bits());
     }
 }

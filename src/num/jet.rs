@@ -24,6 +24,14 @@ impl<const K: usize> Jet<K> {
         Self { c }
     }
 
+    /// The series f with w f' = a' and constant term `first`, a being `self`.
+    fn integrate_over(&self, first: f64, w: &Self) -> Self {
+        Self::recur(first, |k, f| {
+            let known: f64 = (1..k).map(|j| j as f64 * f[j] * w.c[k - j]).sum();
+            (k as f64 * self.c[k] - known) / w.c[0]
+        })
+    }
+
     /// f(self) from a recurrence: `next(k, f)` gives k f_k from the coefficients before it, `first` is f_0.
     fn recur(first: f64, mut next: impl FnMut(usize, &[f64; K]) -> f64) -> Self {
         let mut f = [0.0; K];
@@ -143,6 +151,22 @@ impl<const K: usize> Elementary for Jet<K> {
     fn cos(self) -> Self {
         sin_cos(&self).1
     }
+    fn ln(self) -> Self {
+        // a l' = a'
+        self.integrate_over(Elementary::ln(self.c[0]), &self)
+    }
+    fn atan(self) -> Self {
+        // (1 + a^2) t' = a'
+        self.integrate_over(Elementary::atan(self.c[0]), &(Self::one() + self * self))
+    }
+    fn erf(self) -> Self {
+        // e' = 2/sqrt(pi) exp(-a^2) a'
+        let slope = (-(self * self)).exp().scale(2.0 / Elementary::sqrt(std::f64::consts::PI));
+        Self::recur(Elementary::erf(self.c[0]), |k, _| (1..=k).map(|j| j as f64 * self.c[j] * slope.c[k - j]).sum())
+    }
+    fn pi() -> Self {
+        Self::constant(std::f64::consts::PI)
+    }
     fn sign(self) -> Self {
         Self::constant(self.c[0].sign())
     }
@@ -181,11 +205,13 @@ mod tests {
         let f = |x: f64| -> f64 {
             Elementary::tanh(x) * Elementary::exp(-x) + Elementary::sin(x) / (2.0 + Elementary::cos(x))
                 - Elementary::sqrt(1.5 + x)
+                + Elementary::ln(1.5 + x) * Elementary::atan(x) * Elementary::erf(x)
         };
         let mut x = Jet::<16>::constant(0.3);
         x.c[1] = 1.0;
         let one = Jet::constant(1.5);
-        let j = x.tanh() * (-x).exp() + x.sin() / (Jet::constant(2.0) + x.cos()) - (one + x).sqrt();
+        let j = x.tanh() * (-x).exp() + x.sin() / (Jet::constant(2.0) + x.cos()) - (one + x).sqrt()
+            + (one + x).ln() * x.atan() * x.erf();
         for s in [-0.1, 0.05, 0.12] {
             assert!((value(&j, s) - f(0.3 + s)).abs() < 1e-12, "{s}");
         }

@@ -5,6 +5,7 @@
 //! number, so that one definition serves plain evaluation, differentiation, power series and extended precision), and
 //! [`random`] (a named generator and our own map from bits to numbers).
 
+pub mod decimal;
 pub mod double_double;
 pub mod dual;
 pub mod elementary;
@@ -12,7 +13,10 @@ pub mod jet;
 pub mod random;
 pub mod scalar;
 pub mod series;
+pub mod tape;
 
+pub use decimal::{Decimal, FromDecimal};
 pub use double_double::DoubleDouble;
 pub use dual::Dual;
 pub use scalar::{Arithmetic, Elementary, Scalar};
+pub use tape::Tape;

@@ -65,12 +65,35 @@ pub trait Elementary: Arithmetic {
     fn cos(self) -> Self;
     /// Square root.
     fn sqrt(self) -> Self;
+    /// Natural logarithm.
+    fn ln(self) -> Self;
+    /// Arc tangent, in radians.
+    fn atan(self) -> Self;
+    /// Error function, 2/sqrt(pi) times the integral of exp(-s^2) from 0 to the number.
+    fn erf(self) -> Self;
+    /// pi, as exactly as the type can hold it.
+    fn pi() -> Self;
     /// -1 below zero, +1 from zero on; its derivative is zero.
     fn sign(self) -> Self;
     /// The absolute value; its derivative at 0 is taken as +1.
     #[inline]
     fn abs(self) -> Self {
         self * self.sign()
+    }
+    /// An integer power by multiplication, in an order that is part of the contract because it decides bits:
+    /// x^0 = 1, x^1 = x, x^(2m) = x^m x^m, x^(2m+1) = x^(2m) x, x^-n = 1/x^n.
+    fn power(self, exponent: i32) -> Self {
+        let n = exponent.unsigned_abs();
+        let result = match n {
+            0 => Self::one(),
+            1 => self,
+            _ => {
+                let half = self.power((n / 2) as i32);
+                let even = half * half;
+                if n.is_multiple_of(2) { even } else { even * self }
+            }
+        };
+        if exponent < 0 { Self::one() / result } else { result }
     }
 }
 
@@ -110,6 +133,22 @@ impl Elementary for f64 {
         elementary::sqrt(self)
     }
     #[inline]
+    fn ln(self) -> Self {
+        elementary::ln(self)
+    }
+    #[inline]
+    fn atan(self) -> Self {
+        elementary::atan(self)
+    }
+    #[inline]
+    fn erf(self) -> Self {
+        elementary::erf(self)
+    }
+    #[inline]
+    fn pi() -> Self {
+        std::f64::consts::PI
+    }
+    #[inline]
     fn sign(self) -> Self {
         if self < 0.0 { -1.0 } else { 1.0 }
     }
@@ -119,5 +158,20 @@ impl Scalar for f64 {
     #[inline]
     fn to_f64(self) -> f64 {
         self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn powers_multiply_in_the_documented_order() {
+        let x = 1.1_f64;
+        let (x2, x3) = (x * x, x * x * x);
+        for (n, want) in [(0, 1.0), (1, x), (2, x2), (3, x3), (4, x2 * x2), (5, x2 * x2 * x), (7, x3 * x3 * x)] {
+            assert_eq!(Elementary::power(x, n).to_bits(), want.to_bits(), "{n}");
+            assert_eq!(Elementary::power(x, -n).to_bits(), (1.0 / want).to_bits(), "-{n}");
+        }
     }
 }

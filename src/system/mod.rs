@@ -18,9 +18,12 @@ pub mod stick_slip;
 pub mod transition;
 pub mod wheel;
 
+use std::sync::Arc;
+
 use nalgebra::{SMatrix, SVector};
 
-use crate::num::{Dual, Elementary};
+use crate::num::tape::Recorded;
+use crate::num::{Dual, Elementary, Tape};
 
 pub use caricature::Caricature;
 pub use hysteretic::{Hysteretic, Relaxation};
@@ -36,6 +39,11 @@ pub use wheel::Wheel;
 pub trait VectorField<const N: usize>: Sync {
     /// The right-hand side f(x).
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
+    /// The right-hand side as data. Made by recording [`VectorField::eval`], unless the equation is data already.
+    fn tape(&self) -> Arc<Tape> {
+        let record = |x: &[Recorded]| self.eval(&SVector::<_, N>::from_column_slice(x)).as_slice().to_vec();
+        Arc::new(Tape::record(N, record))
+    }
 }
 
 /// A system that switches between two smooth vector fields on the surface h = 0 (the paper's eq. 3).
