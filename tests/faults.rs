@@ -155,7 +155,7 @@ fn blessing_needs_a_reason() {
 }
 
 fn figure(name: &str, arguments: &[&str]) -> Output {
-    Command::cargo_bin(name).unwrap().args(arguments).output().unwrap()
+    Command::cargo_bin("twofold").unwrap().args(["figure", name, "--fresh"]).args(arguments).output().unwrap()
 }
 
 #[test]
@@ -191,9 +191,9 @@ fn a_shortened_picture_has_another_name_and_says_so() {
 #[test]
 fn a_killed_run_leaves_only_whole_files() {
     let folder = tempfile::tempdir().unwrap();
-    let program = assert_cmd::cargo::cargo_bin("fig6");
+    let program = assert_cmd::cargo::cargo_bin("twofold");
     let mut child = std::process::Command::new(program)
-        .args(["--quiet", "--out", folder.path().to_str().unwrap(), "--threads", "1"])
+        .args(["figure", "fig6", "--fresh", "--quiet", "--out", folder.path().to_str().unwrap(), "--threads", "1"])
         .spawn()
         .unwrap();
     // Kill it as soon as its first picture's files begin to appear.

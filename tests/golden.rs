@@ -1,15 +1,12 @@
 //! Golden tests: the committed hashes, recomputed. The figures that take a second are checked here, in whatever profile the tests
 //! run (they were blessed in release); `make check` recomputes all of them.
 
-#[allow(dead_code, missing_docs)] // each figure's `main` is for its own binary
-#[path = "../figures/catalogue.rs"]
-mod catalogue;
-
 use std::fs;
 use std::path::Path;
 
 use twofold::cli::in_pool;
 use twofold::job::Desk;
+use twofold::paper::figures;
 use twofold::paper::pipeline::{Computed, compute, questions};
 use twofold::paper::{Alterations, Figure};
 use twofold::record::{Hash, Manifest};
@@ -22,7 +19,7 @@ fn manifest(figure: &Figure) -> Manifest {
 
 /// The figures that are cheap enough for every test run.
 fn quick() -> impl Iterator<Item = Figure> {
-    catalogue::all().into_iter().filter(|f| QUICK.contains(&f.id))
+    figures::all().into_iter().filter(|f| QUICK.contains(&f.id))
 }
 
 const QUICK: [&str; 7] = ["fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "workprecision"];
@@ -43,7 +40,7 @@ fn golden_quick_figures_have_the_committed_hashes() {
 
 #[test]
 fn golden_every_figure_has_a_reference_and_its_picture() {
-    for figure in catalogue::all() {
+    for figure in figures::all() {
         let expected = manifest(&figure);
         for picture in &figure.pictures {
             let entry = expected.picture(&picture.name).unwrap_or_else(|| panic!("{} is not blessed", picture.name));
@@ -72,7 +69,7 @@ fn short(figure: &Figure) -> Figure {
 
 fn all_hashes(threads: usize) -> Vec<String> {
     in_pool(threads, || {
-        let pictures: Vec<_> = catalogue::all().iter().flat_map(|f| short(f).pictures).collect();
+        let pictures: Vec<_> = figures::all().iter().flat_map(|f| short(f).pictures).collect();
         let desk = Desk::quiet();
         desk.gather(&questions(&pictures));
         pictures
@@ -96,7 +93,7 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
 
 #[test]
 fn a_changed_question_changes_every_layer_it_should() {
-    let figure = catalogue::all().into_iter().find(|f| f.id == "fig6").unwrap();
+    let figure = figures::all().into_iter().find(|f| f.id == "fig6").unwrap();
     let base = &short(&figure).pictures[0];
     let mut other = base.clone();
     other.panels[0].run.start[0] += 1e-6;
@@ -110,7 +107,7 @@ fn a_changed_question_changes_every_layer_it_should() {
 
 #[test]
 fn specs_survive_json() {
-    for picture in catalogue::all().iter().flat_map(|f| &f.pictures) {
+    for picture in figures::all().iter().flat_map(|f| &f.pictures) {
         for panel in &picture.panels {
             let text = serde_json::to_string(&panel.run).unwrap();
             let back: twofold::job::spec::RunSpec = serde_json::from_str(&text).unwrap();

@@ -132,8 +132,11 @@ fn text_for_people_says_the_same_and_steers_no_terminal() {
 fn published_pictures_are_checked_rung_by_rung() {
     let folder = tempfile::tempdir().unwrap();
     let made = folder.path().join("made");
-    let output =
-        Command::cargo_bin("fig6").unwrap().args(["--quiet", "--out", made.to_str().unwrap()]).output().unwrap();
+    let output = Command::cargo_bin("twofold")
+        .unwrap()
+        .args(["figure", "fig6", "--fresh", "--quiet", "--out", made.to_str().unwrap()])
+        .output()
+        .unwrap();
     assert!(output.status.success());
     let published = folder.path().join("published");
     let name = "fig6-printed.png";

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use twofold::cli::progress::Progress;
 use twofold::cli::{in_pool, print};
 use twofold::job::Desk;
+use twofold::paper::figures;
 use twofold::paper::pipeline::{PictureRecord, compute, questions};
 use twofold::record::{self, Manifest};
 
-use super::{Outcome, Problem, catalogue, published};
+use super::{Outcome, Problem, published};
 
 /// Recompute figures and compare spec, data, pixels and files with the committed manifests; exit code 1 on a difference.
 #[derive(Debug, clap::Args)]
@@ -128,7 +129,7 @@ fn read_manifest(path: &Path) -> Result<Manifest, Problem> {
 
 /// The figures of these names, or all.
 pub fn chosen(names: &[String]) -> Result<Vec<twofold::paper::Figure>, Problem> {
-    let all = catalogue::all();
+    let all = figures::all();
     if let Some(unknown) = names.iter().find(|n| !all.iter().any(|f| f.id == *n)) {
         let known: Vec<&str> = all.iter().map(|f| f.id).collect();
         return Err(format!("there is no figure \"{unknown}\"; choose among {}", known.join(", ")).into());

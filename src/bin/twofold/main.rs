@@ -1,9 +1,6 @@
 //! `twofold`: compute any run; check, bless, inspect and report on the published figures.
 
 mod bless;
-#[allow(dead_code, missing_docs)] // each figure's `main` is for its own binary
-#[path = "../../../figures/catalogue.rs"]
-mod catalogue;
 mod check;
 mod figure;
 mod inspect;
