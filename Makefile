@@ -12,7 +12,7 @@ help: ## this list
 
 figures: ## compute every figure at full length into target/figures
 	@$(CARGO) build --release --locked --bins
-	@set -e; for f in $(FIGURES); do $(RUN) --bin $$f; done
+	@$(RUN) --bin twofold -- figure
 	@$(RUN) --bin twofold -- report
 
 report: ## one page about what stands in target/figures: target/figures/index.html

@@ -4,7 +4,7 @@
 //   node scripts/browser_test.mjs [--bins DIR] [--screenshots DIR] [--require]
 //
 // Needs Node 18 or later and a Chromium or Chrome (found on PATH, or named by $CHROMIUM); no npm packages: the browser is spoken to
-// over a pipe. Without a browser that starts it says so and exits with 0, with --require with 1. --bins: where twofold, fig2 and fig6
+// over a pipe. Without a browser that starts it says so and exits with 0, with --require with 1. --bins: where twofold
 // are, target/release if not given.
 import { spawn, spawnSync, execFileSync } from 'node:child_process';
 import { cpSync, existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
@@ -66,13 +66,12 @@ function squarePng(width, height) {
 function prepare(folder) {
   const bins = argument('--bins') ?? join(root, 'target', 'release');
   const binary = (name) => join(bins, name);
-  for (const name of ['fig2', 'fig6', 'twofold']) {
+  for (const name of ['twofold']) {
     if (!existsSync(binary(name))) throw new Error(`${name} is not built; run: cargo build --release --bins`);
   }
   const figures = join(folder, 'made');
   const expected = join(folder, 'expected');
-  execFileSync(binary('fig2'), ['--out', figures, '--quiet']);
-  execFileSync(binary('fig6'), ['--out', figures, '--quiet']);
+  execFileSync(binary('twofold'), ['figure', 'fig2', 'fig6', '--fresh', '--out', figures, '--quiet']);
   let forced = null;
   for (const id of readdirSync(figures)) {
     mkdirSync(join(expected, id), { recursive: true });

@@ -55,15 +55,25 @@
 //! ```
 #![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
 
+// The figures' files, which stand in figures/, call the library by its name.
+#[cfg(feature = "figures")]
+extern crate self as twofold;
+
 pub mod analyse;
+#[cfg(feature = "cli")]
 pub mod cli;
+#[cfg(feature = "figures")]
 pub mod compare;
+#[cfg(feature = "figures")]
 pub mod draw;
 pub mod integrate;
 pub mod job;
 pub mod num;
+#[cfg(feature = "figures")]
 pub mod paper;
 pub mod record;
+#[cfg(feature = "figures")]
 pub mod render;
+#[cfg(feature = "figures")]
 pub mod report;
 pub mod system;

@@ -1,16 +1,14 @@
 //! The findings that the project stands on, at full length: SCIENCE's reference orbits in the figures as they are.
 
-#[allow(dead_code, missing_docs)]
-#[path = "../figures/catalogue.rs"]
-mod catalogue;
-
 use twofold::analyse::{Crossing, Direction};
-use twofold::job::simulate::{Data, simulate};
+use twofold::job::recording::Data;
+use twofold::job::simulate::simulate;
 use twofold::paper::Reading;
+use twofold::paper::figures;
 
 /// The late half of every panel of fig. 7 in a reading.
 fn late_halves(reading: Reading) -> Vec<Vec<Crossing>> {
-    let figure = catalogue::all().into_iter().find(|f| f.id == "fig7").unwrap();
+    let figure = figures::all().into_iter().find(|f| f.id == "fig7").unwrap();
     let picture = figure.pictures.into_iter().find(|p| p.reading == Some(reading)).unwrap();
     picture
         .panels

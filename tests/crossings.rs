@@ -2,7 +2,8 @@
 
 use twofold::analyse::Direction;
 use twofold::integrate::{Schedule, StepCap, Tolerance};
-use twofold::job::simulate::{Data, simulate};
+use twofold::job::recording::Data;
+use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::system::Caricature;
 

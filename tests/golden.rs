@@ -1,16 +1,13 @@
 //! Golden tests: the committed hashes, recomputed. The figures that take a second are checked here, in whatever profile the tests
 //! run (they were blessed in release); `make check` recomputes all of them.
 
-#[allow(dead_code, missing_docs)] // each figure's `main` is for its own binary
-#[path = "../figures/catalogue.rs"]
-mod catalogue;
-
 use std::fs;
 use std::path::Path;
 
 use twofold::cli::in_pool;
-use twofold::cli::progress::Progress;
-use twofold::paper::pipeline::{Computed, compute};
+use twofold::job::Desk;
+use twofold::paper::figures;
+use twofold::paper::pipeline::{Computed, compute, questions};
 use twofold::paper::{Alterations, Figure};
 use twofold::record::{Hash, Manifest};
 
@@ -22,18 +19,19 @@ fn manifest(figure: &Figure) -> Manifest {
 
 /// The figures that are cheap enough for every test run.
 fn quick() -> impl Iterator<Item = Figure> {
-    catalogue::all().into_iter().filter(|f| QUICK.contains(&f.id))
+    figures::all().into_iter().filter(|f| QUICK.contains(&f.id))
 }
 
 const QUICK: [&str; 7] = ["fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "workprecision"];
 
 #[test]
 fn golden_quick_figures_have_the_committed_hashes() {
+    let desk = Desk::quiet();
     for figure in quick() {
         let expected = manifest(&figure);
         assert_eq!(expected.pictures.len(), figure.pictures.len(), "{}", figure.id);
         for picture in &figure.pictures {
-            let actual = compute(picture, &Progress::new(true)).unwrap().record.hashes;
+            let actual = compute(picture, &desk).unwrap().record.hashes;
             let difference = expected.picture(&picture.name).unwrap().first_difference(&actual);
             assert_eq!(difference, None, "{} differs", picture.name);
         }
@@ -42,7 +40,7 @@ fn golden_quick_figures_have_the_committed_hashes() {
 
 #[test]
 fn golden_every_figure_has_a_reference_and_its_picture() {
-    for figure in catalogue::all() {
+    for figure in figures::all() {
         let expected = manifest(&figure);
         for picture in &figure.pictures {
             let entry = expected.picture(&picture.name).unwrap_or_else(|| panic!("{} is not blessed", picture.name));
@@ -71,11 +69,13 @@ fn short(figure: &Figure) -> Figure {
 
 fn all_hashes(threads: usize) -> Vec<String> {
     in_pool(threads, || {
-        catalogue::all()
+        let pictures: Vec<_> = figures::all().iter().flat_map(|f| short(f).pictures).collect();
+        let desk = Desk::quiet();
+        desk.gather(&questions(&pictures));
+        pictures
             .iter()
-            .flat_map(|f| short(f).pictures)
             .map(|p| {
-                let Computed { record, tables, .. } = compute(&p, &Progress::new(true)).unwrap();
+                let Computed { record, tables, .. } = compute(p, &desk).unwrap();
                 let tables: Vec<Hash> = tables.iter().map(|(_, bytes)| Hash::of(bytes)).collect();
                 format!("{:?} {tables:?}", record.hashes)
             })
@@ -93,11 +93,11 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
 
 #[test]
 fn a_changed_question_changes_every_layer_it_should() {
-    let figure = catalogue::all().into_iter().find(|f| f.id == "fig6").unwrap();
+    let figure = figures::all().into_iter().find(|f| f.id == "fig6").unwrap();
     let base = &short(&figure).pictures[0];
     let mut other = base.clone();
     other.panels[0].run.start[0] += 1e-6;
-    let hashes = |p| compute(p, &Progress::new(true)).unwrap().record.hashes;
+    let hashes = |p| compute(p, &Desk::quiet()).unwrap().record.hashes;
     let (a, b) = (hashes(base), hashes(&other));
     let difference = a.first_difference(&b).unwrap();
     assert_eq!(difference.layer, twofold::record::Layer::Spec);
@@ -107,7 +107,7 @@ fn a_changed_question_changes_every_layer_it_should() {
 
 #[test]
 fn specs_survive_json() {
-    for picture in catalogue::all().iter().flat_map(|f| &f.pictures) {
+    for picture in figures::all().iter().flat_map(|f| &f.pictures) {
         for panel in &picture.panels {
             let text = serde_json::to_string(&panel.run).unwrap();
             let back: twofold::job::spec::RunSpec = serde_json::from_str(&text).unwrap();

@@ -10,7 +10,7 @@ use assert_cmd::Command;
 use common::{copy, figures, small_figure, write_references};
 use serde_json::Value;
 use twofold::cli;
-use twofold::cli::progress::Progress;
+use twofold::job::Desk;
 use twofold::render::{decode_png, encode_png};
 
 fn twofold(arguments: &[&str]) -> Output {
@@ -77,8 +77,8 @@ fn the_manifests_know_the_committed_file_from_others() {
     }
     // The same name and an unbroken seal, other numbers: made by another program, or forged.
     let other = folder.path().join("other");
-    cli::make(&small_figure(40.0), &other, &Progress::new(true)).unwrap();
-    let (code, said) = inspect(&other.join("fig7-printed.png"), &expected);
+    cli::make(&[small_figure(40.0)], &other, &Desk::quiet()).unwrap();
+    let (code, said) = inspect(&other.join("fig7/fig7-printed.png"), &expected);
     assert_eq!((code, said["seal"].as_str()), (1, Some("intact")), "{said}");
     assert_eq!(said["committed"]["state"], "different");
     // The same pixels in a file without provenance.
@@ -92,8 +92,8 @@ fn the_manifests_know_the_committed_file_from_others() {
     let mut altered = small_figure(50.0);
     altered.pictures.truncate(1);
     altered.pictures[0].name = "fig7-printed-shortened".into();
-    cli::make(&altered, &other, &Progress::new(true)).unwrap();
-    let (code, said) = inspect(&other.join("fig7-printed-shortened.png"), &expected);
+    cli::make(&[altered], &other, &Desk::quiet()).unwrap();
+    let (code, said) = inspect(&other.join("fig7/fig7-printed-shortened.png"), &expected);
     assert_eq!((code, &said["committed"]["state"]), (0, &"unlisted".into()), "{said}");
 }
 
@@ -132,8 +132,11 @@ fn text_for_people_says_the_same_and_steers_no_terminal() {
 fn published_pictures_are_checked_rung_by_rung() {
     let folder = tempfile::tempdir().unwrap();
     let made = folder.path().join("made");
-    let output =
-        Command::cargo_bin("fig6").unwrap().args(["--quiet", "--out", made.to_str().unwrap()]).output().unwrap();
+    let output = Command::cargo_bin("twofold")
+        .unwrap()
+        .args(["figure", "fig6", "--fresh", "--quiet", "--out", made.to_str().unwrap()])
+        .output()
+        .unwrap();
     assert!(output.status.success());
     let published = folder.path().join("published");
     let name = "fig6-printed.png";

@@ -2,7 +2,8 @@
 
 use nalgebra::vector;
 use twofold::integrate::{Schedule, StepCap, Tolerance};
-use twofold::job::simulate::{Data, simulate};
+use twofold::job::recording::Data;
+use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::paper::Reading;
 use twofold::system::caricature::MinusSign;

@@ -2,7 +2,8 @@
 //! compared, never points.
 
 use twofold::integrate::{Schedule, StepCap, Tolerance};
-use twofold::job::simulate::{Data, simulate};
+use twofold::job::recording::Data;
+use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::system::Wheel;
 use twofold::system::filippov::two_fold;

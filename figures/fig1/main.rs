@@ -1,39 +1,5 @@
-//! Fig. 1: the wheel assembly. A reconstruction: see `twofold::system::wheel`.
+//! Makes the figure: every number of it stands in figure.rs beside this.
 
-use serde_json::json;
-use twofold::cli;
-use twofold::draw::sketch::assembly;
-use twofold::paper::{Figure, Picture, Study, View};
-use twofold::system::Wheel;
-
-/// Where on its line the wheel is drawn.
-const R: f64 = 0.69267;
-
-/// The figure's specification.
-pub fn figure() -> Figure {
-    Figure {
-        id: "fig1",
-        title: "The wheel assembly",
-        pictures: vec![Picture {
-            name: "fig1".into(),
-            reading: None,
-            title: "The wheel assembly",
-            caption: "The wheel assembly from above, to scale: a disc that turns at ω₀; a housing on it that turns at ω; in the housing \
-                      a line at distance d from the axle, on which a wheel rolls at an angle γ, held by a spring and a damper. The \
-                      slip h along the wheel's axle is the switching function. Our own reconstruction."
-                .into(),
-            view: View::Study(Study {
-                question: || json!({ "wheel": Wheel::default(), "r": R }),
-                compute: || Ok(assembly::tables(&Wheel::default(), R)),
-                draw: assembly::draw,
-            }),
-            panels: Vec::new(),
-            alterations: Vec::new(),
-        }],
-    }
-}
-
-/// Makes the figure.
-pub fn main() -> std::process::ExitCode {
-    cli::main(figure())
+fn main() -> std::process::ExitCode {
+    twofold::cli::main(twofold::paper::figures::fig1::figure())
 }

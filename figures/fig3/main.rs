@@ -1,40 +1,5 @@
-//! Fig. 3: the two-fold (Teixeira) singularity of the normal form (4).
+//! Makes the figure: every number of it stands in figure.rs beside this.
 
-use serde_json::json;
-use twofold::cli;
-use twofold::draw::sketch::portrait;
-use twofold::paper::{Figure, Picture, Study, View};
-
-/// The constants v, w < 0 with vw > 1: the paper's v+ and v-.
-const V: f64 = -1.2;
-/// See [`V`].
-const W: f64 = -1.4;
-
-/// The figure's specification.
-pub fn figure() -> Figure {
-    Figure {
-        id: "fig3",
-        title: "The two-fold singularity",
-        pictures: vec![Picture {
-            name: "fig3".into(),
-            reading: None,
-            title: "The two-fold singularity",
-            caption: "The surface x = 0 of the normal form (4) about its two-fold. Orbits cross where both fields point to the same \
-                      side; where they oppose, orbits slide: into the singularity where sliding attracts, out of it where \
-                      sliding repels."
-                .into(),
-            view: View::Study(Study {
-                question: || json!({ "normal-form": { "v": V, "w": W } }),
-                compute: || portrait::tables(V, W),
-                draw: |tables| portrait::draw(tables, V, W),
-            }),
-            panels: Vec::new(),
-            alterations: Vec::new(),
-        }],
-    }
-}
-
-/// Makes the figure.
-pub fn main() -> std::process::ExitCode {
-    cli::main(figure())
+fn main() -> std::process::ExitCode {
+    twofold::cli::main(twofold::paper::figures::fig3::figure())
 }

@@ -1,55 +1,5 @@
-//! Fig. 4: the mechanism of non-deterministic chaos, computed: a singularity with one way in, and its many ways out that come
-//! back.
+//! Makes the figure: every number of it stands in figure.rs beside this.
 
-use twofold::cli;
-use twofold::integrate::filippov::ExitRule;
-use twofold::integrate::{Schedule, StepCap, Tolerance};
-use twofold::job::spec::*;
-use twofold::paper::{Camera, Figure, Panel, Reading, View};
-
-/// The figure's specification.
-pub fn figure() -> Figure {
-    Figure::in_both_readings(
-        "fig4",
-        "One way in, many ways out, and back",
-        View::Space { camera: Camera { axes: [1, 2, 0], azimuth: -60.0, elevation: 18.0 } },
-        |_| {
-            "The orbit from (0.2, 0, −1) reaches the two-fold; from there its future is a set. Five exit times from the repelling \
-             region, each to both sides, followed until they come back to the two-fold; the foot says how many have within the time shown. \
-             All these orbits pass through one point."
-                .into()
-        },
-        |reading| {
-            let (longest, horizon) = match reading {
-                Reading::Printed => (2.0, 60.0),
-                Reading::Reconstructed => (0.8, 16.0),
-            };
-            vec![Panel::new(
-                "i",
-                "",
-                RunSpec {
-                    system: SystemSpec::Caricature(reading.caricature()),
-                    switch: SwitchSpec::Filippov {
-                        exit: ExitRule::All,
-                        funnel: Some(FunnelSpec { shortest: 0.1, longest, times: 5, horizon, until_two_fold: true }),
-                    },
-                    start: [0.2, 0.0, -1.0],
-                    t_end: 100.0,
-                    method: MethodSpec {
-                        name: Method::Dopri5,
-                        tolerance: Tolerance { rtol: 1e-12, atol: 1e-12 },
-                        step_cap: StepCap::None,
-                        max_steps: DEFAULT_MAX_STEPS,
-                    },
-                    schedule: Schedule::default(),
-                    observe: Observation::Path { chord: 1e-3 },
-                },
-            )]
-        },
-    )
-}
-
-/// Makes the figure.
-pub fn main() -> std::process::ExitCode {
-    cli::main(figure())
+fn main() -> std::process::ExitCode {
+    twofold::cli::main(twofold::paper::figures::fig4::figure())
 }

@@ -1,48 +1,5 @@
-//! Fig. 7: Poincare sections of the smoothed system, restarted after every interval.
+//! Makes the figure: every number of it stands in figure.rs beside this.
 
-use twofold::cli;
-use twofold::integrate::Schedule;
-use twofold::job::spec::*;
-use twofold::paper::verdict::{Claim, SectionClaim};
-use twofold::paper::{Figure, Panel, View};
-
-/// The figure's specification.
-pub fn figure() -> Figure {
-    Figure::in_both_readings(
-        "fig7",
-        "One system, one start, three iteration schemes",
-        View::Section { horizontal: 0, vertical: 2 },
-        |_| {
-            "Poincaré sections y = 0 of the smoothed system, integrated to t = 200000 in intervals of (i) 20, (ii) 40, \
-             (iii) 100 after each of which the integrator starts afresh. Early half faint, late half dark."
-                .into()
-        },
-        |reading| {
-            let panel = |label, interval| {
-                Panel::new(
-                    label,
-                    format!("interval {interval}"),
-                    RunSpec {
-                        system: SystemSpec::Caricature(reading.caricature()),
-                        switch: SwitchSpec::tanh(1e-3),
-                        start: [0.2, 0.0, -1.0],
-                        t_end: 2e5,
-                        method: MethodSpec::ndsolve_defaults(Method::Lsoda),
-                        schedule: Schedule { restart_every: Some(interval), kick: None },
-                        observe: Observation::Section { coordinate: 1, value: 0.0 },
-                    },
-                )
-            };
-            vec![
-                panel("i", 20.0).claimed(Claim::Section(SectionClaim::Period(1))),
-                panel("ii", 40.0).claimed(Claim::Section(SectionClaim::Period(3))),
-                panel("iii", 100.0).claimed(Claim::Section(SectionClaim::Chaos)),
-            ]
-        },
-    )
-}
-
-/// Makes the figure.
-pub fn main() -> std::process::ExitCode {
-    cli::main(figure())
+fn main() -> std::process::ExitCode {
+    twofold::cli::main(twofold::paper::figures::fig7::figure())
 }

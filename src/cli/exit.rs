@@ -4,7 +4,7 @@ use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use crate::job::simulate::RunError;
+use crate::job::JobError;
 use crate::job::spec::SpecError;
 use crate::paper::pipeline::PipelineError;
 use crate::record::FileError;
@@ -70,7 +70,7 @@ pub enum CliError {
     Spec(#[from] SpecError),
     /// A run failed.
     #[error(transparent)]
-    Run(#[from] RunError),
+    Job(#[from] JobError),
     /// A run or a drawing of a figure failed.
     #[error(transparent)]
     Pipeline(#[from] PipelineError),
@@ -108,9 +108,9 @@ pub enum CliError {
 impl CliError {
     /// The exit code.
     pub fn exit(&self) -> Exit {
-        let of_run = |e: &RunError| if matches!(e, RunError::Spec(_)) { Exit::Usage } else { Exit::Failed };
+        let of_job = |e: &JobError| if e.is_bad_question() { Exit::Usage } else { Exit::Failed };
         match self {
-            CliError::Run(source) | CliError::Pipeline(PipelineError::Run { source, .. }) => of_run(source),
+            CliError::Job(source) | CliError::Pipeline(PipelineError::Job { source, .. }) => of_job(source),
             CliError::Pipeline(PipelineError::Render { .. }) => Exit::Failed,
             CliError::Stopped { exit, .. } => *exit,
             CliError::Usage(_)

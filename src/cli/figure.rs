@@ -12,8 +12,9 @@ use super::words::{Method, Readings};
 use super::{CliError, Exit, LONG_VERSION, in_pool, interrupt};
 use crate::integrate::filippov::ExitRule;
 use crate::job::spec::{RunSpec, SwitchSpec};
-use crate::paper::pipeline::{Computed, PictureRecord, compute};
-use crate::paper::{Alterations, Figure};
+use crate::job::{Desk, Store};
+use crate::paper::pipeline::{Computed, PictureRecord, compute, questions};
+use crate::paper::{Alterations, Figure, Panel, Picture};
 use crate::record::files::{still_there, try_folder};
 use crate::record::{FileError, write};
 
@@ -21,6 +22,13 @@ use crate::record::{FileError, write};
 #[derive(Clone, Debug, Parser)]
 #[command(version, long_version = LONG_VERSION, after_help = Exit::HELP, max_term_width = 120)]
 struct Arguments {
+    #[command(flatten)]
+    flags: FigureFlags,
+}
+
+/// How figures are made.
+#[derive(Clone, Debug, clap::Args)]
+pub struct FigureFlags {
     /// Folder to write to; a folder named after the figure is made in it.
     #[arg(long, value_name = "DIR", default_value = "target/figures")]
     out: PathBuf,
@@ -42,6 +50,8 @@ struct Arguments {
     /// Another integration method; the picture is marked.
     #[arg(long, value_enum, value_name = "METHOD")]
     method: Option<Method>,
+    #[command(flatten)]
+    store: StoreFlags,
     /// Print what was made, with hashes and statistics, as JSON on standard output.
     #[arg(long)]
     json: bool,
@@ -49,8 +59,26 @@ struct Arguments {
     #[arg(long)]
     quiet: bool,
     /// Print the runs' specs as JSON and compute nothing; a single one can be given to `twofold run --spec`.
-    #[arg(long, conflicts_with_all = ["out", "threads", "json"])]
+    #[arg(long, conflicts_with_all = ["out", "threads", "json", "store", "fresh"])]
     print_spec: bool,
+}
+
+/// Where answers are kept, so that nothing is computed twice.
+#[derive(Clone, Debug, clap::Args)]
+pub struct StoreFlags {
+    /// Folder in which answers are kept for the next time.
+    #[arg(long, value_name = "DIR", default_value = "target/store")]
+    store: PathBuf,
+    /// Compute everything anew and keep nothing.
+    #[arg(long, conflicts_with = "store")]
+    fresh: bool,
+}
+
+impl StoreFlags {
+    /// The store that these flags ask for.
+    pub fn store(&self) -> Option<Store> {
+        (!self.fresh).then(|| Store::new(&self.store))
+    }
 }
 
 /// The definition of a figure's flags, with its own name, description and examples.
@@ -83,7 +111,7 @@ pub fn main(figure: Figure) -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => return super::commands::usage(&error).into(),
     };
-    match run(figure, arguments) {
+    match run(vec![figure], &arguments.flags) {
         Ok(()) => Exit::Fine.into(),
         Err(error) => {
             complain(&format!("error: {error}"));
@@ -92,35 +120,47 @@ pub fn main(figure: Figure) -> ExitCode {
     }
 }
 
-fn run(figure: Figure, arguments: Arguments) -> Result<(), CliError> {
-    let figure = select(figure, &arguments)?;
+/// Computes these figures and writes them, as the flags say.
+///
+/// # Errors
+///
+/// See [`CliError`].
+pub fn run(figures: Vec<Figure>, arguments: &FigureFlags) -> Result<(), CliError> {
+    refuse_idle(&figures, arguments)?;
+    let figures = figures.into_iter().map(|f| select(f, arguments)).collect::<Result<Vec<_>, _>>()?;
     if arguments.print_spec {
-        return print_specs(&figure);
+        return print_specs(&figures);
+    }
+    for figure in &figures {
+        try_folder(&arguments.out.join(figure.id))?;
     }
     let progress = Progress::new(arguments.quiet);
-    let folder = arguments.out.join(figure.id);
-    try_folder(&folder)?;
-    let records = in_pool(arguments.threads, || make(&figure, &folder, &progress))??;
+    let desk = Desk::new(arguments.store.store(), &progress);
+    let records = in_pool(arguments.threads, || make(&figures, &arguments.out, &desk))??;
     if arguments.json {
         print_json(&records)?;
     }
     Ok(())
 }
 
-/// Computes every picture and writes each as soon as it is finished: a killed run loses nothing finished.
+/// Makes these figures, each in a folder of its own under `out`: all their questions first, side by side, the longest first; then the
+/// pictures. Answers that the desk's store keeps are not lost if this is killed.
 ///
 /// # Errors
-/// If a run, a drawing or a write fails, or if what was written has been removed by the time that all is done.
-pub fn make(figure: &Figure, folder: &Path, progress: &Progress) -> Result<Vec<PictureRecord>, CliError> {
-    let results: Vec<Result<(PictureRecord, Vec<Written>), CliError>> = figure
-        .pictures
+///
+/// If a computation or a drawing failed, a file could not be written, or what was written has been removed by the time that all is done;
+/// what could be made is there all the same.
+pub fn make(figures: &[Figure], out: &Path, desk: &Desk<'_>) -> Result<Vec<PictureRecord>, CliError> {
+    desk.gather(&questions(figures.iter().flat_map(|f| &f.pictures)));
+    let pictures: Vec<(PathBuf, &Picture)> =
+        figures.iter().flat_map(|f| f.pictures.iter().map(|p| (out.join(f.id), p))).collect();
+    let results: Vec<Result<(PictureRecord, Vec<Written>), CliError>> = pictures
         .par_iter()
-        .map(|picture| {
-            let mut computed = compute(picture, progress)?;
-            computed.judge(picture)?;
+        .map(|(folder, picture)| {
+            let computed = compute(picture, desk)?;
             let written = write_picture(folder, &computed)?;
             let name = &computed.record.hashes.name;
-            progress.line(&format!("wrote {}", folder.join(format!("{name}.png")).display()));
+            desk.progress().line(&format!("wrote {}", folder.join(format!("{name}.png")).display()));
             Ok((computed.record, written))
         })
         .collect();
@@ -153,39 +193,57 @@ fn write_picture(folder: &Path, computed: &Computed) -> Result<Vec<Written>, Fil
     Ok(written)
 }
 
-/// The pictures and panels that were asked for, altered as asked for, and checked. A flag that would change nothing is refused.
-fn select(mut figure: Figure, arguments: &Arguments) -> Result<Figure, CliError> {
-    let id = figure.id;
-    let in_one_piece = figure.pictures.iter().all(|p| p.panels.is_empty());
+/// Refuses a flag that changes none of these figures.
+fn refuse_idle(figures: &[Figure], arguments: &FigureFlags) -> Result<(), CliError> {
+    let names: Vec<&str> = figures.iter().map(|f| f.id).collect();
+    let names = names.join(", ");
+    let pictures = || figures.iter().flat_map(|f| &f.pictures);
     let of_runs = [
         ("--only", arguments.only.is_some()),
         ("--method", arguments.method.is_some()),
         ("--t-end", arguments.t_end.is_some()),
         ("--print-spec", arguments.print_spec),
     ];
-    if let Some((flag, _)) = of_runs.into_iter().find(|(_, given)| *given && in_one_piece) {
-        return Err(CliError::no_effect(flag, format!("{id} is made in one piece, not of single runs; leave it out")));
+    if let Some((flag, _)) = of_runs.into_iter().find(|(_, given)| *given)
+        && pictures().all(|p| p.panels.is_empty())
+    {
+        return Err(CliError::no_effect(flag, format!("{names}: made in one piece, not of single runs; leave it out")));
     }
-    if arguments.reading.is_some() && figure.pictures.iter().all(|p| p.reading.is_none()) {
-        return Err(CliError::no_effect("--reading", format!("{id} is the same in every reading; leave it out")));
+    if arguments.reading.is_some() && pictures().all(|p| p.reading.is_none()) {
+        return Err(CliError::no_effect("--reading", format!("{names}: the same in every reading; leave it out")));
     }
+    let wanted = |panel: &&Panel| arguments.only.as_deref().is_none_or(|only| panel.label == label(only));
+    if arguments.seed.is_some() && !pictures().flat_map(|p| &p.panels).filter(wanted).any(|panel| is_random(&panel.run))
+    {
+        return Err(CliError::no_effect(
+            "--seed",
+            format!("{names}: nothing in what is to be made is random; leave it out"),
+        ));
+    }
+    Ok(())
+}
+
+/// "(ii)" and "ii" are the same panel.
+fn label(only: &str) -> &str {
+    only.trim_start_matches('(').trim_end_matches(')')
+}
+
+/// The pictures and panels that were asked for, altered as asked for, and checked.
+fn select(mut figure: Figure, arguments: &FigureFlags) -> Result<Figure, CliError> {
     if let Some(only) = &arguments.only {
-        let label = only.trim_start_matches('(').trim_end_matches(')');
+        let label = label(only);
         let mut known: Vec<String> = figure.pictures.iter().flat_map(|p| &p.panels).map(|p| p.label.clone()).collect();
         if !known.iter().any(|k| k == label) {
             known.sort_by_key(|k| (k.len(), k.clone()));
             known.dedup();
-            return Err(CliError::NoSuchPanel { panel: only.clone(), figure: id, known: known.join(", ") });
+            let known = if known.is_empty() { "none: it is made in one piece".into() } else { known.join(", ") };
+            return Err(CliError::NoSuchPanel { panel: only.clone(), figure: figure.id, known });
         }
         figure.pictures.retain(|p| p.panels.iter().any(|q| q.label == label));
         figure.pictures.iter_mut().for_each(|p| p.keep_only(label));
     }
     let readings = arguments.reading.unwrap_or_default();
     figure.pictures.retain(|p| readings.wants(p.reading));
-    if arguments.seed.is_some() && !figure.pictures.iter().flat_map(|p| &p.panels).any(|p| is_random(&p.run)) {
-        let what = if arguments.only.is_some() { "this panel" } else { id };
-        return Err(CliError::no_effect("--seed", format!("nothing in {what} is random; leave it out")));
-    }
     let alterations =
         Alterations { seed: arguments.seed, t_end: arguments.t_end, method: arguments.method.map(Into::into) };
     for picture in &mut figure.pictures {
@@ -202,10 +260,10 @@ fn is_random(run: &RunSpec) -> bool {
 }
 
 /// One spec alone, or several under their names.
-fn print_specs(figure: &Figure) -> Result<(), CliError> {
-    let specs: Vec<_> = figure
-        .pictures
+fn print_specs(figures: &[Figure]) -> Result<(), CliError> {
+    let specs: Vec<_> = figures
         .iter()
+        .flat_map(|figure| &figure.pictures)
         .flat_map(|picture| {
             picture.panels.iter().map(move |panel| (format!("{}-{}", picture.name, panel.label), panel.run))
         })
@@ -218,5 +276,28 @@ fn print_specs(figure: &Figure) -> Result<(), CliError> {
                 .map(|(name, run)| (name.clone(), serde_json::to_value(run).expect("specs are plain data")))
                 .collect::<serde_json::Map<_, _>>(),
         ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::paper::figures;
+
+    #[test]
+    fn each_figure_helps_in_its_own_words() {
+        for figure in figures::all() {
+            let mut command = command(&figure);
+            command.clone().debug_assert();
+            let (short, long) = (command.render_help().to_string(), command.render_long_help().to_string());
+            let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+            for text in [&short, &long] {
+                assert!(words(text).contains(&format!("{}: {}", figure.id, figure.title)), "{text}");
+                assert!(
+                    text.contains(&format!("{} --out pictures", figure.id)) && words(text).contains(Exit::HELP),
+                    "{text}"
+                );
+            }
+        }
     }
 }

@@ -7,7 +7,6 @@
 use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 
 use super::Exit;
-use crate::integrate::Watch;
 
 /// How many graces are asked for at present.
 static GRACES: AtomicUsize = AtomicUsize::new(0);
@@ -41,20 +40,6 @@ impl Grace {
 impl Drop for Grace {
     fn drop(&mut self) {
         GRACES.fetch_sub(1, Ordering::SeqCst);
-    }
-}
-
-/// A watch that also stops a run when a signal came.
-pub struct Stoppable<'a, W> {
-    /// Whose progress is shown.
-    pub watch: &'a W,
-    /// By which the signal is known.
-    pub grace: &'a Grace,
-}
-
-impl<W: Watch> Watch for Stoppable<'_, W> {
-    fn reached(&self, t: f64) -> bool {
-        self.watch.reached(t) && self.grace.asked_to_stop().is_none()
     }
 }
 

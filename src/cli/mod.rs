@@ -14,7 +14,7 @@ pub mod speak;
 pub mod words;
 
 pub use exit::{CliError, Exit};
-pub use figure::{main, make};
+pub use figure::{FigureFlags, main, make, run};
 pub use speak::{print, print_bytes};
 
 /// The most threads that can be asked for. More than this many never help here, and tens of thousands hang before they fail.

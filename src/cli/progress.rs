@@ -6,8 +6,11 @@ use std::time::{Duration, Instant};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use super::Exit;
+use super::interrupt::Grace;
 use super::speak::{complain, harmless};
 use crate::integrate::Watch;
+use crate::job;
 
 /// The bars on the screen, if there are any: a signal clears them away.
 static BARS: OnceLock<MultiProgress> = OnceLock::new();
@@ -23,6 +26,7 @@ pub(super) fn clear() {
 /// Shows how far runs have come.
 pub struct Progress {
     style: Style,
+    grace: Option<Grace>,
 }
 
 enum Style {
@@ -42,11 +46,20 @@ impl Progress {
         } else {
             Style::Lines
         };
-        Self { style }
+        Self { style, grace: None }
     }
 
-    /// Begins to show a run that goes to `t_end`.
-    pub fn run(&self, name: String, t_end: f64) -> RunProgress<'_> {
+    /// Runs shown here stop when a signal comes, so that what they have can be kept.
+    pub fn with_grace(quiet: bool) -> Self {
+        Self { grace: Some(Grace::new()), ..Self::new(quiet) }
+    }
+
+    /// The exit code of the signal for which runs shown here stop, if it came.
+    pub fn asked_to_stop(&self) -> Option<Exit> {
+        self.grace.as_ref().and_then(Grace::asked_to_stop)
+    }
+
+    fn run(&self, name: &str, t_end: f64) -> RunProgress<'_> {
         let bar = match &self.style {
             Style::Bars(bars) => {
                 let bar = bars.add(ProgressBar::new(RESOLUTION));
@@ -54,12 +67,12 @@ impl Progress {
                     ProgressStyle::with_template("{msg:<28} {wide_bar} {percent:>3} %  {eta:>4}")
                         .unwrap_or_else(|_| ProgressStyle::default_bar()),
                 );
-                bar.set_message(name.clone());
+                bar.set_message(name.to_owned());
                 Some(bar)
             }
             _ => None,
         };
-        RunProgress { progress: self, bar, name, t_end, begun: Instant::now() }
+        RunProgress { progress: self, bar, name: name.to_owned(), t_end, begun: Instant::now() }
     }
 
     /// One line for the user, above any bars.
@@ -87,9 +100,18 @@ pub struct RunProgress<'a> {
     begun: Instant,
 }
 
-impl RunProgress<'_> {
-    /// The run is over; `what` is said of it.
-    pub fn done(self, what: &str) {
+impl job::Progress for Progress {
+    fn begin<'a>(&'a self, label: &str, extent: f64) -> Box<dyn job::JobWatch + 'a> {
+        Box::new(self.run(label, extent))
+    }
+
+    fn line(&self, text: &str) {
+        Progress::line(self, text);
+    }
+}
+
+impl job::JobWatch for RunProgress<'_> {
+    fn done(self: Box<Self>, what: &str) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
@@ -102,7 +124,7 @@ impl Watch for RunProgress<'_> {
         if let Some(bar) = &self.bar {
             bar.set_position((t / self.t_end * RESOLUTION as f64) as u64);
         }
-        true
+        self.progress.asked_to_stop().is_none()
     }
 }
 

@@ -1,157 +1,378 @@
-//! Recorded numbers as bytes: little-endian bits for hashing, CSV and JSON for people.
+//! Answers as bytes, and back.
 //!
-//! Whatever was recorded is first laid out as a table of numbers and words; the three encodings are views of it.
+//! [`bits`] is what is hashed and what the store keeps; [`csv`] and [`json`] are for people and other programs. All three are views
+//! of the same [`Table`]s, and all three are read back by this file, with units and metadata: a table that comes back is equal to the one
+//! that went out, to the last bit.
 
-use std::fmt::Write as _;
-
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::simulate::{Data, Recording};
-use super::spec::RunSpec;
-use crate::analyse::{Direction, Motion};
-use crate::integrate::filippov::{Mode, ModeEvent, Side};
+use super::answer::Answer;
+use super::table::{Cells, Column, Kind, Table, Words};
+use crate::record::hash::canonical_json;
 
-/// A cell of a data table.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Cell {
-    Number(f64),
-    /// A word, and the number that stands for it among the hashed bits.
-    Word(&'static str, f64),
-    /// Nothing, where a column does not apply.
-    Blank,
+/// Bytes that are not what they claim to be.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("this is not a table of twofold's: {0}")]
+pub struct Malformed(pub String);
+
+fn malformed<T>(what: impl Into<String>) -> Result<T, Malformed> {
+    Err(Malformed(what.into()))
 }
 
-/// The columns' names and a row per recorded point.
-fn table(spec: &RunSpec, data: &Data) -> (Vec<&'static str>, Vec<Vec<Cell>>) {
-    let [a, b, c] = spec.system.coordinates();
-    let point = |t: f64, x: [f64; 3]| [t, x[0], x[1], x[2]].map(Cell::Number).to_vec();
-    let with = |mut row: Vec<Cell>, more: &[Cell]| {
-        row.extend_from_slice(more);
-        row
-    };
-    match data {
-        Data::Path(samples) => (vec!["t", a, b, c], samples.iter().map(|s| point(s.t, s.x)).collect()),
-        Data::Section(crossings) => (
-            vec!["t", a, b, c, "direction"],
-            crossings.iter().map(|k| with(point(k.t, k.x), &[direction(k.direction)])).collect(),
-        ),
-        Data::Motion(motion) => {
-            (vec!["t", a, b, c, "mode"], motion.samples().map(|(m, s)| with(point(s.t, s.x), &[mode(m)])).collect())
-        }
-        Data::Funnel { approach, futures } => {
-            let rows = |motion: &Motion, exit: [Cell; 2]| -> Vec<Vec<Cell>> {
-                motion.samples().map(|(m, s)| with(point(s.t, s.x), &[mode(m), exit[0], exit[1]])).collect()
-            };
-            let mut all = rows(approach, [Cell::Blank, Cell::Blank]);
-            for future in futures {
-                let side = match future.side {
-                    Side::Plus => Cell::Word("plus", 1.0),
-                    Side::Minus => Cell::Word("minus", -1.0),
-                };
-                all.extend(rows(&future.motion, [Cell::Number(future.exit_time), side]));
-            }
-            (vec!["t", a, b, c, "mode", "exit_time", "side"], all)
-        }
-    }
-}
-
-fn direction(direction: Direction) -> Cell {
-    Cell::Word(direction.word(), if direction == Direction::Up { 1.0 } else { -1.0 })
-}
-
-fn mode(mode: Mode) -> Cell {
-    match mode {
-        Mode::Plus => Cell::Word("plus", 1.0),
-        Mode::Minus => Cell::Word("minus", -1.0),
-        Mode::SlidingAttracting => Cell::Word("sliding-attracting", 2.0),
-        Mode::SlidingRepelling => Cell::Word("sliding-repelling", -2.0),
-    }
-}
-
-/// The events of a recording, approach first.
-fn events(data: &Data) -> Vec<&ModeEvent<3>> {
-    match data {
-        Data::Path(_) | Data::Section(_) => Vec::new(),
-        Data::Motion(motion) => motion.events.iter().collect(),
-        Data::Funnel { approach, futures } => {
-            approach.events.iter().chain(futures.iter().flat_map(|f| &f.motion.events)).collect()
-        }
-    }
-}
-
-fn event_json(event: &ModeEvent<3>) -> Value {
-    json!({
-        "t": event.t,
-        "state": <[f64; 3]>::from(event.state),
-        "event": event.kind,
-        "from": event.from,
-        "to": event.to,
-    })
-}
-
-/// The bytes that are hashed: every number as the little-endian bits of an f64, row after row; a word as the number that
-/// stands for it, a blank as not-a-number; then the events as canonical JSON.
-pub fn bits(spec: &RunSpec, data: &Data) -> Vec<u8> {
+/// The bytes that are hashed: table by table, column by column, little-endian. Names and units are part of them; all
+/// not-a-numbers are one.
+pub fn bits(tables: &[Table]) -> Vec<u8> {
     let mut bytes = Vec::new();
-    for cell in table(spec, data).1.iter().flatten() {
-        let number = match cell {
-            Cell::Number(v) | Cell::Word(_, v) => *v,
-            Cell::Blank => f64::NAN,
-        };
-        bytes.extend_from_slice(&number.to_bits().to_le_bytes());
-    }
-    for event in events(data) {
-        bytes.extend_from_slice(event_json(event).to_string().as_bytes());
+    let text = |bytes: &mut Vec<u8>, text: &str| {
+        bytes.extend_from_slice(&(text.len() as u64).to_le_bytes());
+        bytes.extend_from_slice(text.as_bytes());
+    };
+    bytes.extend_from_slice(&(tables.len() as u64).to_le_bytes());
+    for table in tables {
+        text(&mut bytes, &table.name);
+        bytes.extend_from_slice(&(table.columns.len() as u64).to_le_bytes());
+        for column in &table.columns {
+            text(&mut bytes, &column.name);
+            text(&mut bytes, &column.unit);
+            bytes.push(match column.kind() {
+                Kind::Number => b'n',
+                Kind::Integer => b'i',
+                Kind::Word => b'w',
+            });
+            bytes.extend_from_slice(&(column.len() as u64).to_le_bytes());
+            match &column.cells {
+                Cells::Numbers(values) => {
+                    for v in values {
+                        let v = if v.is_nan() { f64::NAN } else { *v };
+                        bytes.extend_from_slice(&v.to_bits().to_le_bytes());
+                    }
+                }
+                Cells::Integers(values) => values.iter().for_each(|v| bytes.extend_from_slice(&v.to_le_bytes())),
+                Cells::Words(words) => {
+                    bytes.extend_from_slice(&(words.vocabulary.len() as u64).to_le_bytes());
+                    words.vocabulary.iter().for_each(|w| text(&mut bytes, w));
+                    words.codes.iter().for_each(|c| bytes.extend_from_slice(&c.to_le_bytes()));
+                }
+            }
+        }
     }
     bytes
 }
 
-/// CSV with a header line and shortest round-trip numbers.
-pub fn csv(spec: &RunSpec, data: &Data) -> Vec<u8> {
-    let (columns, rows) = table(spec, data);
-    let mut text = columns.join(",");
-    text.push('\n');
-    for row in rows {
-        for (i, cell) in row.iter().enumerate() {
-            if i > 0 {
-                text.push(',');
-            }
-            // Writing to a String cannot fail.
-            let _ = match cell {
-                Cell::Number(v) => write!(text, "{v:?}"),
-                Cell::Word(word, _) => write!(text, "{word}"),
-                Cell::Blank => Ok(()),
-            };
-        }
-        text.push('\n');
+/// Reads bytes from the front.
+struct Reader<'a>(&'a [u8]);
+
+impl<'a> Reader<'a> {
+    fn take(&mut self, n: usize) -> Result<&'a [u8], Malformed> {
+        let Some((head, rest)) = self.0.split_at_checked(n) else { return malformed("it ends too early") };
+        self.0 = rest;
+        Ok(head)
     }
-    text.into_bytes()
+
+    fn eight(&mut self) -> Result<[u8; 8], Malformed> {
+        self.take(8)?.try_into().or_else(|_| malformed("it ends too early"))
+    }
+
+    /// A count of things that take at least `size` bytes each: one that the rest cannot hold is refused before memory is taken for it.
+    fn count(&mut self, size: usize) -> Result<usize, Malformed> {
+        let n = u64::from_le_bytes(self.eight()?);
+        match usize::try_from(n).ok().and_then(|n| n.checked_mul(size)) {
+            Some(needed) if needed <= self.0.len() => Ok(needed / size),
+            _ => malformed(format!("it speaks of {n} items but holds {} bytes", self.0.len())),
+        }
+    }
+
+    fn text(&mut self) -> Result<String, Malformed> {
+        let n = self.count(1)?;
+        String::from_utf8(self.take(n)?.to_vec()).or_else(|_| malformed("a name is not text"))
+    }
 }
 
-/// JSON: the spec, the statistics, the events, and the rows as arrays under their column names.
-pub fn json(spec: &RunSpec, recording: &Recording) -> Vec<u8> {
-    let (columns, rows) = table(spec, &recording.data);
-    let rows: Vec<Vec<Value>> = rows
-        .iter()
-        .map(|row| {
-            let value = |cell: &Cell| match cell {
-                Cell::Number(v) => json!(v),
-                Cell::Word(word, _) => json!(word),
-                Cell::Blank => Value::Null,
+/// The tables of which [`bits`] made these bytes.
+///
+/// # Errors
+///
+/// If the bytes are anything else.
+pub fn from_bits(bytes: &[u8]) -> Result<Vec<Table>, Malformed> {
+    let mut r = Reader(bytes);
+    let mut tables = Vec::new();
+    for _ in 0..r.count(16)? {
+        let mut table = Table { name: r.text()?, columns: Vec::new() };
+        for _ in 0..r.count(25)? {
+            let (name, unit) = (r.text()?, r.text()?);
+            let cells = match r.take(1)? {
+                b"n" => {
+                    let n = r.count(8)?;
+                    let cells = r.take(8 * n)?.chunks_exact(8);
+                    Cells::Numbers(cells.map(|c| f64::from_le_bytes(c.try_into().unwrap_or_default())).collect())
+                }
+                b"i" => {
+                    let n = r.count(8)?;
+                    let cells = r.take(8 * n)?.chunks_exact(8);
+                    Cells::Integers(cells.map(|c| i64::from_le_bytes(c.try_into().unwrap_or_default())).collect())
+                }
+                b"w" => {
+                    let n = r.count(4)?;
+                    let vocabulary = (0..r.count(8)?).map(|_| r.text()).collect::<Result<Vec<_>, _>>()?;
+                    let codes: Vec<u32> = r
+                        .take(4 * n)?
+                        .chunks_exact(4)
+                        .map(|c| u32::from_le_bytes(c.try_into().unwrap_or_default()))
+                        .collect();
+                    if codes.iter().any(|c| *c as usize >= vocabulary.len()) {
+                        return malformed("a word is not in its vocabulary");
+                    }
+                    Cells::Words(Words { vocabulary, codes })
+                }
+                _ => return malformed("a column is of no known kind"),
             };
-            row.iter().map(value).collect()
-        })
-        .collect();
+            table.columns.push(Column { name, unit, cells });
+        }
+        if table.columns.iter().any(|c| c.len() != table.len()) {
+            return malformed("columns of different lengths");
+        }
+        tables.push(table);
+    }
+    if !r.0.is_empty() {
+        return malformed("there is more than it speaks of");
+    }
+    Ok(tables)
+}
+
+/// What a CSV file says about itself in its first line.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Heading {
+    /// The program and its version.
+    pub made_by: String,
+    /// The table's name.
+    pub table: String,
+    /// Whatever its maker adds: the question, its hash.
+    pub about: Value,
+    /// The columns.
+    pub columns: Vec<ColumnHeading>,
+}
+
+/// What a file says about a column.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ColumnHeading {
+    /// Its name.
+    pub name: String,
+    /// Its unit, "1" for a pure number.
+    pub unit: String,
+    /// What it holds.
+    pub kind: Kind,
+}
+
+fn headings(table: &Table) -> Vec<ColumnHeading> {
+    let heading = |c: &Column| ColumnHeading { name: c.name.clone(), unit: c.unit.clone(), kind: c.kind() };
+    table.columns.iter().map(heading).collect()
+}
+
+/// What starts the line of metadata: a comment to gnuplot, NumPy, R and pandas (`comment="#"`).
+const COMMENT: &str = "# ";
+
+/// CSV: a comment line of metadata as JSON (`about` is whatever its maker wants to say), a line of column names, then a row per line with
+/// shortest round-trip numbers; blanks are empty.
+pub fn csv(table: &Table, about: &Value) -> Vec<u8> {
+    let heading = Heading {
+        made_by: concat!("twofold ", env!("CARGO_PKG_VERSION")).to_owned(),
+        table: table.name.clone(),
+        about: about.clone(),
+        columns: headings(table),
+    };
+    let mut bytes = COMMENT.as_bytes().to_vec();
+    bytes.extend(canonical_json(&heading));
+    bytes.push(b'\n');
+    let mut writer = csv::Writer::from_writer(bytes);
+    let written = (|| {
+        writer.write_record(table.columns.iter().map(|c| &c.name))?;
+        let mut text = String::new();
+        for row in 0..table.len() {
+            for column in &table.columns {
+                match &column.cells {
+                    Cells::Words(words) => writer.write_field(words.get(row))?,
+                    Cells::Numbers(values) => {
+                        text.clear();
+                        number(&mut text, values[row]);
+                        writer.write_field(&text)?;
+                    }
+                    Cells::Integers(values) => writer.write_field(values[row].to_string())?,
+                }
+            }
+            writer.write_record(None::<&[u8]>)?;
+        }
+        Ok::<(), csv::Error>(())
+    })();
+    written.expect("memory takes what is written to it");
+    writer.into_inner().expect("memory takes what is written to it")
+}
+
+/// The shortest text that reads as this number; nothing for a blank.
+fn number(text: &mut String, value: f64) {
+    use std::fmt::Write as _;
+    if !value.is_nan() {
+        // Writing to a String cannot fail.
+        let _ = write!(text, "{value:?}");
+    }
+}
+
+/// The table of which [`csv()`] made this file, and what it says about itself.
+///
+/// # Errors
+///
+/// If the file is anything else.
+pub fn from_csv(bytes: &[u8]) -> Result<(Heading, Table), Malformed> {
+    let Some(end) = bytes.iter().position(|b| *b == b'\n') else { return malformed("there is no line in it") };
+    let Some(text) = bytes[..end].strip_prefix(COMMENT.as_bytes()) else {
+        return malformed("its first line is not a comment with metadata");
+    };
+    let heading: Heading = serde_json::from_slice(text).map_err(|e| Malformed(format!("its metadata: {e}")))?;
+    let mut table = Table::new(&heading.table, heading.columns.iter().map(|c| Column::new(&c.name, &c.unit, c.kind)));
+    let mut reader = csv::Reader::from_reader(&bytes[end + 1..]);
+    let names = reader.headers().map_err(|e| Malformed(e.to_string()))?;
+    if !names.iter().eq(table.columns.iter().map(|c| c.name.as_str())) {
+        return malformed("its column names are not those of its metadata");
+    }
+    for (row, record) in reader.records().enumerate() {
+        let record = record.map_err(|e| Malformed(e.to_string()))?;
+        for (column, field) in table.columns.iter_mut().zip(&record) {
+            let fits = match &mut column.cells {
+                Cells::Words(words) => {
+                    words.push(field);
+                    true
+                }
+                Cells::Numbers(values) => {
+                    let value = if field.is_empty() { Some(f64::NAN) } else { field.parse().ok() };
+                    value.map(|v| values.push(v)).is_some()
+                }
+                Cells::Integers(values) => field.parse().ok().map(|v| values.push(v)).is_some(),
+            };
+            if !fits {
+                return malformed(format!("row {}, column {}: \"{field}\" is not a number", row + 1, column.name));
+            }
+        }
+    }
+    Ok((heading, table))
+}
+
+/// JSON: what `about` says, the facts, statistics and stop reason, and every table with its columns and rows.
+pub fn json(answer: &Answer, about: &Value) -> Vec<u8> {
+    let cell = |cells: &Cells, row: usize| match cells {
+        Cells::Numbers(v) if v[row].is_nan() => Value::Null,
+        Cells::Numbers(v) if v[row].is_infinite() => json!(if v[row] > 0.0 { "inf" } else { "-inf" }),
+        Cells::Numbers(v) => json!(v[row]),
+        Cells::Integers(v) => json!(v[row]),
+        Cells::Words(w) => json!(w.get(row)),
+    };
+    let table = |t: &Table| {
+        let row = |row| Value::Array(t.columns.iter().map(|c| cell(&c.cells, row)).collect());
+        json!({ "name": t.name, "columns": headings(t), "rows": (0..t.len()).map(row).collect::<Vec<_>>() })
+    };
     let value = json!({
-        "spec": spec,
-        "end": { "t": recording.t, "state": recording.x },
-        "statistics": recording.statistics,
-        "most_steps_in_segment": recording.most_steps_in_segment,
-        "events": events(&recording.data).into_iter().map(event_json).collect::<Vec<_>>(),
-        "columns": columns,
-        "rows": rows,
+        "made_by": concat!("twofold ", env!("CARGO_PKG_VERSION")),
+        "about": about,
+        "stop": answer.stop,
+        "facts": answer.facts,
+        "statistics": answer.statistics,
+        "tables": answer.tables.iter().map(table).collect::<Vec<_>>(),
     });
-    let mut bytes = serde_json::to_vec(&value).expect("a recording is plain data");
+    let mut bytes = canonical_json(&value);
     bytes.push(b'\n');
     bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn table(numbers: Vec<f64>, words: Vec<String>) -> Table {
+        let mut table =
+            Table::new("a table", [Column::new("x", "m", Kind::Number), Column::words("word"), Column::integers("n")]);
+        for (i, (x, word)) in numbers.into_iter().zip(&words).enumerate() {
+            table.push([x.into(), word.as_str().into(), (i as i64 - 3).into()]);
+        }
+        table
+    }
+
+    fn any_table() -> impl Strategy<Value = Table> {
+        (0_usize..20).prop_flat_map(|n| {
+            (prop::collection::vec(any::<f64>(), n), prop::collection::vec("[a-c,\"\n#é ]{0,3}", n))
+                .prop_map(|(numbers, words)| table(numbers, words))
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn bits_come_back(a in any_table(), b in any_table()) {
+            let bytes = bits(&[a, b]);
+            let back = from_bits(&bytes).unwrap();
+            prop_assert_eq!(bits(&back), bytes);
+        }
+
+        #[test]
+        fn csv_comes_back(t in any_table()) {
+            let about = json!({"question": "?"});
+            let (heading, back) = from_csv(&csv(&t, &about)).unwrap();
+            prop_assert_eq!(heading.about, about);
+            prop_assert_eq!(bits(&[back]), bits(&[t]));
+        }
+
+        #[test]
+        fn damaged_bits_are_refused_or_are_other_tables(t in any_table(), at in any::<prop::sample::Index>(), flip in 1_u8..) {
+            let mut bytes = bits(std::slice::from_ref(&t));
+            let at = at.index(bytes.len());
+            bytes[at] ^= flip;
+            // Whatever comes back must be a table that its own bits describe: nothing is read past, nothing panics.
+            if let Ok(tables) = from_bits(&bytes) {
+                prop_assert!(from_bits(&bits(&tables)).is_ok());
+            }
+            prop_assert!(from_bits(&bytes[..at]).is_err());
+        }
+    }
+
+    #[test]
+    fn every_bit_of_a_table_counts() {
+        let t = table(vec![0.0, f64::NAN, 1.0], vec!["up".into(), String::new(), "up".into()]);
+        let base = bits(std::slice::from_ref(&t));
+        let changes: [fn(&mut Table); 5] = [
+            |t| t.name.push('x'),
+            |t| t.columns[0].name.push('x'),
+            |t| t.columns[0].unit.push('x'),
+            |t| t.columns[0].cells = Cells::Numbers(vec![-0.0, f64::NAN, 1.0]),
+            |t| t.columns[2].cells = Cells::Integers(vec![0, 1, 2]),
+        ];
+        for change in changes {
+            let mut other = t.clone();
+            change(&mut other);
+            assert_ne!(bits(&[other]), base);
+        }
+        // All not-a-numbers are one blank.
+        let mut other = t.clone();
+        other.columns[0].cells = Cells::Numbers(vec![0.0, f64::from_bits(f64::NAN.to_bits() | 1), 1.0]);
+        assert_eq!(bits(&[other]), base);
+    }
+
+    #[test]
+    fn csv_as_it_looks() {
+        let t = table(vec![0.1, f64::NAN, 1e300], vec!["up".into(), String::new(), "a,b".into()]);
+        let text = String::from_utf8(csv(&t, &Value::Null)).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(lines[0].starts_with("# {\"made_by\":\"twofold "), "{}", lines[0]);
+        assert_eq!(lines[1..], ["x,word,n", "0.1,up,-3", ",,-2", "1e300,\"a,b\",-1"]);
+    }
+
+    #[test]
+    fn other_files_are_refused() {
+        assert!(from_csv(b"a,b\n1,2\n").is_err());
+        assert!(from_csv(b"").is_err());
+        assert!(from_bits(b"").is_err());
+        assert!(from_bits(&[255; 64]).is_err());
+        let t = table(vec![0.1], vec!["up".into()]);
+        let text = String::from_utf8(csv(&t, &Value::Null)).unwrap().replace("0.1", "zero");
+        assert!(from_csv(text.as_bytes()).unwrap_err().to_string().contains("row 1, column x"), "{text}");
+    }
 }

@@ -2,104 +2,17 @@
 
 use nalgebra::{SVector, vector};
 
-use super::spec::{FunnelSpec, MethodSpec, Observation, RunSpec, SpecError, SwitchSpec, SystemSpec};
+use super::question::JobError;
+use super::recording::{Data, Future, Recording};
+use super::spec::{FunnelSpec, MethodSpec, Observation, RunSpec, SwitchSpec, SystemSpec};
 use crate::analyse::path::MOST_POINTS;
-use crate::analyse::{Crossing, Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder};
-use crate::integrate::filippov::{self, AllModes, ExitRule, FilippovError, FilippovSummary, FunnelGrid, Side};
-use crate::integrate::{Course, Failure, Observer, Statistics, Stepper, StopReason, Watch, WithStepper, drive};
+use crate::analyse::{Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder};
+use crate::integrate::filippov::{self, AllModes, ExitRule, FilippovSummary, FunnelGrid};
+use crate::integrate::{Course, Observer, Statistics, Stepper, StopReason, Watch, WithStepper, drive};
 use crate::system::{Hysteretic, PiecewiseSmooth, Smoothed, VectorField};
 
-/// What a run left behind.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Recording {
-    /// The recorded points.
-    pub data: Data,
-    /// Final time.
-    pub t: f64,
-    /// Final state (first three components).
-    pub x: [f64; 3],
-    /// Work done.
-    pub statistics: Statistics,
-    /// The largest number of steps between restarts; NDSolve's default limit is 10,000.
-    pub most_steps_in_segment: u64,
-    /// Why it ended.
-    pub stop: StopReason,
-}
-
-/// Recorded points.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Data {
-    /// A path.
-    Path(Vec<Sample>),
-    /// A Poincare section.
-    Section(Vec<Crossing>),
-    /// A Filippov motion: pieces by mode, and events.
-    Motion(Motion),
-    /// The approach to a set-valued point and its futures.
-    Funnel {
-        /// The motion up to there.
-        approach: Motion,
-        /// The futures, by exit time, plus before minus.
-        futures: Vec<Future>,
-    },
-}
-
-/// One future of a set-valued point.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Future {
-    /// Time of repelling sliding asked for.
-    pub exit_time: f64,
-    /// The side left to.
-    pub side: Side,
-    /// The motion from the set-valued point on.
-    pub motion: Motion,
-}
-
-impl Data {
-    /// Number of recorded points.
-    pub fn len(&self) -> usize {
-        match self {
-            Data::Path(samples) => samples.len(),
-            Data::Section(crossings) => crossings.len(),
-            Data::Motion(motion) => motion.len(),
-            Data::Funnel { approach, futures } => {
-                approach.len() + futures.iter().map(|f| f.motion.len()).sum::<usize>()
-            }
-        }
-    }
-
-    /// Whether nothing was recorded.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-}
-
-/// Why a run gave no recording.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum RunError {
-    /// The spec is wrong.
-    #[error(transparent)]
-    Spec(#[from] SpecError),
-    /// The integration failed.
-    #[error(transparent)]
-    Integration(#[from] Failure),
-    /// More points than fit in memory.
-    #[error(
-        "more than {limit} points were recorded by t = {t}, the most that are kept in memory (0.6 GB): record passages through a plane instead of the path, give a larger chord, or an earlier end time"
-    )]
-    TooManyPoints {
-        /// Time reached.
-        t: f64,
-        /// The limit.
-        limit: usize,
-    },
-    /// The Filippov motion could not go on.
-    #[error(transparent)]
-    Filippov(#[from] FilippovError),
-}
-
 /// Computes a run.
-pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, RunError> {
+pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, JobError> {
     spec.validate()?;
     let recording = match spec.system {
         SystemSpec::Caricature(system) => switch(spec, system, watch),
@@ -107,12 +20,12 @@ pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, RunError
     }?;
     // The only observers here are recorders, which stop a run when they are full.
     if recording.stop == StopReason::Observer {
-        return Err(RunError::TooManyPoints { t: recording.t, limit: MOST_POINTS });
+        return Err(JobError::TooManyPoints { t: recording.t, limit: MOST_POINTS });
     }
     Ok(recording)
 }
 
-fn switch<P: PiecewiseSmooth<3> + Copy>(spec: &RunSpec, system: P, watch: &dyn Watch) -> Result<Recording, RunError> {
+fn switch<P: PiecewiseSmooth<3> + Copy>(spec: &RunSpec, system: P, watch: &dyn Watch) -> Result<Recording, JobError> {
     let x0 = SVector::from(spec.start);
     match spec.switch {
         SwitchSpec::Smoothed { eps, transition } => observe(spec, &Smoothed { system, transition, eps }, x0, watch),
@@ -132,7 +45,7 @@ fn discontinuous<P: PiecewiseSmooth<3>>(
     exit: ExitRule,
     funnel: Option<FunnelSpec>,
     watch: &dyn Watch,
-) -> Result<Recording, RunError> {
+) -> Result<Recording, JobError> {
     let settings = filippov::Settings {
         tolerance: spec.method.tolerance,
         max_step: spec.method.step_cap.for_segment(spec.t_end),
@@ -170,7 +83,7 @@ fn futures<P: PiecewiseSmooth<3>>(
     x0: SVector<f64, 3>,
     settings: &filippov::Settings,
     funnel: &FunnelSpec,
-) -> Result<Recording, RunError> {
+) -> Result<Recording, JobError> {
     let grid = FunnelGrid {
         shortest: funnel.shortest,
         longest: funnel.longest,
@@ -216,7 +129,7 @@ fn observe<F: VectorField<N>, const N: usize>(
     field: &F,
     x0: SVector<f64, N>,
     watch: &dyn Watch,
-) -> Result<Recording, RunError> {
+) -> Result<Recording, JobError> {
     match spec.observe {
         Observation::Path { chord } => {
             let mut recorder = PathRecorder::new(&x0, chord);
@@ -237,7 +150,7 @@ fn integrate<F: VectorField<N>, O: Observer<N>, const N: usize>(
     x0: SVector<f64, N>,
     observer: &mut O,
     watch: &dyn Watch,
-) -> Result<End, RunError> {
+) -> Result<End, JobError> {
     let MethodSpec { name, tolerance, step_cap, max_steps } = spec.method;
     let course = Course { t_end: spec.t_end, schedule: spec.schedule, step_cap, max_steps };
     name.with_stepper(tolerance, Drive { field, x0, course, observer, watch })
@@ -253,7 +166,7 @@ struct Drive<'a, F, O, const N: usize> {
 }
 
 impl<F: VectorField<N>, O: Observer<N>, const N: usize> WithStepper<N> for Drive<'_, F, O, N> {
-    type Answer = Result<End, RunError>;
+    type Answer = Result<End, JobError>;
     fn with<M: Stepper<N>>(self, mut stepper: M) -> Self::Answer {
         let Self { field, x0, course, observer, watch } = self;
         let summary = drive(field, x0, &course, &mut stepper, observer, watch)?.within_budget()?;

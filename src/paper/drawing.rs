@@ -4,7 +4,7 @@ use super::{Camera, Panel, Picture, View, wording};
 use crate::analyse::{Crossing, Motion, Sample};
 use crate::draw::surface;
 use crate::integrate::filippov::{EventKind, Mode, Side};
-use crate::job::simulate::{Data, Future, Recording};
+use crate::job::recording::{Data, Future, Recording};
 use crate::job::spec::SystemSpec;
 use crate::record::Hash;
 use crate::render::sheet::{

@@ -6,6 +6,7 @@
 //! paper's caption, and nothing else.
 
 pub mod drawing;
+pub mod figures;
 pub mod pipeline;
 pub mod study;
 pub mod verdict;

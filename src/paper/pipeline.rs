@@ -1,16 +1,17 @@
-//! From pictures to bytes: independent runs side by side, collected in order.
+//! From pictures to bytes: questions asked, answers judged and drawn.
 
-use rayon::prelude::*;
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
-use super::verdict::{PanelVerdict, judge};
-use super::{Picture, Reading, Study, View, drawing};
-use crate::cli::progress::Progress;
+use super::verdict::{self, PanelVerdict, judge};
+use super::{Picture, Reading, View, drawing};
 use crate::integrate::Statistics;
 use crate::job::encode;
-use crate::job::simulate::{Recording, RunError, simulate};
+use crate::job::question::question_hash;
 use crate::job::spec::RunSpec;
-use crate::record::hash::canonical_json;
+use crate::job::{Answer, AnyQuestion, Desk, JobError, Recording, Run, Stop};
 use crate::record::{Hash, PanelEntry, PictureEntry};
 use crate::render::{Pixels, RenderError, Rendered, render};
 
@@ -19,12 +20,10 @@ use crate::render::{Pixels, RenderError, Rendered, render};
 pub struct Computed {
     /// PNG, SVG and PDF.
     pub rendered: Rendered,
-    /// CSV per panel: (label, bytes).
+    /// A CSV file per table: its name's last part, bytes.
     pub tables: Vec<(String, Vec<u8>)>,
     /// What is known about the picture, as it is written beside it.
     pub record: PictureRecord,
-    /// The recorded runs, panel by panel.
-    pub recordings: Vec<Recording>,
 }
 
 /// What is known about a picture.
@@ -32,8 +31,7 @@ pub struct Computed {
 pub struct PictureRecord {
     /// Hashes of every layer.
     pub hashes: PictureEntry,
-    /// The heading; empty in records of before it was kept.
-    #[serde(default)]
+    /// The heading.
     pub title: String,
     /// The parameter reading.
     pub reading: Option<Reading>,
@@ -41,13 +39,28 @@ pub struct PictureRecord {
     pub caption: String,
     /// How it differs from the published picture; empty for the real thing.
     pub alterations: Vec<String>,
-    /// Its panels.
+    /// Its panels, if it is made of runs.
     pub panels: Vec<PanelRecord>,
-    /// Verdicts on the paper's claims; empty until they are asked for.
+    /// Verdicts on the paper's claims.
     pub verdicts: Vec<PanelVerdict>,
-    /// What a study depends on; absent for pictures of runs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub question: Option<serde_json::Value>,
+    /// What it asks, if it is not made of runs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub questions: Vec<Value>,
+    /// The tables' files, name and digest.
+    pub tables: Vec<TableRecord>,
+}
+
+/// What is known about a table's file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TableRecord {
+    /// The file's name.
+    pub file: String,
+    /// The panel whose numbers it holds, if it is made of runs.
+    pub panel: Option<String>,
+    /// Digest of the file.
+    pub sha256: Hash,
+    /// Rows.
+    pub rows: usize,
 }
 
 /// What is known about a panel.
@@ -65,6 +78,8 @@ pub struct PanelRecord {
     pub t: f64,
     /// Final state.
     pub state: [f64; 3],
+    /// Why the run ended.
+    pub stop: Stop,
     /// Work done.
     pub statistics: Statistics,
     /// The largest number of steps between restarts; NDSolve's default limit is 10,000.
@@ -74,15 +89,15 @@ pub struct PanelRecord {
 /// A picture that could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum PipelineError {
-    /// A run failed.
-    #[error("{picture} ({panel}): {source}")]
-    Run {
+    /// A computation failed.
+    #[error("{picture} ({part}): {source}")]
+    Job {
         /// The picture.
         picture: String,
-        /// The panel.
-        panel: String,
+        /// The panel, or what else was computed.
+        part: String,
         /// Why.
-        source: RunError,
+        source: JobError,
     },
     /// The drawing failed.
     #[error("{picture}: {source}")]
@@ -103,141 +118,133 @@ pub fn pixel_hash(pixels: &Pixels) -> Hash {
     Hash::of(&bytes)
 }
 
-/// Computes and draws one picture. The result does not depend on the number of threads.
-pub fn compute(picture: &Picture, progress: &Progress) -> Result<Computed, PipelineError> {
-    if let View::Study(study) = &picture.view {
-        return compute_study(picture, study, progress);
+/// What a picture's panels ask, label by label; a study's questions are named after their kind.
+fn parts(picture: &Picture) -> Vec<(String, AnyQuestion)> {
+    match &picture.view {
+        View::Study(study) => (study.questions)().into_iter().map(|q| (q.kind().to_owned(), q)).collect(),
+        _ => picture.panels.iter().map(|p| (p.label.clone(), Arc::new(Run(p.run)) as AnyQuestion)).collect(),
     }
-    let recordings: Vec<Recording> = picture
-        .panels
-        .par_iter()
-        .map(|panel| {
-            let watch = progress.run(format!("{} ({})", picture.name, panel.label), panel.run.t_end);
-            let result = simulate(&panel.run, &watch).map_err(|source| PipelineError::Run {
-                picture: picture.name.clone(),
-                panel: panel.label.clone(),
-                source,
-            });
-            match &result {
-                Ok(r) => watch.done(&format!("{} steps, {} points", r.statistics.steps, r.data.len())),
-                Err(_) => watch.done("failed"),
+}
+
+/// Everything that making these pictures will ask, so that it can be computed side by side, the longest first.
+pub fn questions<'a>(pictures: impl IntoIterator<Item = &'a Picture>) -> Vec<AnyQuestion> {
+    let mut all = Vec::new();
+    for picture in pictures {
+        all.extend(parts(picture).into_iter().map(|(_, question)| question));
+        all.extend((0..picture.panels.len()).filter_map(|i| verdict::question(picture, i)));
+    }
+    all
+}
+
+/// Makes one picture from answers, asking `desk` for those that it does not have yet. A pure view: the same answers give the same bytes.
+///
+/// # Errors
+///
+/// If a computation or the drawing failed.
+pub fn compute(picture: &Picture, desk: &Desk<'_>) -> Result<Computed, PipelineError> {
+    let failed = |part: &str| {
+        let (picture, part) = (picture.name.clone(), part.to_owned());
+        move |source: JobError| PipelineError::Job { picture, part, source }
+    };
+    let parts = parts(picture);
+    let answers = parts
+        .iter()
+        .map(|(part, question)| desk.ask(&**question).and_then(finished).map_err(failed(part)))
+        .collect::<Result<Vec<Arc<Answer>>, _>>()?;
+    let verdicts = judge(picture, desk).map_err(failed("verdict"))?;
+
+    let entries: Vec<PanelEntry> = parts
+        .iter()
+        .zip(&answers)
+        .map(|((label, question), answer)| PanelEntry {
+            label: label.clone(),
+            spec: question_hash(&**question),
+            data: answer.hash(),
+            verdict: verdicts.iter().find(|v| v.panel == *label).map(Hash::of_json),
+        })
+        .collect();
+    let joined = |hash: fn(&PanelEntry) -> Option<&Hash>| {
+        let hashes: Vec<String> =
+            entries.iter().map(|e| format!("{} {}", e.label, hash(e).map_or("none", Hash::as_str))).collect();
+        Hash::of(hashes.join("\n").as_bytes())
+    };
+    let (spec, data) = (joined(|e| Some(&e.spec)), joined(|e| Some(&e.data)));
+    let verdict = joined(|e| e.verdict.as_ref());
+
+    let mut panels = Vec::new();
+    let drawn = match &picture.view {
+        View::Study(study) => drawing::study_sheet(picture, (study.draw)(&answers), &spec, &data),
+        _ => {
+            let mut recordings = Vec::new();
+            for (panel, answer) in picture.panels.iter().zip(&answers) {
+                let recording = Recording::of_answer(&panel.run, answer).map_err(|e| failed(&panel.label)(e.into()))?;
+                panels.push(PanelRecord {
+                    label: panel.label.clone(),
+                    title: panel.title.clone(),
+                    run: panel.run,
+                    points: recording.data.len(),
+                    t: recording.t,
+                    state: recording.x,
+                    stop: answer.stop,
+                    statistics: recording.statistics.clone(),
+                    most_steps_in_segment: recording.most_steps_in_segment,
+                });
+                recordings.push(recording);
             }
-            result
-        })
-        .collect::<Vec<_>>()
-        .into_iter()
-        .collect::<Result<_, _>>()?;
-
-    let entries: Vec<PanelEntry> = picture
-        .panels
-        .iter()
-        .zip(&recordings)
-        .map(|(panel, recording)| PanelEntry {
-            label: panel.label.clone(),
-            spec: Hash::of_json(&panel.run),
-            data: Hash::of(&encode::bits(&panel.run, &recording.data)),
-        })
-        .collect();
-    let spec = Hash::of(&canonical_json(&picture.panels.iter().map(|p| (&p.label, &p.run)).collect::<Vec<_>>()));
-    let data = Hash::of(entries.iter().map(|e| e.data.as_str()).collect::<Vec<_>>().join("\n").as_bytes());
-
-    let sheet = drawing::sheet(picture, &recordings, &spec, &data);
-    let rendered = render(&sheet).map_err(|source| PipelineError::Render { picture: picture.name.clone(), source })?;
-    let hashes = picture_entry(picture, spec, data, &rendered, entries);
-    let panels = picture
-        .panels
-        .iter()
-        .zip(&recordings)
-        .map(|(panel, r)| PanelRecord {
-            label: panel.label.clone(),
-            title: panel.title.clone(),
-            run: panel.run,
-            points: r.data.len(),
-            t: r.t,
-            state: r.x,
-            statistics: r.statistics.clone(),
-            most_steps_in_segment: r.most_steps_in_segment,
-        })
-        .collect();
-    let tables = picture
-        .panels
-        .iter()
-        .zip(&recordings)
-        .map(|(panel, r)| (panel.label.clone(), encode::csv(&panel.run, &r.data)))
-        .collect();
-    let record = PictureRecord {
-        hashes,
-        title: picture.title.to_owned(),
-        reading: picture.reading,
-        caption: picture.caption.clone(),
-        alterations: picture.alterations.clone(),
-        panels,
-        verdicts: Vec::new(),
-        question: None,
+            drawing::sheet(picture, &recordings, &spec, &data)
+        }
     };
-    Ok(Computed { rendered, tables, record, recordings })
-}
+    let rendered = render(&drawn).map_err(|source| PipelineError::Render { picture: picture.name.clone(), source })?;
 
-/// Computes and draws a study.
-fn compute_study(picture: &Picture, study: &Study, progress: &Progress) -> Result<Computed, PipelineError> {
-    let watch = progress.run(picture.name.clone(), 1.0);
-    let tables = (study.compute)().map_err(|source| PipelineError::Run {
-        picture: picture.name.clone(),
-        panel: "study".into(),
-        source,
-    })?;
-    watch.done(&format!("{} rows", tables.iter().map(|t| t.rows.len()).sum::<usize>()));
-    let question = (study.question)();
-    let spec = Hash::of_json(&question);
-    let panels: Vec<PanelEntry> = tables
-        .iter()
-        .map(|t| PanelEntry { label: t.name.clone(), spec: spec.clone(), data: Hash::of(&t.bits()) })
-        .collect();
-    let data = Hash::of(panels.iter().map(|e| e.data.as_str()).collect::<Vec<_>>().join("\n").as_bytes());
-    let sheet = drawing::study_sheet(picture, (study.draw)(&tables), &spec, &data);
-    let rendered = render(&sheet).map_err(|source| PipelineError::Render { picture: picture.name.clone(), source })?;
-    let hashes = picture_entry(picture, spec, data, &rendered, panels);
-    let record = PictureRecord {
-        title: picture.title.to_owned(),
-        hashes,
-        reading: picture.reading,
-        caption: picture.caption.clone(),
-        alterations: picture.alterations.clone(),
-        panels: Vec::new(),
-        verdicts: Vec::new(),
-        question: Some(question),
-    };
-    let tables = tables.iter().map(|t| (t.name.clone(), t.csv())).collect();
-    Ok(Computed { rendered, tables, record, recordings: Vec::new() })
-}
-
-fn picture_entry(
-    picture: &Picture,
-    spec: Hash,
-    data: Hash,
-    rendered: &Rendered,
-    panels: Vec<PanelEntry>,
-) -> PictureEntry {
-    PictureEntry {
+    let runs = !panels.is_empty();
+    let mut tables = Vec::new();
+    let mut table_records = Vec::new();
+    for ((label, question), answer) in parts.iter().zip(&answers) {
+        for table in &answer.tables {
+            // A run's main table is called after its panel.
+            let ending = match (runs, table.name.as_str()) {
+                (true, "path" | "section" | "motion") => label.clone(),
+                (true, other) => format!("{label}-{other}"),
+                (false, other) => other.to_owned(),
+            };
+            let about =
+                json!({ "kind": question.kind(), "question_sha256": question_hash(&**question), "stop": answer.stop });
+            let bytes = encode::csv(table, &about);
+            table_records.push(TableRecord {
+                file: format!("{}-{ending}.csv", picture.name),
+                panel: runs.then(|| label.clone()),
+                sha256: Hash::of(&bytes),
+                rows: table.len(),
+            });
+            tables.push((ending, bytes));
+        }
+    }
+    let hashes = PictureEntry {
         name: picture.name.clone(),
         spec,
         data,
+        verdict,
         pixels: pixel_hash(&rendered.pixels),
         png: Hash::of(&rendered.png),
         svg: Hash::of(&rendered.svg),
         pdf: Hash::of(&rendered.pdf),
+        panels: entries,
+    };
+    let record = PictureRecord {
+        hashes,
+        title: picture.title.to_owned(),
+        reading: picture.reading,
+        caption: picture.caption.clone(),
+        alterations: picture.alterations.clone(),
         panels,
-    }
+        verdicts,
+        questions: if runs { Vec::new() } else { parts.iter().map(|(_, q)| q.json()).collect() },
+        tables: table_records,
+    };
+    Ok(Computed { rendered, tables, record })
 }
 
-impl Computed {
-    /// Adds the verdicts on the paper's claims to the record.
-    pub fn judge(&mut self, picture: &Picture) -> Result<(), PipelineError> {
-        self.record.verdicts = judge(picture, &self.recordings).map_err(|source| PipelineError::Run {
-            picture: picture.name.clone(),
-            panel: "verdict".into(),
-            source,
-        })?;
-        Ok(())
-    }
+/// An answer that may be published: half a run must not look like a whole one.
+fn finished(answer: Arc<Answer>) -> Result<Arc<Answer>, JobError> {
+    if answer.stop == Stop::Interrupted { Err(JobError::Interrupted) } else { Ok(answer) }
 }

@@ -1,21 +1,57 @@
 //! Studies: pictures that are made of something other than the paper's runs.
-//!
-//! A study is a question written out as JSON (hashed as the spec), a pure function from nothing but that question to named
-//! tables of numbers (hashed as the data), and a drawing of those tables.
+
+use std::sync::Arc;
 
 use serde_json::Value;
 
-use crate::job::simulate::RunError;
-use crate::job::table::Table;
+use crate::integrate::Watch;
+use crate::job::{Answer, AnyQuestion, Desk, JobError, Question, Table};
 use crate::render::Sheet;
 
-/// A picture that computes its own numbers. Function pointers keep figures plain data.
+/// A picture that asks its own questions and draws the answers. Function pointers keep figures plain data.
 #[derive(Clone, Copy, Debug)]
 pub struct Study {
-    /// Every number that the study depends on.
-    pub question: fn() -> Value,
+    /// What is asked.
+    pub questions: fn() -> Vec<AnyQuestion>,
+    /// Draws the answers, in the questions' order: panels, legend, subtitle, footer. Title, description and provenance are added by the
+    /// pipeline.
+    pub draw: fn(&[Arc<Answer>]) -> Sheet,
+}
+
+/// A question whose numbers are a plain function of it.
+#[derive(Clone, Debug)]
+pub struct Computed {
+    /// The kind.
+    pub kind: &'static str,
+    /// Every number that it depends on.
+    pub question: Value,
+    /// Expected work, in the units of [`Question::cost`].
+    pub cost: f64,
     /// Computes the tables.
-    pub compute: fn() -> Result<Vec<Table>, RunError>,
-    /// Draws them: panels, legend, subtitle, footer. Title, description and provenance are added by the pipeline.
-    pub draw: fn(&[Table]) -> Sheet,
+    pub compute: fn() -> Result<Vec<Table>, JobError>,
+}
+
+impl Question for Computed {
+    fn kind(&self) -> &'static str {
+        self.kind
+    }
+
+    fn json(&self) -> Value {
+        self.question.clone()
+    }
+
+    fn cost(&self) -> f64 {
+        self.cost
+    }
+
+    fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        Ok(Answer::of_tables((self.compute)()?))
+    }
+}
+
+impl Study {
+    /// The tables of all answers, in order.
+    pub fn tables(answers: &[Arc<Answer>]) -> Vec<Table> {
+        answers.iter().flat_map(|a| a.tables.iter().cloned()).collect()
+    }
 }

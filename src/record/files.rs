@@ -274,6 +274,14 @@ pub fn still_there(files: &[(PathBuf, u64)]) -> Result<(), FileError> {
     Ok(())
 }
 
+/// Removes a file; one that is already gone is no error.
+pub fn remove(path: &Path) -> Result<(), FileError> {
+    match fs::remove_file(path) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(FileError::new("remove", path)(e)),
+        _ => Ok(()),
+    }
+}
+
 /// The largest file that [`read`] reads: the largest table of a full-length figure has some 20 MB.
 pub const LARGEST: u64 = 512 << 20;
 

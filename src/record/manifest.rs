@@ -1,14 +1,14 @@
 //! Manifests: which bytes a figure is made of, in layers.
 //!
-//! A picture has a hash for its spec, its data, its pixels and each of its files. The first layer that differs names
-//! the room that changed: spec (the question), data (numerics), pixels (drawing), file (encoding).
+//! A picture has a hash for its spec, its data, its verdict, its pixels and each of its files. The first layer that differs
+//! names the room that changed: spec (the question), data (numerics), verdict (judgement), pixels (drawing), file (encoding).
 
 use serde::{Deserialize, Serialize};
 
 use super::Hash;
 
 /// The format's version; a manifest of another version is refused, not guessed at.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// All pictures of one figure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,6 +34,8 @@ pub struct PictureEntry {
     pub spec: Hash,
     /// Hash of all panels' data.
     pub data: Hash,
+    /// Hash of all panels' verdicts.
+    pub verdict: Hash,
     /// Hash of the decoded pixels (width, height, RGBA).
     pub pixels: Hash,
     /// Hash of the PNG file.
@@ -52,10 +54,13 @@ pub struct PictureEntry {
 pub struct PanelEntry {
     /// The panel's label, "i".
     pub label: String,
-    /// Hash of the spec's canonical JSON.
+    /// Hash of the question's canonical JSON.
     pub spec: Hash,
-    /// Hash of the data (f64, little-endian).
+    /// Hash of the answer: tables (little-endian bits), facts, stop reason.
     pub data: Hash,
+    /// Hash of the verdict's canonical JSON, if the paper claims something of the panel.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<Hash>,
 }
 
 /// A layer of a picture, from question to file.
@@ -66,6 +71,8 @@ pub enum Layer {
     Spec,
     /// The numbers.
     Data,
+    /// What the numbers are held to mean.
+    Verdict,
     /// The decoded picture.
     Pixels,
     /// The PNG file's bytes.
@@ -82,6 +89,7 @@ impl Layer {
         match self {
             Layer::Spec => "spec",
             Layer::Data => "data",
+            Layer::Verdict => "verdict",
             Layer::Pixels => "pixels",
             Layer::Png => "PNG file",
             Layer::Svg => "SVG file",
@@ -177,7 +185,7 @@ pub struct Difference {
 impl PictureEntry {
     /// The first layer in which `actual` differs from `self`.
     pub fn first_difference(&self, actual: &PictureEntry) -> Option<Difference> {
-        let panels_differing = |hash: fn(&PanelEntry) -> &Hash| {
+        let panels_differing = |hash: fn(&PanelEntry) -> Option<&Hash>| {
             let mut labels = Vec::new();
             for panel in &self.panels {
                 let other = actual.panels.iter().find(|p| p.label == panel.label);
@@ -190,6 +198,7 @@ impl PictureEntry {
         let layer = [
             (Layer::Spec, &self.spec, &actual.spec),
             (Layer::Data, &self.data, &actual.data),
+            (Layer::Verdict, &self.verdict, &actual.verdict),
             (Layer::Pixels, &self.pixels, &actual.pixels),
             (Layer::Png, &self.png, &actual.png),
             (Layer::Svg, &self.svg, &actual.svg),
@@ -199,8 +208,9 @@ impl PictureEntry {
         .find(|(_, a, b)| a != b)?
         .0;
         let panels = match layer {
-            Layer::Spec => panels_differing(|p| &p.spec),
-            Layer::Data => panels_differing(|p| &p.data),
+            Layer::Spec => panels_differing(|p| Some(&p.spec)),
+            Layer::Data => panels_differing(|p| Some(&p.data)),
+            Layer::Verdict => panels_differing(|p| p.verdict.as_ref()),
             _ => Vec::new(),
         };
         Some(Difference { layer, panels })
@@ -213,11 +223,12 @@ mod tests {
 
     fn entry() -> PictureEntry {
         let h = |s: &str| Hash::of(s.as_bytes());
-        let panel = |l: &str| PanelEntry { label: l.into(), spec: h("s"), data: h("d") };
+        let panel = |l: &str| PanelEntry { label: l.into(), spec: h("s"), data: h("d"), verdict: Some(h("v")) };
         PictureEntry {
             name: "fig7-printed".into(),
             spec: h("1"),
             data: h("2"),
+            verdict: h("7"),
             pixels: h("3"),
             png: h("4"),
             svg: h("5"),

@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::model::*;
 use crate::compare;
 use crate::paper::Reading;
-use crate::paper::pipeline::{PanelRecord, pixel_hash};
+use crate::paper::pipeline::{PanelRecord, TableRecord, pixel_hash};
 use crate::paper::wording;
 use crate::record::{FileBytes, Hash, Layer, Manifest, PictureEntry};
 use crate::render::{Pixels, decode_png, encode_png};
@@ -27,6 +27,8 @@ struct Record {
     panels: Vec<PanelRecord>,
     #[serde(default)]
     verdicts: Vec<Value>,
+    #[serde(default)]
+    tables: Vec<TableRecord>,
 }
 
 /// Puts the report together: `made` are the files of the figures' folder, `committed` those of the references' folder
@@ -196,19 +198,11 @@ fn picture(
     if let Some(pixels) = &pixels {
         hashes.pixels = pixel_hash(pixels);
     }
-    for panel in &record.panels {
-        let label = Some(panel.label.clone());
-        let suffix = format!("-{}.csv", panel.label);
-        let Some(table) = find(&suffix) else {
-            listed.push(missing(&format!("{id}/{name}{suffix}"), Role::Data, label));
-            continue;
-        };
-        let mut report = file_report(table, Role::Data, label, None);
-        let recorded = record.hashes.panels.iter().find(|p| p.label == panel.label);
-        if let (Some(recorded), Some(bits)) = (recorded, table_bits(&table.bytes)) {
-            report.integrity = if Hash::of(&bits) == recorded.data { Integrity::Unchanged } else { Integrity::Changed };
-        }
-        listed.push(report);
+    for table in &record.tables {
+        listed.push(match files.iter().find(|f| f.name() == table.file) {
+            Some(file) => file_report(file, Role::Data, table.panel.clone(), Some(&table.sha256)),
+            None => missing(&format!("{id}/{}", table.file), Role::Data, table.panel.clone()),
+        });
     }
     for table in files.iter().filter(|f| f.name().ends_with(".csv")) {
         if !listed.iter().any(|l| l.path == table.path) {
@@ -413,24 +407,6 @@ pub(super) fn media_type(path: &str) -> &'static str {
     }
 }
 
-/// The numbers of a table as the bits that are hashed (see `encode::bits`), so that a table can be checked against its
-/// record. `None` if it holds anything but numbers and directions.
-fn table_bits(csv: &[u8]) -> Option<Vec<u8>> {
-    let text = std::str::from_utf8(csv).ok()?;
-    let mut bits = Vec::with_capacity(csv.len() / 2);
-    for line in text.lines().skip(1) {
-        for field in line.split(',') {
-            let value: f64 = match field {
-                "up" => 1.0,
-                "down" => -1.0,
-                number => number.parse().ok()?,
-            };
-            bits.extend_from_slice(&value.to_bits().to_le_bytes());
-        }
-    }
-    Some(bits)
-}
-
 fn summary(figures: &[FigureReport]) -> Summary {
     let mut s = Summary::default();
     let mut readings: Vec<ReadingSummary> = Vec::new();
@@ -510,25 +486,5 @@ mod tests {
         assert_eq!(owner("fig7-printed-shortened-i.csv", &names), Some(&names[1]));
         assert_eq!(owner("fig7-printed.png", &names), Some(&names[0]));
         assert_eq!(owner("fig7-printedx.png", &names), None);
-    }
-
-    #[test]
-    fn a_table_gives_back_the_bits_it_was_made_from() {
-        use crate::analyse::{Crossing, Direction};
-        use crate::job::encode;
-        use crate::job::simulate::Data;
-        let crossing = |t: f64, direction| Crossing { t, x: [1e-5 / 3.0, 0.0, -0.1], direction };
-        let data = Data::Section(vec![crossing(0.1, Direction::Up), crossing(1e5, Direction::Down)]);
-        let run = crate::job::spec::RunSpec {
-            system: crate::job::spec::SystemSpec::Caricature(Reading::Printed.caricature()),
-            switch: crate::job::spec::SwitchSpec::tanh(1e-3),
-            start: [0.2, 0.0, -1.0],
-            t_end: 1.0,
-            method: crate::job::spec::MethodSpec::ndsolve_defaults(crate::job::spec::Method::Dopri5),
-            schedule: Default::default(),
-            observe: crate::job::spec::Observation::Section { coordinate: 1, value: 0.0 },
-        };
-        assert_eq!(table_bits(&encode::csv(&run, &data)).unwrap(), encode::bits(&run, &data));
-        assert_eq!(table_bits(b"a,b\n1,x\n"), None);
     }
 }

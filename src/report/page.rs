@@ -449,6 +449,7 @@ fn meaning(layer: Layer) -> &'static str {
     match layer {
         Layer::Spec => "another question was asked",
         Layer::Data => "the same question, other numbers",
+        Layer::Verdict => "the same numbers, judged otherwise",
         Layer::Pixels => "the same numbers, drawn otherwise",
         Layer::Png | Layer::Svg | Layer::Pdf => "the same picture, another file",
     }

@@ -8,8 +8,8 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use twofold::cli;
-use twofold::cli::progress::Progress;
 use twofold::integrate::Schedule;
+use twofold::job::Desk;
 use twofold::job::spec::*;
 use twofold::paper::verdict::{Claim, SectionClaim};
 use twofold::paper::{Figure, Panel, View};
@@ -46,7 +46,7 @@ pub fn figures() -> &'static Path {
     static MADE: OnceLock<tempfile::TempDir> = OnceLock::new();
     let made = MADE.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();
-        cli::make(&small_figure(60.0), &folder.path().join("fig7"), &Progress::new(true)).unwrap();
+        cli::make(&[small_figure(60.0)], folder.path(), &Desk::quiet()).unwrap();
         folder
     });
     made.path()

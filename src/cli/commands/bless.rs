@@ -9,8 +9,8 @@ use super::chosen;
 use crate::cli::progress::Progress;
 use crate::cli::speak::print_json;
 use crate::cli::{CliError, Exit, in_pool, print};
-use crate::paper::Figure;
-use crate::paper::pipeline::compute;
+use crate::job::Desk;
+use crate::paper::pipeline::{compute, questions};
 use crate::record::manifest::VERSION;
 use crate::record::{self, Manifest};
 
@@ -38,12 +38,12 @@ pub struct Arguments {
     quiet: bool,
 }
 
-pub fn run(arguments: &Arguments, figures: fn() -> Vec<Figure>) -> Result<Exit, CliError> {
+pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let reason = arguments.reason.trim();
     if reason.is_empty() || reason.contains('\n') {
         return Err(CliError::Usage("--reason: give one line that says why the reference changes".into()));
     }
-    let figures = chosen(figures(), &arguments.figures)?;
+    let figures = chosen(&arguments.figures)?;
     record::files::try_folder(&arguments.expected)?;
     let say = |outcome: &str, changed: &[(String, String)], text: &str| {
         if !arguments.json {
@@ -60,6 +60,8 @@ pub fn run(arguments: &Arguments, figures: fn() -> Vec<Figure>) -> Result<Exit, 
         return Ok(Exit::CheckFailed);
     }
     let progress = Progress::new(arguments.quiet);
+    let desk = Desk::new(None, &progress);
+    in_pool(arguments.threads, || desk.gather(&questions(figures.iter().flat_map(|f| &f.pictures))))?;
     let mut changed: Vec<(String, String)> = Vec::new();
     for figure in &figures {
         let folder = arguments.expected.join(figure.id);
@@ -74,7 +76,7 @@ pub fn run(arguments: &Arguments, figures: fn() -> Vec<Figure>) -> Result<Exit, 
             pictures: Vec::new(),
         };
         for picture in &figure.pictures {
-            let computed = in_pool(arguments.threads, || compute(picture, &progress))??;
+            let computed = compute(picture, &desk)?;
             let entry = computed.record.hashes;
             let what = match before.as_ref().and_then(|m| m.picture(&entry.name)) {
                 None => Some("new".to_owned()),

@@ -8,8 +8,8 @@ use super::{chosen, published};
 use crate::cli::progress::Progress;
 use crate::cli::speak::print_json;
 use crate::cli::{CliError, Exit, in_pool, print};
-use crate::paper::Figure;
-use crate::paper::pipeline::{PictureRecord, compute};
+use crate::job::Desk;
+use crate::paper::pipeline::{PictureRecord, compute, questions};
 use crate::record::{self, Layer, Manifest};
 
 /// Recompute figures and compare spec, data, pixels and files with the committed manifests; exit code 1 on a difference.
@@ -61,7 +61,7 @@ impl Finding {
     fn line(&self) -> String {
         let name = &self.name;
         match &self.state {
-            State::Same => format!("{name}: same (spec, data, pixels, PNG, SVG, PDF)"),
+            State::Same => format!("{name}: same (spec, data, verdict, pixels, PNG, SVG, PDF)"),
             State::Differs { layer, panels } if panels.is_empty() => {
                 format!("{name}: DIFFERS first in its {}", layer.name())
             }
@@ -74,8 +74,8 @@ impl Finding {
     }
 }
 
-pub fn run(arguments: &Arguments, figures: fn() -> Vec<Figure>) -> Result<Exit, CliError> {
-    let mut figures = chosen(figures(), &arguments.figures)?;
+pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
+    let mut figures = chosen(&arguments.figures)?;
     if let Some(folder) = arguments.against.as_ref().filter(|path| path.is_dir()) {
         return published::check(folder, &figures, arguments.threads, arguments.quiet, arguments.json);
     }
@@ -103,6 +103,9 @@ pub fn run(arguments: &Arguments, figures: fn() -> Vec<Figure>) -> Result<Exit, 
         })
         .collect();
     let progress = Progress::new(arguments.quiet);
+    // A check never rests on a store: everything is computed here and now.
+    let desk = Desk::new(None, &progress);
+    in_pool(arguments.threads, || desk.gather(&questions(figures.iter().flat_map(|f| &f.pictures))))?;
     let mut findings = Vec::new();
     let mut found = |name: &str, state: State| {
         let finding = Finding { name: name.to_owned(), state };
@@ -119,7 +122,7 @@ pub fn run(arguments: &Arguments, figures: fn() -> Vec<Figure>) -> Result<Exit, 
             }
         };
         for picture in &figure.pictures {
-            let actual = in_pool(arguments.threads, || compute(picture, &progress))??.record;
+            let actual = compute(picture, &desk)?.record;
             found(&actual.hashes.name, compare(&manifest, &actual))?;
         }
         for missing in manifest.pictures.iter().filter(|e| !figure.pictures.iter().any(|p| p.name == e.name)) {

@@ -2,6 +2,7 @@
 
 mod bless;
 mod check;
+mod figure;
 mod inspect;
 mod manual;
 mod published;
@@ -15,7 +16,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use super::speak::complain;
 use super::{CliError, Exit, LONG_VERSION, interrupt};
-use crate::paper::Figure;
+use crate::paper::{Figure, figures};
 
 /// Reference software for the breakdown of determinism at a two-fold singularity (Jeffrey 2013).
 #[derive(Debug, Parser)]
@@ -28,6 +29,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Run(Box<run::Arguments>),
+    Figure(Box<figure::Arguments>),
     Sweep(Box<sweep::Arguments>),
     Check(check::Arguments),
     Bless(bless::Arguments),
@@ -37,8 +39,8 @@ enum Command {
     Man(manual::Man),
 }
 
-/// The program `twofold`; `figures` are those that it can check.
-pub fn main(figures: fn() -> Vec<Figure>) -> ExitCode {
+/// The program `twofold`.
+pub fn main() -> ExitCode {
     interrupt::listen();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
@@ -46,9 +48,10 @@ pub fn main(figures: fn() -> Vec<Figure>) -> ExitCode {
     };
     let result = match arguments.command {
         Command::Run(arguments) => run::run(&arguments),
+        Command::Figure(arguments) => figure::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),
-        Command::Check(arguments) => check::run(&arguments, figures),
-        Command::Bless(arguments) => bless::run(&arguments, figures),
+        Command::Check(arguments) => check::run(&arguments),
+        Command::Bless(arguments) => bless::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Completions(arguments) => manual::completions(&arguments, Arguments::command()),
@@ -71,7 +74,8 @@ pub(super) fn usage(error: &clap::Error) -> Exit {
 }
 
 /// The figures of these names, or all.
-fn chosen(all: Vec<Figure>, names: &[String]) -> Result<Vec<Figure>, CliError> {
+fn chosen(names: &[String]) -> Result<Vec<Figure>, CliError> {
+    let all = figures::all();
     if let Some(unknown) = names.iter().find(|n| !all.iter().any(|f| f.id == *n)) {
         let known: Vec<&str> = all.iter().map(|f| f.id).collect();
         return Err(CliError::Usage(format!("there is no figure \"{unknown}\"; choose among {}", known.join(", "))));

@@ -8,8 +8,9 @@ use crate::cli::progress::Progress;
 use crate::cli::speak::print_json;
 use crate::cli::{CliError, Exit, in_pool, print};
 use crate::compare::{Comparison, Limits, Rung, SizesDiffer, compare};
+use crate::job::Desk;
 use crate::paper::Figure;
-use crate::paper::pipeline::{Computed, compute, pixel_hash};
+use crate::paper::pipeline::{Computed, compute, pixel_hash, questions};
 use crate::record::{FileBytes, Hash, read_tree};
 use crate::render::{decode_png, png_size};
 
@@ -44,6 +45,9 @@ pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool, jso
         )));
     }
     let progress = Progress::new(quiet);
+    let desk = Desk::new(None, &progress);
+    let wanted = figures.iter().flat_map(|f| &f.pictures).filter(|p| !named(&p.name).is_empty());
+    in_pool(threads, || desk.gather(&questions(wanted)))?;
     let limits = Limits::default();
     let mut findings = Vec::new();
     let mut say = |finding: Finding| {
@@ -64,7 +68,7 @@ pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool, jso
             say(passed_over(&picture.name, "not in the folder, not checked"))?;
             continue;
         }
-        let computed = in_pool(threads, || compute(picture, &progress))??;
+        let computed = compute(picture, &desk)?;
         for file in files {
             say(held(file, &computed, &limits))?;
         }

@@ -2,15 +2,14 @@
 
 use std::path::PathBuf;
 
+use serde_json::json;
+
 use crate::cli::exit::part_of;
 use crate::cli::flags::{RunFlags, Use};
-use crate::cli::interrupt::{Grace, Stoppable};
 use crate::cli::progress::Progress;
 use crate::cli::speak::{deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
-use crate::integrate::StopReason;
-use crate::job::encode;
-use crate::job::simulate::simulate;
+use crate::job::{Desk, JobError, Question, Run, Stop, encode};
 
 /// Compute one run: its path, or with --section its passages through a plane.
 ///
@@ -57,20 +56,15 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         deliver(out, &text)?;
         return Ok(Exit::Fine);
     }
-    let grace = Grace::new();
-    let progress = Progress::new(arguments.quiet);
-    let watch = progress.run("run".into(), spec.t_end);
-    let result = simulate(&spec, &Stoppable { watch: &watch, grace: &grace });
-    watch.done(&match &result {
-        Ok(r) => format!("{} steps, {} points", r.statistics.steps, r.data.len()),
-        Err(_) => "failed".into(),
-    });
-    let recording = result?;
+    let progress = Progress::with_grace(arguments.quiet);
+    let run = Run(spec);
+    let answer = Desk::new(None, &progress).ask(&run)?;
+    let about = json!({ "kind": run.kind(), "question": run.json(), "stop": answer.stop });
     let bytes = match arguments.format.unwrap_or(Format::Csv) {
-        Format::Csv => encode::csv(&spec, &recording.data),
-        Format::Json => encode::json(&spec, &recording),
+        Format::Csv => encode::csv(&answer.tables[0], &about),
+        Format::Json => encode::json(&answer, &about),
     };
-    let stopped = if recording.stop == StopReason::Watch { grace.asked_to_stop() } else { None };
+    let stopped = if answer.stop == Stop::Interrupted { progress.asked_to_stop() } else { None };
     let Some(exit) = stopped else {
         deliver(out, &bytes)?;
         return Ok(Exit::Fine);
@@ -78,7 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let part = out.filter(|f| !is_standard_output(f)).map(part_of);
     deliver(part.as_deref(), &bytes)?;
     let place = part.map_or("standard output".to_owned(), |p| p.display().to_string());
-    let said =
-        format!("interrupted at t = {}: the {} points up to there are in {place}", recording.t, recording.data.len());
+    let t: f64 = answer.fact("t").map_err(JobError::from)?;
+    let said = format!("interrupted at t = {t}: the {} rows up to there are in {place}", answer.rows());
     Err(CliError::Stopped { said, exit })
 }

@@ -10,14 +10,11 @@ use serde_json::json;
 use crate::analyse::attractor::{Evidence, Verdict};
 use crate::cli::exit::part_of;
 use crate::cli::flags::{RunFlags, Use};
-use crate::cli::interrupt::{Grace, Stoppable};
 use crate::cli::progress::Progress;
 use crate::cli::speak::{complain, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit, in_pool};
-use crate::integrate::StopReason;
-use crate::job::simulate::{Data, RunError, simulate};
 use crate::job::spec::RunSpec;
-use crate::paper::verdict::section_evidence;
+use crate::job::{Classification, Desk, JobError};
 
 /// The most runs of one sweep: their rows are kept in memory.
 const MOST_RUNS: u32 = 1_000_000;
@@ -57,7 +54,7 @@ pub struct Arguments {
 /// What became of one run.
 struct Row {
     shift: f64,
-    end: Result<Evidence, RunError>,
+    end: Result<Evidence, JobError>,
 }
 
 impl Row {
@@ -85,12 +82,17 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     }
     let out = arguments.out.as_deref();
     try_delivery(out)?;
-    let grace = Grace::new();
-    let progress = Progress::new(arguments.quiet);
+    let progress = Progress::with_grace(arguments.quiet);
     let rows: Vec<Option<Row>> = in_pool(arguments.threads, || {
         (1..=arguments.runs)
             .into_par_iter()
-            .map(|k| one(&spec, f64::from(k) * arguments.shift, k, &progress, &grace))
+            .map(|k| {
+                if progress.asked_to_stop().is_some() {
+                    None
+                } else {
+                    one(&spec, f64::from(k) * arguments.shift, &progress)
+                }
+            })
             .collect()
     })?;
     let rows: Vec<Row> = rows.into_iter().flatten().collect();
@@ -100,7 +102,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     }
     let bytes = if arguments.json { as_json(&spec, &rows, &counts, arguments) } else { as_csv(&rows).into_bytes() };
     if (rows.len() as u64) < u64::from(arguments.runs)
-        && let Some(exit) = grace.asked_to_stop()
+        && let Some(exit) = progress.asked_to_stop()
     {
         let part = out.filter(|f| !is_standard_output(f)).map(part_of);
         deliver(part.as_deref(), &bytes)?;
@@ -127,24 +129,14 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 }
 
 /// One run, or nothing if it was interrupted.
-fn one(spec: &RunSpec, shift: f64, k: u32, progress: &Progress, grace: &Grace) -> Option<Row> {
-    if grace.asked_to_stop().is_some() {
-        return None;
-    }
+fn one(spec: &RunSpec, shift: f64, progress: &Progress) -> Option<Row> {
     let mut shifted = *spec;
     shifted.start[0] += shift;
-    let watch = progress.run(format!("run {k}"), spec.t_end);
-    let recording = simulate(&shifted, &Stoppable { watch: &watch, grace });
-    watch.done(match &recording {
-        Ok(r) if r.stop == StopReason::Watch => return None,
-        Ok(_) => "done",
-        Err(_) => "failed",
-    });
-    let end = recording.and_then(|recording| match &recording.data {
-        Data::Section(crossings) => section_evidence(&shifted, &recording, crossings),
-        _ => unreachable!("`Use::Passages` gives specs of sections only"),
-    });
-    Some(Row { shift, end })
+    // A desk of its own: what it has computed is forgotten with it, however many runs there are.
+    match Classification::of(shifted).ask(&Desk::new(None, progress)) {
+        Err(JobError::Interrupted) => None,
+        end => Some(Row { shift, end }),
+    }
 }
 
 fn as_csv(rows: &[Row]) -> String {

@@ -4,16 +4,16 @@
 pub mod assembly;
 pub mod portrait;
 
-use crate::job::table::{Entry, Table};
+use crate::job::table::{Column, Entry, Table};
 
 /// Lines of a sketch as a table: a name per line, a row per point.
 fn lines_table<const N: usize>(columns: [&str; N], lines: &[(String, Vec<[f64; N]>)]) -> Table {
-    let mut table = Table::new("lines", &[&["line"], &columns[..]].concat());
+    let mut table = Table::new("lines", std::iter::once(Column::words("line")).chain(columns.map(Column::numbers)));
     for (name, points) in lines {
         for point in points {
             let mut row = vec![Entry::Word(name.clone())];
             row.extend(point.map(Entry::Number));
-            table.rows.push(row);
+            table.push(row);
         }
     }
     table
@@ -22,7 +22,7 @@ fn lines_table<const N: usize>(columns: [&str; N], lines: &[(String, Vec<[f64; N
 /// The lines of such a table, in order.
 fn lines_of<const N: usize>(table: &Table) -> Vec<(String, Vec<[f64; N]>)> {
     let mut lines: Vec<(String, Vec<[f64; N]>)> = Vec::new();
-    for row in &table.rows {
+    for row in table.rows() {
         let (Some(Entry::Word(name)), numbers) = (row.first(), &row[1..]) else { continue };
         let point: [f64; N] = std::array::from_fn(|i| match numbers.get(i) {
             Some(Entry::Number(v)) => *v,

@@ -6,7 +6,7 @@ use nalgebra::vector;
 use super::super::surface;
 use super::{lines_of, lines_table};
 use crate::integrate::filippov::{ExitRule, Mode, Settings, Side, Trajectory, run};
-use crate::job::simulate::RunError;
+use crate::job::JobError;
 use crate::job::table::Table;
 use crate::render::Sheet;
 use crate::render::sheet::{
@@ -24,7 +24,7 @@ pub fn system(v: f64, w: f64) -> Caricature {
 }
 
 /// Computed orbits: single flights of f+ and f- between two crossings, and sliding orbits in both sliding regions.
-pub fn tables(v: f64, w: f64) -> Result<Vec<Table>, RunError> {
+pub fn tables(v: f64, w: f64) -> Result<Vec<Table>, JobError> {
     let system = system(v, w);
     let settings = Settings::default();
     let mut lines: Vec<(String, Vec<[f64; 3]>)> = Vec::new();
@@ -33,7 +33,7 @@ pub fn tables(v: f64, w: f64) -> Result<Vec<Table>, RunError> {
                   start: [f64; 3],
                   mode: fn(Mode) -> bool,
                   t_end: f64|
-     -> Result<(), RunError> {
+     -> Result<(), JobError> {
         let mut trajectory = Trajectory::new(12).until_two_fold();
         // Long sliding: the portrait shows the sliding flow up to the region's edge, not a choice of exit.
         let rule = ExitRule::AfterTime { time: t_end, side: Side::Plus };

@@ -1,0 +1,387 @@
+//! The breakdown of determinism, in digits. Not a figure of the paper; it puts numbers on the paper's claim.
+//!
+//! Left: how many digits of each passage through y = 0 a method gets right. Right: what the first visit to the singularity makes
+//! of a small disturbance, as a function of the stiffness.
+
+use std::sync::Arc;
+
+use nalgebra::SVector;
+use rayon::prelude::*;
+use serde_json::{Value, json};
+use twofold::analyse::digits::{
+    Agreement, ExtendedCrossing, ExtendedPoint, Plane, agreement, amplification, reference,
+};
+use twofold::integrate::{Dopri5, Failure, Lsoda, Radau5, StepCap, Taylor, Tolerance};
+use twofold::job::spec::Method;
+use twofold::job::table::{Column, Entry, Table};
+use twofold::job::{AnyQuestion, JobError};
+use twofold::num::elementary::{exp10, log10};
+use twofold::num::{Arithmetic, DoubleDouble, Scalar};
+use twofold::paper::study::Computed;
+use twofold::paper::wording::number;
+use twofold::paper::{Figure, Reading, Study};
+use twofold::render::sheet::*;
+use twofold::render::style;
+use twofold::system::{Caricature, Smoothed, Transition};
+
+/// The start of the paper's runs.
+const START: [f64; 3] = [0.2, 0.0, -1.0];
+/// Passages through y = 0 are compared.
+const SECTION: Plane = Plane { coordinate: 1, value: 0.0 };
+/// The stiffness parameter of the left panel.
+const EPS: f64 = 1e-3;
+/// Passages are compared up to this time.
+const T_END: f64 = 100.0;
+/// A passage this close to the singularity is a visit.
+const NEAR: f64 = 0.05;
+/// Longest step of the compared methods: that of fig. 7 (i).
+const MAX_STEP: f64 = 2.0;
+/// More passages than an orbit makes in these times.
+const MOST_PASSAGES: usize = 1000;
+/// Most steps of a compared method.
+const MAX_STEPS: u64 = 10_000_000;
+/// When disturbances are made, relative to the passage.
+const OFFSETS: [f64; 3] = [-0.1, 0.0, 0.1];
+/// Size of disturbances made at t = 0; they are contracted before they grow, so that it need not be tiny.
+const AT_START: f64 = 1e-8;
+/// The exit of the first visit must come before this time.
+const EXIT_BY: f64 = 60.0;
+/// Growth of a disturbance made near the singularity, reconstructed reading, measured outside this project: (eps, factor).
+const OUTSIDE: [(f64, f64); 3] = [(1e-2, 1e6), (1e-3, 1e10), (1e-4, 1e12)];
+
+/// Stiffness parameters of the right panel. The printed reading's first visit comes four times as late and is followed for fewer.
+fn ladder(reading: Reading) -> &'static [f64] {
+    match reading {
+        Reading::Printed => &[1e-2, 3e-3, 1e-3],
+        Reading::Reconstructed => &[1e-2, 3e-3, 1e-3, 3e-4, 1e-4],
+    }
+}
+
+/// The methods of the left panel, with their tolerances and looks.
+fn methods() -> [(Method, f64, Colour, MarkerShape); 6] {
+    [
+        (Method::Taylor, 1e-16, style::INK, MarkerShape::Star),
+        (Method::Dopri5, 1e-14, style::GREEN, MarkerShape::Square),
+        (Method::Dopri5, 1e-11, style::BLUE, MarkerShape::Square),
+        (Method::Dopri5, 1e-8, style::SKY, MarkerShape::Square),
+        (Method::Radau5, 1e-8, style::VERMILLION, MarkerShape::Triangle),
+        (Method::Lsoda, exp10(-7.97727), style::PURPLE, MarkerShape::Dot),
+    ]
+}
+
+fn question(reading: Reading) -> Value {
+    json!({
+        "study": "digits",
+        "system": reading.caricature(),
+        "start": START,
+        "section": SECTION,
+        "near": NEAR,
+        "agreement": {
+            "eps": EPS, "t_end": T_END, "max_step": MAX_STEP, "max_steps": MAX_STEPS,
+            "methods": methods().map(|m| json!({"name": m.0, "tolerance": m.1})),
+        },
+        "growth": { "eps": ladder(reading), "offsets": OFFSETS, "at_start": AT_START, "exit_by": EXIT_BY },
+        "outside": outside(reading),
+    })
+}
+
+fn outside(reading: Reading) -> &'static [(f64, f64)] {
+    match reading {
+        Reading::Printed => &[],
+        Reading::Reconstructed => &OUTSIDE,
+    }
+}
+
+fn smoothed(reading: Reading, eps: f64) -> Smoothed<Caricature> {
+    Smoothed { system: reading.caricature(), transition: Transition::Tanh, eps }
+}
+
+fn start() -> ExtendedPoint {
+    SVector::from(START).map(DoubleDouble::from_f64)
+}
+
+/// Largest component of a crossing's state.
+fn extent(crossing: &ExtendedCrossing) -> f64 {
+    crossing.x.map(|c| c.to_f64()).amax()
+}
+
+fn compute(reading: Reading) -> Result<Vec<Table>, JobError> {
+    let (left, right) = rayon::join(|| digits(reading), || growth(reading));
+    let mut tables = left?;
+    tables.extend(right?);
+    Ok(tables)
+}
+
+/// The digits of each method, and the visits.
+fn digits(reading: Reading) -> Result<Vec<Table>, Failure> {
+    let field = smoothed(reading, EPS);
+    let exact = reference(&field, start(), SECTION, MOST_PASSAGES, T_END, false)?;
+    let mut visits = Table::new("visits", [Column::numbers("t"), Column::numbers("distance")]);
+    for crossing in exact.iter().filter(|c| extent(c) < NEAR) {
+        visits.push(vec![crossing.t.to_f64().into(), extent(crossing).into()]);
+    }
+    let follow = |method, tolerance| -> Result<Vec<Agreement>, Failure> {
+        let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
+        let (x0, cap) = (SVector::from(START), StepCap::Absolute(MAX_STEP));
+        match method {
+            Method::Lsoda => agreement(&field, x0, SECTION, &exact, &mut Lsoda::new(tolerance), cap, MAX_STEPS),
+            Method::Radau5 => agreement(&field, x0, SECTION, &exact, &mut Radau5::new(tolerance), cap, MAX_STEPS),
+            Method::Dopri5 => agreement(&field, x0, SECTION, &exact, &mut Dopri5::new(tolerance), cap, MAX_STEPS),
+            Method::Taylor | Method::TaylorExtended => {
+                agreement(&field, x0, SECTION, &exact, &mut Taylor::new(tolerance), cap, MAX_STEPS)
+            }
+        }
+    };
+    let mut rows = Table::new(
+        "agreement",
+        [
+            Column::words("method"),
+            Column::numbers("tolerance"),
+            Column::numbers("crossing"),
+            Column::numbers("t"),
+            Column::numbers("error"),
+            Column::numbers("digits"),
+        ],
+    );
+    for (method, tolerance, _, _) in methods() {
+        for a in follow(method, tolerance)? {
+            let numbers = [tolerance, a.crossing as f64, a.t, a.error, -a.log10_error];
+            rows.push(std::iter::once(method.name().into()).chain(numbers.map(Entry::from)).collect::<Vec<_>>());
+        }
+    }
+    Ok(vec![rows, visits])
+}
+
+/// The growth of disturbances over the first visit.
+fn growth(reading: Reading) -> Result<Vec<Table>, Failure> {
+    let found: Vec<Result<Vec<Vec<Entry>>, Failure>> =
+        ladder(reading).par_iter().map(|&eps| grown(reading, eps)).collect();
+    let mut rows = Table::new(
+        "growth",
+        [
+            Column::numbers("eps"),
+            Column::words("made"),
+            Column::numbers("t"),
+            Column::numbers("t_visit"),
+            Column::numbers("t_exit"),
+            Column::numbers("x"),
+            Column::numbers("y"),
+            Column::numbers("z"),
+        ],
+    );
+    for here in found {
+        rows.extend(here?);
+    }
+    let mut others = Table::new("outside", [Column::numbers("eps"), Column::numbers("growth")]);
+    others.extend(outside(reading).iter().map(|&(eps, factor)| vec![eps.into(), factor.into()]));
+    Ok(vec![rows, others])
+}
+
+fn grown(reading: Reading, eps: f64) -> Result<Vec<Vec<Entry>>, Failure> {
+    let field = smoothed(reading, eps);
+    let Some(visit) = amplification(&field, SVector::from(START), SECTION, NEAR, &OFFSETS, EXIT_BY)? else {
+        return Ok(Vec::new());
+    };
+    let row = |made: &str, t: f64, factors: [f64; 3]| -> Vec<Entry> {
+        let mut row = vec![eps.into(), made.into(), t.into(), visit.t.into(), visit.exit_t.into()];
+        row.extend(factors.map(Entry::from));
+        row
+    };
+    let mut rows: Vec<_> = visit.rows.iter().map(|r| row("near", r.t, r.factors)).collect();
+    // From the start: the same crossing of the undisturbed and of the disturbed orbits.
+    let orbit = |x0| reference(&field, x0, SECTION, MOST_PASSAGES, visit.exit_t + 0.1, false);
+    let undisturbed = orbit(start())?;
+    let Some(exit) = undisturbed.iter().position(|c| c.t.to_f64() >= visit.exit_t) else { return Ok(rows) };
+    let mut factors = [f64::NAN; 3];
+    for component in 0..3 {
+        let mut x0 = start();
+        x0[component] += DoubleDouble::from_f64(AT_START);
+        if let Some(moved) = orbit(x0)?.get(exit) {
+            factors[component] = (moved.x - undisturbed[exit].x).map(|c| c.to_f64()).amax() / AT_START;
+        }
+    }
+    rows.push(row("start", 0.0, factors));
+    Ok(rows)
+}
+
+fn value(entry: &Entry) -> f64 {
+    if let Entry::Number(v) = entry { *v } else { f64::NAN }
+}
+
+/// Where a disturbance is made and in which direction: one series of the right panel.
+struct Series {
+    words: &'static str,
+    colour: Colour,
+    shape: MarkerShape,
+    /// (eps, growth), several growths for one eps.
+    points: Vec<[f64; 2]>,
+}
+
+/// The series of the right panel.
+fn series(growth: &Table) -> [Series; 3] {
+    let pick = |made: &str, components: &[usize]| {
+        let rows = growth.rows().into_iter().filter(|r| r[1] == Entry::from(made));
+        rows.map(|r| [value(&r[0]), components.iter().map(|c| value(&r[5 + c])).fold(0.0, f64::max)]).collect()
+    };
+    [
+        Series {
+            words: "near it, across the layer (*x*)",
+            colour: style::VERMILLION,
+            shape: MarkerShape::Dot,
+            points: pick("near", &[0]),
+        },
+        Series {
+            words: "near it, along the layer (*y*, *z*)",
+            colour: style::BLUE,
+            shape: MarkerShape::Square,
+            points: pick("near", &[1, 2]),
+        },
+        Series {
+            words: "at the start, *t* = 0",
+            colour: style::GREEN,
+            shape: MarkerShape::Triangle,
+            points: pick("start", &[0, 1, 2]),
+        },
+    ]
+}
+
+impl Series {
+    /// The largest growth for each eps.
+    fn largest(&self) -> Vec<[f64; 2]> {
+        let mut largest: Vec<[f64; 2]> = Vec::new();
+        for &[eps, factor] in &self.points {
+            match largest.last_mut() {
+                Some(last) if last[0] == eps => last[1] = last[1].max(factor),
+                _ => largest.push([eps, factor]),
+            }
+        }
+        largest
+    }
+
+    /// Digits of growth per decade of eps: the slope of log10 of the largest growth over -log10 eps, by least squares.
+    fn digits_per_decade(&self) -> f64 {
+        let points: Vec<[f64; 2]> = self.largest().iter().map(|p| [-log10(p[0]), log10(p[1])]).collect();
+        let n = points.len() as f64;
+        let mean = |i: usize| points.iter().map(|p| p[i]).sum::<f64>() / n;
+        let (x, y) = (mean(0), mean(1));
+        points.iter().map(|p| (p[0] - x) * (p[1] - y)).sum::<f64>()
+            / points.iter().map(|p| (p[0] - x) * (p[0] - x)).sum::<f64>()
+    }
+}
+
+fn draw(tables: &[Table]) -> Sheet {
+    let [rows, visits, growth, others] = tables else { unreachable!("compute makes four tables") };
+    let mut digits =
+        PlanePanel::new(Axis::linear("*t*", 0.0, T_END), Axis::linear("digits that are right", -2.0, 17.0));
+    for visit in visits.rows() {
+        let t = value(&visit[0]);
+        digits = digits.line(vec![[t, -2.0], [t, 17.0]], LineStyle::new(style::MAGENTA, style::CURVE_PT).dashed());
+    }
+    let mut lines = Vec::new();
+    for (method, tolerance, colour, shape) in methods().into_iter().rev() {
+        let mine = |r: &&Vec<Entry>| r[0] == Entry::from(method.name()) && r[1] == Entry::from(tolerance);
+        let points: Vec<[f64; 2]> = rows.rows().iter().filter(mine).map(|r| [value(&r[3]), value(&r[5])]).collect();
+        let (line, marker) = (LineStyle::new(colour, style::FRAME_PT), MarkerStyle { shape, colour, size: 3.2 });
+        digits = digits.line(points.clone(), line).markers(points, marker);
+        lines.push((LegendKey::LineMarker(line, marker), format!("{} {}", method.name(), number(tolerance))));
+    }
+    for (key, words) in lines.into_iter().rev() {
+        digits = digits.legend(key, words);
+    }
+    let digits = digits
+        .legend(LegendKey::Line(LineStyle::new(style::MAGENTA, style::CURVE_PT).dashed()), "visit")
+        .legend_at(Corner::UpperRight);
+
+    let series = series(growth);
+    let outside: Vec<[f64; 2]> = others.rows().iter().map(|r| [value(&r[0]), value(&r[1])]).collect();
+    let mut amplified =
+        PlanePanel::new(Axis::log("*ε*", 6e-5, 1.6e-2), Axis::log("growth of a disturbance", 1e-4, 1e27));
+    for (level, words, at, anchor) in [
+        (1.0, "neither grows nor shrinks", 6.6e-5, Anchor::Left),
+        (1e8, "10^{−8} becomes 1", 6.6e-5, Anchor::Left),
+        (1e16, "10^{−16} becomes 1", 1.45e-2, Anchor::Right),
+    ] {
+        amplified = amplified
+            .line(vec![[6e-5, level], [1.6e-2, level]], LineStyle::new(style::SOFT_INK, style::FRAME_PT).dotted())
+            .note([at, level * 5.0], words, anchor);
+    }
+    for s in &series {
+        let style = MarkerStyle { shape: s.shape, colour: s.colour, size: 4.0 };
+        amplified =
+            amplified.line(s.largest(), LineStyle::new(s.colour, style::CURVE_PT)).markers(s.points.clone(), style);
+        amplified = amplified.legend(LegendKey::Marker(style), s.words);
+    }
+    if !outside.is_empty() {
+        let hollow = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::INK, size: 5.0 };
+        amplified = amplified.markers(outside, hollow).legend(LegendKey::Marker(hollow), "measured elsewhere");
+    }
+    let amplified = amplified.legend_at(Corner::UpperRight);
+    let sheet = Sheet::new(ColumnWidth::Double, 2, "")
+        .panel_aspect(0.95)
+        .panel("(a)", format!("passages through *y* = 0, *ε* = {}", number(EPS)), digits)
+        .panel("(b)", "what the first visit makes of a disturbance", amplified);
+    footer(rows, visits, &series).into_iter().fold(sheet, Sheet::footer)
+}
+
+/// What the tables say, in words.
+fn footer(rows: &Table, visits: &Table, series: &[Series; 3]) -> Vec<String> {
+    let mut lines = vec![
+        "(a) −log_{10} of the largest difference in a coordinate between a method’s *n*th passage and that of an orbit in \
+         double-double arithmetic (32 digits). "
+            .to_owned()
+            + &format!("Visit: a passage within {} of the singularity. Steps up to {}.", number(NEAR), number(MAX_STEP)),
+    ];
+    if let Some(first) = visits.rows().first().map(|r| value(&r[0])) {
+        let around = methods().map(|(method, tolerance, _, _)| {
+            let mine: Vec<_> = rows
+                .rows()
+                .iter()
+                .filter(|r| r[0] == Entry::from(method.name()) && r[1] == Entry::from(tolerance))
+                .map(|r| (value(&r[3]), value(&r[5])))
+                .collect();
+            let before = mine.iter().filter(|r| r.0 < first).map(|r| r.1).fold(f64::INFINITY, f64::min);
+            let after = mine.iter().find(|r| r.0 > first).map_or(f64::NAN, |r| r.1);
+            format!("{} {}: {before:.1} → {after:.1}", method.name(), number(tolerance)).replace('-', "−")
+        });
+        lines.push(format!(
+            "Fewest digits before the first visit (*t* = {first:.2}), and digits at the next passage after it: {}.",
+            around.join("; ")
+        ));
+    }
+    let slopes: Vec<String> =
+        series.iter().map(|s| format!("{:.1} ({})", s.digits_per_decade(), s.words).replace('-', "−")).collect();
+    lines.push(format!(
+        "(b) Distance at the exit over the size of the disturbance; the exit is the first passage beyond {}. Made near it: {} before, at \
+         and {} after the passage; the line joins the largest. Digits by which the growth rises for each decade that *ε* falls, least squares: {}.",
+        number(NEAR),
+        number(-OFFSETS[0]),
+        number(OFFSETS[2]),
+        slopes.join(", "),
+    ));
+    lines
+}
+
+fn study(reading: Reading, compute: fn() -> Result<Vec<Table>, JobError>) -> Vec<AnyQuestion> {
+    vec![Arc::new(Computed { kind: "digits", question: question(reading), cost: 2.0e5, compute })]
+}
+
+/// The figure's specification.
+pub fn figure() -> Figure {
+    Figure::studied_in_both_readings(
+        "digits",
+        "The breakdown of determinism, in digits",
+        "(a) Digits of each passage through y = 0 that a method gets right, against time; dashed lines mark visits to the \
+                  singularity. (b) Growth of a small disturbance until the exit from the first visit, against ε, for disturbances made \
+                  near the singularity across and along the switching layer and for disturbances made at the start.",
+        [
+            Study {
+                questions: || study(Reading::Printed, || compute(Reading::Printed)),
+                draw: |answers| draw(&Study::tables(answers)),
+            },
+            Study {
+                questions: || study(Reading::Reconstructed, || compute(Reading::Reconstructed)),
+                draw: |answers| draw(&Study::tables(answers)),
+            },
+        ],
+    )
+}

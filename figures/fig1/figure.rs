@@ -1,0 +1,42 @@
+//! Fig. 1: the wheel assembly. A reconstruction: see `twofold::system::wheel`.
+
+use std::sync::Arc;
+
+use serde_json::json;
+use twofold::draw::sketch::assembly;
+use twofold::paper::study::Computed;
+use twofold::paper::{Figure, Picture, Study, View};
+use twofold::system::Wheel;
+
+/// Where on its line the wheel is drawn.
+const R: f64 = 0.69267;
+
+/// The figure's specification.
+pub fn figure() -> Figure {
+    Figure {
+        id: "fig1",
+        title: "The wheel assembly",
+        pictures: vec![Picture {
+            name: "fig1".into(),
+            reading: None,
+            title: "The wheel assembly",
+            caption: "The wheel assembly from above, to scale: a disc that turns at ω₀; a housing on it that turns at ω; in the housing \
+                      a line at distance d from the axle, on which a wheel rolls at an angle γ, held by a spring and a damper. The \
+                      slip h along the wheel's axle is the switching function. Our own reconstruction."
+                .into(),
+            view: View::Study(Study {
+                questions: || {
+                    vec![Arc::new(Computed {
+                        kind: "wheel-assembly",
+                        question: json!({ "wheel": Wheel::default(), "r": R }),
+                        cost: 1.0,
+                        compute: || Ok(assembly::tables(&Wheel::default(), R)),
+                    })]
+                },
+                draw: |answers| assembly::draw(&Study::tables(answers)),
+            }),
+            panels: Vec::new(),
+            alterations: Vec::new(),
+        }],
+    }
+}

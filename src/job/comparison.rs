@@ -1,0 +1,53 @@
+//! The question of how alike two paths are.
+
+use serde_json::{Value, json};
+
+use super::answer::Answer;
+use super::desk::Desk;
+use super::question::{JobError, Question};
+use super::recording::{Data, Recording};
+use super::run::Run;
+use super::spec::RunSpec;
+use crate::analyse::Sample;
+use crate::analyse::tangle::{STRIDES, Tangle, common_box};
+use crate::integrate::Watch;
+
+/// How organised two runs' paths are, and what they share. Facts: `freshness` (share of each path's strides into new places) and
+/// `shared` ([`Shared`](crate::analyse::tangle::Shared)).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathComparison(pub RunSpec, pub RunSpec);
+
+impl Question for PathComparison {
+    fn kind(&self) -> &'static str {
+        "path-comparison"
+    }
+
+    fn json(&self) -> Value {
+        json!({ "runs": [self.0, self.1], "strides": STRIDES })
+    }
+
+    fn label(&self) -> String {
+        "two paths compared".into()
+    }
+
+    fn cost(&self) -> f64 {
+        Run(self.0).cost() + Run(self.1).cost()
+    }
+
+    fn compute(&self, desk: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        let (a, b) = (path(desk, &self.0)?, path(desk, &self.1)?);
+        let range = common_box([&a[..], &b[..]]);
+        let (a, b) = (Tangle::new(&a, &range), Tangle::new(&b, &range));
+        Ok(Answer::of_tables(Vec::new())
+            .with_fact("freshness", &[a.freshness(), b.freshness()])
+            .with_fact("shared", &a.compare(&b)))
+    }
+}
+
+fn path(desk: &Desk<'_>, run: &RunSpec) -> Result<Vec<Sample>, JobError> {
+    let recording = Recording::of_answer(run, &*desk.ask(&Run(*run))?)?.whole()?;
+    match recording.data {
+        Data::Path(samples) => Ok(samples),
+        _ => Err(JobError::Other("only paths can be compared as paths; leave out --section".into())),
+    }
+}

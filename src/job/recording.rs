@@ -1,0 +1,372 @@
+//! What a run records, as typed data and as an [`Answer`]'s tables.
+//!
+//! | observation | table | columns |
+//! |---|---|---|
+//! | path | `path` | t, state |
+//! | section | `section` | t, state, direction |
+//! | Filippov motion | `motion`, `events` | t, state, mode, piece; t, state and what happened |
+//! | funnel | `motion`, `events` | the same with the number of the future (0 is the approach), its exit time and side |
+
+use nalgebra::SVector;
+
+use super::answer::{Answer, NoSuchFact, Stop};
+use super::question::JobError;
+use super::spec::RunSpec;
+use super::table::{Column, Entry, Table};
+use crate::analyse::{Crossing, Direction, Motion, Sample};
+use crate::integrate::filippov::{EventKind, ExitRule, Mode, ModeEvent, Side};
+use crate::integrate::{Statistics, StopReason};
+use crate::record::hash::canonical_json;
+
+/// What a run left behind.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// The recorded points.
+    pub data: Data,
+    /// Final time.
+    pub t: f64,
+    /// Final state (first three components).
+    pub x: [f64; 3],
+    /// Work done.
+    pub statistics: Statistics,
+    /// The largest number of steps between restarts; NDSolve's default limit is 10,000.
+    pub most_steps_in_segment: u64,
+    /// Why it ended.
+    pub stop: StopReason,
+}
+
+/// Recorded points.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Data {
+    /// A path.
+    Path(Vec<Sample>),
+    /// A Poincare section.
+    Section(Vec<Crossing>),
+    /// A Filippov motion: pieces by mode, and events.
+    Motion(Motion),
+    /// The approach to a set-valued point and its futures.
+    Funnel {
+        /// The motion up to there.
+        approach: Motion,
+        /// The futures, by exit time, plus before minus.
+        futures: Vec<Future>,
+    },
+}
+
+/// One future of a set-valued point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Future {
+    /// Time of repelling sliding asked for.
+    pub exit_time: f64,
+    /// The side left to.
+    pub side: Side,
+    /// The motion from the set-valued point on.
+    pub motion: Motion,
+}
+
+impl Data {
+    /// Number of recorded points.
+    pub fn len(&self) -> usize {
+        match self {
+            Data::Path(samples) => samples.len(),
+            Data::Section(crossings) => crossings.len(),
+            Data::Motion(motion) => motion.len(),
+            Data::Funnel { approach, futures } => {
+                approach.len() + futures.iter().map(|f| f.motion.len()).sum::<usize>()
+            }
+        }
+    }
+
+    /// Whether nothing was recorded.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// Unit of every column of a state or a time: the systems here are dimensionless.
+const PURE: &str = "1";
+
+impl Recording {
+    /// The recording, unless it was interrupted.
+    ///
+    /// # Errors
+    ///
+    /// [`JobError::Interrupted`]: nothing may rest on half a run.
+    pub fn whole(self) -> Result<Self, JobError> {
+        if self.stop == StopReason::Watch { Err(JobError::Interrupted) } else { Ok(self) }
+    }
+
+    /// The recording as an answer.
+    pub fn to_answer(&self, run: &RunSpec) -> Answer {
+        let names = run.system.coordinates();
+        let tables = match &self.data {
+            Data::Path(samples) => vec![path_table(&names, samples)],
+            Data::Section(crossings) => vec![section_table(&names, crossings)],
+            Data::Motion(motion) => motion_tables(&names, &[Member { motion, future: None }]),
+            Data::Funnel { approach, futures } => {
+                let mut members = vec![Member { motion: approach, future: None }];
+                members
+                    .extend(futures.iter().map(|f| Member { motion: &f.motion, future: Some((f.exit_time, f.side)) }));
+                motion_tables(&names, &members)
+            }
+        };
+        Answer { statistics: Some(self.statistics.clone()), stop: self.stop.into(), ..Answer::of_tables(tables) }
+            .with_fact("t", &self.t)
+            .with_fact("state", &self.x)
+            .with_fact("most_steps_in_segment", &self.most_steps_in_segment)
+    }
+
+    /// The recording that an answer to `run` holds.
+    ///
+    /// # Errors
+    ///
+    /// If the answer is not one to a run like this.
+    pub fn of_answer(run: &RunSpec, answer: &Answer) -> Result<Self, NoSuchFact> {
+        let names = run.system.coordinates();
+        let data = if let Some(table) = answer.table("path") {
+            Data::Path(samples(&names, table))
+        } else if let Some(table) = answer.table("section") {
+            let directions = table.words("direction").map(|w| if w == "up" { Direction::Up } else { Direction::Down });
+            let points = samples(&names, table).into_iter().zip(directions);
+            Data::Section(points.map(|(s, direction)| Crossing { t: s.t, x: s.x, direction }).collect())
+        } else if let (Some(motion), Some(events)) = (answer.table("motion"), answer.table("events")) {
+            let mut members = members_of(&names, motion, events)?;
+            let approach = members.remove(0).1;
+            // A funnel may be empty, a motion never has futures: the question says which it is.
+            match run.switch {
+                super::spec::SwitchSpec::Filippov { funnel: Some(_), .. } => Data::Funnel {
+                    approach,
+                    futures: members
+                        .into_iter()
+                        .filter_map(|(future, motion)| {
+                            future.map(|(exit_time, side)| Future { exit_time, side, motion })
+                        })
+                        .collect(),
+                },
+                _ => Data::Motion(approach),
+            }
+        } else {
+            let known: Vec<&str> = answer.tables.iter().map(|t| t.name.as_str()).collect();
+            let why = format!("there is no table of points among {}", known.join(", "));
+            return Err(NoSuchFact { name: "path".into(), why });
+        };
+        Ok(Self {
+            data,
+            t: answer.fact("t")?,
+            x: answer.fact("state")?,
+            statistics: answer.statistics.clone().unwrap_or_default(),
+            most_steps_in_segment: answer.fact("most_steps_in_segment")?,
+            stop: match answer.stop {
+                Stop::Finished => StopReason::EndTime,
+                Stop::Found => StopReason::Observer,
+                Stop::SetValued => StopReason::SetValued,
+                Stop::StepBudget => StopReason::StepBudget,
+                Stop::Interrupted => StopReason::Watch,
+            },
+        })
+    }
+}
+
+fn point_columns(names: &[&str; 3]) -> Vec<Column> {
+    std::iter::once(&"t").chain(names).map(|name| Column::new(name, PURE, super::table::Kind::Number)).collect()
+}
+
+fn point(t: f64, x: [f64; 3]) -> Vec<Entry> {
+    std::iter::once(t).chain(x).map(Entry::from).collect()
+}
+
+fn path_table(names: &[&str; 3], samples: &[Sample]) -> Table {
+    let mut table = Table::new("path", point_columns(names));
+    samples.iter().for_each(|s| table.push(point(s.t, s.x)));
+    table
+}
+
+fn section_table(names: &[&str; 3], crossings: &[Crossing]) -> Table {
+    let mut table = Table::new("section", point_columns(names).into_iter().chain([Column::words("direction")]));
+    for c in crossings {
+        let mut row = point(c.t, c.x);
+        row.push(c.direction.word().into());
+        table.push(row);
+    }
+    table
+}
+
+fn samples(names: &[&str; 3], table: &Table) -> Vec<Sample> {
+    let [t, x, y, z] = ["t", names[0], names[1], names[2]].map(|name| table.numbers(name));
+    t.iter().zip(x).zip(y).zip(z).map(|(((t, x), y), z)| Sample { t: *t, x: [*x, *y, *z] }).collect()
+}
+
+/// A motion, and which future it is if it is one.
+struct Member<'a> {
+    motion: &'a Motion,
+    future: Option<(f64, Side)>,
+}
+
+fn side_word(side: Side) -> &'static str {
+    match side {
+        Side::Plus => "plus",
+        Side::Minus => "minus",
+    }
+}
+
+fn side_of(word: &str) -> Option<Side> {
+    [Side::Plus, Side::Minus].into_iter().find(|s| side_word(*s) == word)
+}
+
+const MODES: [(Mode, &str); 4] = [
+    (Mode::Plus, "plus"),
+    (Mode::Minus, "minus"),
+    (Mode::SlidingAttracting, "sliding-attracting"),
+    (Mode::SlidingRepelling, "sliding-repelling"),
+];
+
+fn mode_word(mode: Option<Mode>) -> &'static str {
+    MODES.iter().find(|(m, _)| Some(*m) == mode).map_or("", |(_, word)| word)
+}
+
+fn mode_of(word: &str) -> Option<Mode> {
+    MODES.iter().find(|(_, w)| *w == word).map(|(m, _)| *m)
+}
+
+fn motion_tables(names: &[&str; 3], members: &[Member<'_>]) -> Vec<Table> {
+    let future = || {
+        [
+            Column::integers("future"),
+            Column::new("exit_time", PURE, super::table::Kind::Number),
+            Column::words("exit_side"),
+        ]
+    };
+    let mut points = Table::new(
+        "motion",
+        point_columns(names).into_iter().chain([Column::words("mode"), Column::integers("piece")]).chain(future()),
+    );
+    let mut events = Table::new(
+        "events",
+        point_columns(names)
+            .into_iter()
+            .chain(["event", "from", "to", "side"].map(Column::words))
+            .chain(["leg", "error", "time", "arc"].map(Column::numbers))
+            .chain([Column::words("rule")])
+            .chain(future()),
+    );
+    for (number, member) in members.iter().enumerate() {
+        let which = || {
+            let (time, side) = member.future.map_or((f64::NAN, ""), |(time, side)| (time, side_word(side)));
+            [(number as i64).into(), time.into(), side.into()]
+        };
+        for (piece, (mode, samples)) in member.motion.pieces.iter().enumerate() {
+            for s in samples {
+                let mut row = point(s.t, s.x);
+                row.extend([mode_word(Some(*mode)).into(), (piece as i64).into()]);
+                row.extend(which());
+                points.push(row);
+            }
+        }
+        for event in &member.motion.events {
+            let mut row = point(event.t, event.state.into());
+            row.extend(event_cells(event));
+            row.extend(which());
+            events.push(row);
+        }
+    }
+    vec![points, events]
+}
+
+/// event, from, to, side, leg, error, time, arc, rule.
+fn event_cells(event: &ModeEvent<3>) -> [Entry; 9] {
+    let none = f64::NAN;
+    let (word, side, [leg, error, time, arc], rule) = match event.kind {
+        EventKind::Crossing { to } => ("crossing", Some(to), [none; 4], None),
+        EventKind::Landing { from } => ("landing", Some(from), [none; 4], None),
+        EventKind::Grazing { side } => ("grazing", Some(side), [none; 4], None),
+        EventKind::LeftByTangency { to } => ("left-by-tangency", Some(to), [none; 4], None),
+        EventKind::StartedOnSurface => ("started-on-surface", None, [none; 4], None),
+        EventKind::EnteredRepelling => ("entered-repelling", None, [none; 4], None),
+        EventKind::TwoFoldReached { leg, error } => ("two-fold-reached", None, [leg, error, none, none], None),
+        EventKind::Exit { to, time, arc, rule } => ("exit", Some(to), [none, none, time, arc], Some(rule)),
+        EventKind::ExitAtBoundary { to, time, arc, rule } => {
+            ("exit-at-boundary", Some(to), [none, none, time, arc], Some(rule))
+        }
+    };
+    let rule = rule.map_or_else(String::new, |rule| String::from_utf8_lossy(&canonical_json(&rule)).into_owned());
+    [
+        word.into(),
+        mode_word(event.from).into(),
+        mode_word(event.to).into(),
+        side.map_or("", side_word).into(),
+        leg.into(),
+        error.into(),
+        time.into(),
+        arc.into(),
+        Entry::Word(rule),
+    ]
+}
+
+/// Each motion of the tables with its future, in order; at least the approach, which may be empty.
+type Members = Vec<(Option<(f64, Side)>, Motion)>;
+
+fn members_of(names: &[&str; 3], points: &Table, events: &Table) -> Result<Members, NoSuchFact> {
+    let wrong = |why: &str| NoSuchFact { name: "motion".into(), why: why.into() };
+    let mut members: Members = vec![(None, Motion::default())];
+    let mut last_piece = None;
+    let futures = points.integers("future").iter().zip(points.numbers("exit_time")).zip(points.words("exit_side"));
+    let modes = points.words("mode").zip(points.integers("piece"));
+    for ((sample, (mode, piece)), ((future, exit_time), side)) in
+        samples(names, points).into_iter().zip(modes).zip(futures)
+    {
+        let mode = mode_of(mode).ok_or_else(|| wrong("an unknown mode"))?;
+        let member = member(&mut members, *future, *exit_time, side).ok_or_else(|| wrong("futures out of order"))?;
+        if last_piece != Some((*future, *piece)) {
+            last_piece = Some((*future, *piece));
+            member.pieces.push((mode, Vec::new()));
+        }
+        if let Some((_, piece)) = member.pieces.last_mut() {
+            piece.push(sample);
+        }
+    }
+    let futures = events.integers("future").iter().zip(events.numbers("exit_time")).zip(events.words("exit_side"));
+    for ((row, sample), ((future, exit_time), side)) in samples(names, events).into_iter().enumerate().zip(futures) {
+        let event = event_of(events, row, &sample).ok_or_else(|| wrong("an unknown event"))?;
+        let member = member(&mut members, *future, *exit_time, side).ok_or_else(|| wrong("futures out of order"))?;
+        member.events.push(event);
+    }
+    Ok(members)
+}
+
+/// The motion of a future, made if it is the next one.
+fn member<'a>(members: &'a mut Members, future: i64, exit_time: f64, side: &str) -> Option<&'a mut Motion> {
+    let index = usize::try_from(future).ok()?;
+    if index == members.len() {
+        members.push((Some((exit_time, side_of(side)?)), Motion::default()));
+    }
+    members.get_mut(index).map(|(_, motion)| motion)
+}
+
+fn event_of(events: &Table, row: usize, at: &Sample) -> Option<ModeEvent<3>> {
+    let cell = |name: &str| events.column(name).map(|c| c.get(row));
+    let word = |name: &str| cell(name).map_or_else(String::new, |c| c.word().to_owned());
+    let number = |name: &str| cell(name).map_or(f64::NAN, |c| c.value());
+    let side = || side_of(&word("side"));
+    let rule = || serde_json::from_str::<ExitRule>(&word("rule")).ok();
+    let kind = match word("event").as_str() {
+        "crossing" => EventKind::Crossing { to: side()? },
+        "landing" => EventKind::Landing { from: side()? },
+        "grazing" => EventKind::Grazing { side: side()? },
+        "left-by-tangency" => EventKind::LeftByTangency { to: side()? },
+        "started-on-surface" => EventKind::StartedOnSurface,
+        "entered-repelling" => EventKind::EnteredRepelling,
+        "two-fold-reached" => EventKind::TwoFoldReached { leg: number("leg"), error: number("error") },
+        "exit" => EventKind::Exit { to: side()?, time: number("time"), arc: number("arc"), rule: rule()? },
+        "exit-at-boundary" => {
+            EventKind::ExitAtBoundary { to: side()?, time: number("time"), arc: number("arc"), rule: rule()? }
+        }
+        _ => return None,
+    };
+    Some(ModeEvent {
+        t: at.t,
+        state: SVector::from(at.x),
+        kind,
+        from: mode_of(&word("from")),
+        to: mode_of(&word("to")),
+    })
+}
