@@ -32,6 +32,8 @@ pub mod comparison;
 pub mod desk;
 pub mod encode;
 pub mod exponent;
+#[cfg(feature = "parquet")]
+pub mod parquet;
 pub mod question;
 pub mod recording;
 pub mod run;
