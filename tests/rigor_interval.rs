@@ -417,7 +417,7 @@ fn inverse_functions(x: f64) {
             term = -product(&term, &square) / (n + 1);
         }
         // 2/sqrt(pi)
-        let factor = ((BigInt::from(2) << (2 * BITS) as usize) / (pi() << BITS as usize).sqrt());
+        let factor = (BigInt::from(2) << (2 * BITS) as usize) / (pi() << BITS as usize).sqrt();
         let erf = product(&sum, &factor);
         let got = point(x).erf();
         // The series loses exp(x^2) to cancellation.
