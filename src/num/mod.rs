@@ -11,6 +11,7 @@ pub mod dual;
 pub mod elementary;
 pub mod interval;
 pub mod interval_extended;
+pub mod fit;
 pub mod jet;
 pub mod random;
 pub mod scalar;
