@@ -5,18 +5,17 @@
 
 use std::sync::Arc;
 
-use nalgebra::SVector;
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use twofold::analyse::digits::{
-    Agreement, ExtendedCrossing, ExtendedPoint, Plane, agreement, amplification, reference,
-};
-use twofold::integrate::{Dopri5, Failure, Lsoda, Radau5, StepCap, Taylor, Tolerance};
+use twofold::analyse::digits::{Contender, DigitsQuestion, digits};
+use twofold::analyse::growth::{GrowthQuestion, growth};
+use twofold::analyse::reference::Plane;
+use twofold::integrate::{Failure, StepCap};
 use twofold::job::spec::Method;
 use twofold::job::table::{Column, Entry, Table};
 use twofold::job::{AnyQuestion, JobError};
 use twofold::num::elementary::{exp10, log10};
-use twofold::num::{Arithmetic, DoubleDouble, Scalar};
+use twofold::num::fit::line;
 use twofold::paper::study::Computed;
 use twofold::paper::wording::number;
 use twofold::paper::{Figure, Reading, Study};
@@ -36,8 +35,6 @@ const T_END: f64 = 100.0;
 const NEAR: f64 = 0.05;
 /// Longest step of the compared methods: that of fig. 7 (i).
 const MAX_STEP: f64 = 2.0;
-/// More passages than an orbit makes in these times.
-const MOST_PASSAGES: usize = 1000;
 /// Most steps of a compared method.
 const MAX_STEPS: u64 = 10_000_000;
 /// When disturbances are made, relative to the passage.
@@ -96,112 +93,78 @@ fn smoothed(reading: Reading, eps: f64) -> Smoothed<Caricature> {
     Smoothed { system: reading.caricature(), transition: Transition::Tanh, eps }
 }
 
-fn start() -> ExtendedPoint {
-    SVector::from(START).map(DoubleDouble::from_f64)
+fn digits_question() -> DigitsQuestion {
+    DigitsQuestion {
+        start: START,
+        section: SECTION,
+        t_end: T_END,
+        near: NEAR,
+        methods: methods().map(|(name, tolerance, _, _)| Contender { name, tolerance }).into(),
+        step_cap: StepCap::Absolute(MAX_STEP),
+        max_steps: MAX_STEPS,
+    }
 }
 
-/// Largest component of a crossing's state.
-fn extent(crossing: &ExtendedCrossing) -> f64 {
-    crossing.x.map(|c| c.to_f64()).amax()
+fn growth_question() -> GrowthQuestion {
+    GrowthQuestion {
+        start: START,
+        section: SECTION,
+        near: NEAR,
+        offsets: OFFSETS.into(),
+        at_start: AT_START,
+        exit_by: EXIT_BY,
+    }
 }
 
 fn compute(reading: Reading) -> Result<Vec<Table>, JobError> {
-    let (left, right) = rayon::join(|| digits(reading), || growth(reading));
+    let (left, right) = rayon::join(|| agreement_tables(reading), || growth_tables(reading));
     let mut tables = left?;
     tables.extend(right?);
     Ok(tables)
 }
 
 /// The digits of each method, and the visits.
-fn digits(reading: Reading) -> Result<Vec<Table>, Failure> {
-    let field = smoothed(reading, EPS);
-    let exact = reference(&field, start(), SECTION, MOST_PASSAGES, T_END, false)?;
+fn agreement_tables(reading: Reading) -> Result<Vec<Table>, Failure> {
+    let answer = digits(&smoothed(reading, EPS), &digits_question())?;
     let mut visits = Table::new("visits", [Column::numbers("t"), Column::numbers("distance")]);
-    for crossing in exact.iter().filter(|c| extent(c) < NEAR) {
-        visits.push(vec![crossing.t.to_f64().into(), extent(crossing).into()]);
-    }
-    let follow = |method, tolerance| -> Result<Vec<Agreement>, Failure> {
-        let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
-        let (x0, cap) = (SVector::from(START), StepCap::Absolute(MAX_STEP));
-        match method {
-            Method::Lsoda => agreement(&field, x0, SECTION, &exact, &mut Lsoda::new(tolerance), cap, MAX_STEPS),
-            Method::Radau5 => agreement(&field, x0, SECTION, &exact, &mut Radau5::new(tolerance), cap, MAX_STEPS),
-            Method::Dopri5 => agreement(&field, x0, SECTION, &exact, &mut Dopri5::new(tolerance), cap, MAX_STEPS),
-            Method::Taylor | Method::TaylorExtended => {
-                agreement(&field, x0, SECTION, &exact, &mut Taylor::new(tolerance), cap, MAX_STEPS)
-            }
-        }
-    };
-    let mut rows = Table::new(
-        "agreement",
-        [
-            Column::words("method"),
-            Column::numbers("tolerance"),
-            Column::numbers("crossing"),
-            Column::numbers("t"),
-            Column::numbers("error"),
-            Column::numbers("digits"),
-        ],
-    );
-    for (method, tolerance, _, _) in methods() {
-        for a in follow(method, tolerance)? {
-            let numbers = [tolerance, a.crossing as f64, a.t, a.error, -a.log10_error];
-            rows.push(std::iter::once(method.name().into()).chain(numbers.map(Entry::from)).collect::<Vec<_>>());
-        }
+    visits.extend(answer.visits.iter().map(|v| vec![v.t.into(), v.distance.into()]));
+    let columns = ["method", "tolerance", "crossing", "t", "error", "digits"]
+        .map(|name| if name == "method" { Column::words(name) } else { Column::numbers(name) });
+    let mut rows = Table::new("agreement", columns);
+    for row in answer.rows {
+        let (Contender { name, tolerance }, a) = (row.contender, row.agreement);
+        let numbers = [tolerance, a.crossing as f64, a.t, a.error, -a.log10_error];
+        rows.push(std::iter::once(name.name().into()).chain(numbers.map(Entry::from)));
     }
     Ok(vec![rows, visits])
 }
 
 /// The growth of disturbances over the first visit.
-fn growth(reading: Reading) -> Result<Vec<Table>, Failure> {
-    let found: Vec<Result<Vec<Vec<Entry>>, Failure>> =
-        ladder(reading).par_iter().map(|&eps| grown(reading, eps)).collect();
-    let mut rows = Table::new(
-        "growth",
-        [
-            Column::numbers("eps"),
-            Column::words("made"),
-            Column::numbers("t"),
-            Column::numbers("t_visit"),
-            Column::numbers("t_exit"),
-            Column::numbers("x"),
-            Column::numbers("y"),
-            Column::numbers("z"),
-        ],
-    );
-    for here in found {
-        rows.extend(here?);
+fn growth_tables(reading: Reading) -> Result<Vec<Table>, Failure> {
+    let question = growth_question();
+    let found: Vec<_> =
+        ladder(reading).par_iter().map(|&eps| (eps, growth(&smoothed(reading, eps), &question))).collect();
+    let columns = ["eps", "made", "t", "t_visit", "t_exit", "x", "y", "z"]
+        .map(|name| if name == "made" { Column::words(name) } else { Column::numbers(name) });
+    let mut rows = Table::new("growth", columns);
+    for (eps, answer) in found {
+        let answer = answer?;
+        let Some(visit) = answer.visit else { continue };
+        let mut row = |made: &str, t: f64, factors: [f64; 3]| {
+            let mut row = vec![eps.into(), made.into(), t.into(), visit.t.into(), visit.exit_t.into()];
+            row.extend(factors.map(Entry::from));
+            rows.push(row);
+        };
+        for r in &visit.rows {
+            row("near", r.t, r.factors);
+        }
+        if let Some(factors) = answer.from_start {
+            row("start", 0.0, factors.map(|f| f.unwrap_or(f64::NAN)));
+        }
     }
     let mut others = Table::new("outside", [Column::numbers("eps"), Column::numbers("growth")]);
     others.extend(outside(reading).iter().map(|&(eps, factor)| vec![eps.into(), factor.into()]));
     Ok(vec![rows, others])
-}
-
-fn grown(reading: Reading, eps: f64) -> Result<Vec<Vec<Entry>>, Failure> {
-    let field = smoothed(reading, eps);
-    let Some(visit) = amplification(&field, SVector::from(START), SECTION, NEAR, &OFFSETS, EXIT_BY)? else {
-        return Ok(Vec::new());
-    };
-    let row = |made: &str, t: f64, factors: [f64; 3]| -> Vec<Entry> {
-        let mut row = vec![eps.into(), made.into(), t.into(), visit.t.into(), visit.exit_t.into()];
-        row.extend(factors.map(Entry::from));
-        row
-    };
-    let mut rows: Vec<_> = visit.rows.iter().map(|r| row("near", r.t, r.factors)).collect();
-    // From the start: the same crossing of the undisturbed and of the disturbed orbits.
-    let orbit = |x0| reference(&field, x0, SECTION, MOST_PASSAGES, visit.exit_t + 0.1, false);
-    let undisturbed = orbit(start())?;
-    let Some(exit) = undisturbed.iter().position(|c| c.t.to_f64() >= visit.exit_t) else { return Ok(rows) };
-    let mut factors = [f64::NAN; 3];
-    for component in 0..3 {
-        let mut x0 = start();
-        x0[component] += DoubleDouble::from_f64(AT_START);
-        if let Some(moved) = orbit(x0)?.get(exit) {
-            factors[component] = (moved.x - undisturbed[exit].x).map(|c| c.to_f64()).amax() / AT_START;
-        }
-    }
-    rows.push(row("start", 0.0, factors));
-    Ok(rows)
 }
 
 fn value(entry: &Entry) -> f64 {
@@ -260,12 +223,8 @@ impl Series {
 
     /// Digits of growth per decade of eps: the slope of log10 of the largest growth over -log10 eps, by least squares.
     fn digits_per_decade(&self) -> f64 {
-        let points: Vec<[f64; 2]> = self.largest().iter().map(|p| [-log10(p[0]), log10(p[1])]).collect();
-        let n = points.len() as f64;
-        let mean = |i: usize| points.iter().map(|p| p[i]).sum::<f64>() / n;
-        let (x, y) = (mean(0), mean(1));
-        points.iter().map(|p| (p[0] - x) * (p[1] - y)).sum::<f64>()
-            / points.iter().map(|p| (p[0] - x) * (p[0] - x)).sum::<f64>()
+        let points: Vec<(f64, f64)> = self.largest().iter().map(|p| (-log10(p[0]), log10(p[1]))).collect();
+        line(&points).map_or(f64::NAN, |l| l.slope)
     }
 }
 
