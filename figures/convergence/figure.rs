@@ -3,14 +3,11 @@
 
 use std::sync::Arc;
 
-use serde_json::{Value, json};
-use twofold::analyse::limit::{
-    AfterVisitQuestion, ConvergenceQuestion, MemberCrossing, after_visit, convergence, observed_rate,
-};
-use twofold::integrate::filippov::{FunnelGrid, Mode, Settings, Side};
-use twofold::job::table::{Column, Entry, Table};
-use twofold::job::{AnyQuestion, JobError};
-use twofold::paper::study::Computed;
+use twofold::analyse::limit::{AfterVisitQuestion, ConvergenceQuestion, observed_rate};
+use twofold::integrate::filippov::{FunnelGrid, Settings};
+use twofold::job::spec::SystemSpec;
+use twofold::job::table::{Entry, Table};
+use twofold::job::{AfterVisit, AnyQuestion, SmoothingLimit};
 use twofold::paper::wording::number;
 use twofold::paper::{Figure, Reading, Study};
 use twofold::render::sheet::*;
@@ -49,31 +46,6 @@ fn times(reading: Reading) -> [f64; 4] {
     }
 }
 
-fn question(reading: Reading) -> Value {
-    json!({
-        "study": "convergence",
-        "system": reading.caricature(),
-        "start": START,
-        "before": { "eps": BEFORE, "times": times(reading) },
-        "after": {
-            "eps": AFTER, "beyond": BEYOND, "t_end": T_END,
-            "funnel": {
-                "shortest": GRID.shortest, "longest": GRID.longest, "times": GRID.times, "horizon": GRID.horizon,
-                "until_two_fold": GRID.until_two_fold,
-            },
-        },
-        "refinements": [REFINEMENTS, FINER],
-        "tolerance": Settings::default().tolerance,
-    })
-}
-
-fn side(side: Side) -> &'static str {
-    match side {
-        Side::Plus => "plus",
-        Side::Minus => "minus",
-    }
-}
-
 fn before_question(reading: Reading) -> ConvergenceQuestion {
     ConvergenceQuestion {
         start: START.into(),
@@ -96,34 +68,13 @@ fn after_question() -> AfterVisitQuestion {
     }
 }
 
-fn compute(reading: Reading) -> Result<Vec<Table>, JobError> {
-    let system = reading.caricature();
-    let mut before = Table::new(
-        "before",
-        [Column::numbers("eps"), Column::numbers("t"), Column::words("mode"), Column::numbers("distance")],
-    );
-    for row in convergence(&system, &before_question(reading))?.rows {
-        let mode = if row.mode == Mode::SlidingAttracting { "sliding" } else { "free" };
-        before.push(vec![row.eps.into(), row.t.into(), mode.into(), row.distance.into()]);
-    }
-    let found = after_visit(&system, &after_question())?;
-    let mut members = Table::new(
-        "funnel",
-        [Column::numbers("exit_time"), Column::words("side"), Column::numbers("y"), Column::numbers("z")],
-    );
-    for MemberCrossing { exit_time, side: to, crossing } in &found.members {
-        members.push(vec![(*exit_time).into(), side(*to).into(), crossing[1].into(), crossing[2].into()]);
-    }
-    let columns = ["eps", "y", "z", "nearest_exit_time", "nearest_side", "distance", "width", "t_visit"]
-        .map(|name| if name == "nearest_side" { Column::words(name) } else { Column::numbers(name) });
-    let mut after = Table::new("after", columns);
-    for r in &found.rows {
-        let mut row: Vec<Entry> = [r.eps, r.crossing[1], r.crossing[2], r.nearest.exit_time].map(Entry::from).into();
-        row.push(side(r.nearest.side).into());
-        row.extend([r.distance, found.width, found.t_visit].map(Entry::from));
-        after.push(row);
-    }
-    Ok(vec![before, members, after])
+/// What the figure asks: before the visit, after it.
+fn questions(reading: Reading) -> Vec<AnyQuestion> {
+    let system = SystemSpec::Caricature(reading.caricature());
+    vec![
+        Arc::new(SmoothingLimit { system, compared: before_question(reading) }),
+        Arc::new(AfterVisit { system, compared: after_question() }),
+    ]
 }
 
 fn value(entry: &Entry) -> f64 {
@@ -144,7 +95,7 @@ fn with_room(room: f64, distances: impl Iterator<Item = f64>) -> Axis {
 }
 
 fn draw(tables: &[Table]) -> Sheet {
-    let [before, members, after] = tables else { unreachable!("compute makes three tables") };
+    let [before, members, after] = tables else { unreachable!("the two questions have three tables") };
     let (before, members, after) = (before.rows(), members.rows(), after.rows());
     let expected = LineStyle::new(style::SOFT_INK, style::CURVE_PT).dashed();
 
@@ -245,10 +196,6 @@ fn draw(tables: &[Table]) -> Sheet {
         ))
 }
 
-fn study(reading: Reading, compute: fn() -> Result<Vec<Table>, JobError>) -> Vec<AnyQuestion> {
-    vec![Arc::new(Computed { kind: "convergence", question: question(reading), cost: 4.0e5, compute })]
-}
-
 /// The figure's specification.
 pub fn figure() -> Figure {
     Figure::studied_in_both_readings(
@@ -260,11 +207,11 @@ pub fn figure() -> Figure {
                   each smoothed crossing to the nearest member, beside the width of the set.",
         [
             Study {
-                questions: || study(Reading::Printed, || compute(Reading::Printed)),
+                questions: || questions(Reading::Printed),
                 draw: |answers| draw(&Study::tables(answers)),
             },
             Study {
-                questions: || study(Reading::Reconstructed, || compute(Reading::Reconstructed)),
+                questions: || questions(Reading::Reconstructed),
                 draw: |answers| draw(&Study::tables(answers)),
             },
         ],

@@ -5,23 +5,19 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
-use serde_json::{Value, json};
-use twofold::analyse::digits::{Contender, DigitsQuestion, digits};
-use twofold::analyse::growth::{GrowthQuestion, growth};
+use twofold::analyse::digits::{Contender, DigitsQuestion};
+use twofold::analyse::growth::GrowthQuestion;
 use twofold::analyse::reference::Plane;
-use twofold::integrate::{Failure, StepCap};
-use twofold::job::spec::Method;
-use twofold::job::table::{Column, Entry, Table};
-use twofold::job::{AnyQuestion, JobError};
+use twofold::integrate::StepCap;
+use twofold::job::spec::{Method, SystemSpec};
+use twofold::job::table::{Entry, Table};
+use twofold::job::{Answer, AnyQuestion, DisturbanceGrowth, MethodDigits};
 use twofold::num::elementary::{exp10, log10};
 use twofold::num::fit::line;
-use twofold::paper::study::Computed;
 use twofold::paper::wording::number;
 use twofold::paper::{Figure, Reading, Study};
 use twofold::render::sheet::*;
 use twofold::render::style;
-use twofold::system::{Caricature, Smoothed, Transition};
 
 /// The start of the paper's runs.
 const START: [f64; 3] = [0.2, 0.0, -1.0];
@@ -43,8 +39,8 @@ const OFFSETS: [f64; 3] = [-0.1, 0.0, 0.1];
 const AT_START: f64 = 1e-8;
 /// The exit of the first visit must come before this time.
 const EXIT_BY: f64 = 60.0;
-/// Growth of a disturbance made near the singularity, reconstructed reading, measured outside this project: (eps, factor).
-const OUTSIDE: [(f64, f64); 3] = [(1e-2, 1e6), (1e-3, 1e10), (1e-4, 1e12)];
+/// Growth of a disturbance made across the layer at the singularity, reconstructed reading, measured by another program: (eps, factor).
+const OUTSIDE: [(f64, f64); 3] = [(1e-2, 3.36e9), (1e-3, 7.67e12), (1e-4, 5.49e16)];
 
 /// Stiffness parameters of the right panel. The printed reading's first visit comes four times as late and is followed for fewer.
 fn ladder(reading: Reading) -> &'static [f64] {
@@ -66,31 +62,11 @@ fn methods() -> [(Method, f64, Colour, MarkerShape); 6] {
     ]
 }
 
-fn question(reading: Reading) -> Value {
-    json!({
-        "study": "digits",
-        "system": reading.caricature(),
-        "start": START,
-        "section": SECTION,
-        "near": NEAR,
-        "agreement": {
-            "eps": EPS, "t_end": T_END, "max_step": MAX_STEP, "max_steps": MAX_STEPS,
-            "methods": methods().map(|m| json!({"name": m.0, "tolerance": m.1})),
-        },
-        "growth": { "eps": ladder(reading), "offsets": OFFSETS, "at_start": AT_START, "exit_by": EXIT_BY },
-        "outside": outside(reading),
-    })
-}
-
 fn outside(reading: Reading) -> &'static [(f64, f64)] {
     match reading {
         Reading::Printed => &[],
         Reading::Reconstructed => &OUTSIDE,
     }
-}
-
-fn smoothed(reading: Reading, eps: f64) -> Smoothed<Caricature> {
-    Smoothed { system: reading.caricature(), transition: Transition::Tanh, eps }
 }
 
 fn digits_question() -> DigitsQuestion {
@@ -116,59 +92,18 @@ fn growth_question() -> GrowthQuestion {
     }
 }
 
-fn compute(reading: Reading) -> Result<Vec<Table>, JobError> {
-    let (left, right) = rayon::join(|| agreement_tables(reading), || growth_tables(reading));
-    let mut tables = left?;
-    tables.extend(right?);
-    Ok(tables)
-}
-
-/// The digits of each method, and the visits.
-fn agreement_tables(reading: Reading) -> Result<Vec<Table>, Failure> {
-    let answer = digits(&smoothed(reading, EPS), &digits_question())?;
-    let mut visits = Table::new("visits", [Column::numbers("t"), Column::numbers("distance")]);
-    visits.extend(answer.visits.iter().map(|v| vec![v.t.into(), v.distance.into()]));
-    let columns = ["method", "tolerance", "crossing", "t", "error", "digits"]
-        .map(|name| if name == "method" { Column::words(name) } else { Column::numbers(name) });
-    let mut rows = Table::new("agreement", columns);
-    for row in answer.rows {
-        let (Contender { name, tolerance }, a) = (row.contender, row.agreement);
-        let numbers = [tolerance, a.crossing as f64, a.t, a.error, -a.log10_error];
-        rows.push(std::iter::once(name.name().into()).chain(numbers.map(Entry::from)));
+/// What the figure asks: the digits first, then the growth for each eps.
+fn questions(reading: Reading) -> Vec<AnyQuestion> {
+    let system = SystemSpec::Caricature(reading.caricature());
+    let mut all: Vec<AnyQuestion> = vec![Arc::new(MethodDigits { system, eps: EPS, compared: digits_question() })];
+    for &eps in ladder(reading) {
+        all.push(Arc::new(DisturbanceGrowth { system, eps, disturbances: growth_question() }));
     }
-    Ok(vec![rows, visits])
-}
-
-/// The growth of disturbances over the first visit.
-fn growth_tables(reading: Reading) -> Result<Vec<Table>, Failure> {
-    let question = growth_question();
-    let found: Vec<_> =
-        ladder(reading).par_iter().map(|&eps| (eps, growth(&smoothed(reading, eps), &question))).collect();
-    let columns = ["eps", "made", "t", "t_visit", "t_exit", "x", "y", "z"]
-        .map(|name| if name == "made" { Column::words(name) } else { Column::numbers(name) });
-    let mut rows = Table::new("growth", columns);
-    for (eps, answer) in found {
-        let answer = answer?;
-        let Some(visit) = answer.visit else { continue };
-        let mut row = |made: &str, t: f64, factors: [f64; 3]| {
-            let mut row = vec![eps.into(), made.into(), t.into(), visit.t.into(), visit.exit_t.into()];
-            row.extend(factors.map(Entry::from));
-            rows.push(row);
-        };
-        for r in &visit.rows {
-            row("near", r.t, r.factors);
-        }
-        if let Some(factors) = answer.from_start {
-            row("start", 0.0, factors.map(|f| f.unwrap_or(f64::NAN)));
-        }
-    }
-    let mut others = Table::new("outside", [Column::numbers("eps"), Column::numbers("growth")]);
-    others.extend(outside(reading).iter().map(|&(eps, factor)| vec![eps.into(), factor.into()]));
-    Ok(vec![rows, others])
+    all
 }
 
 fn value(entry: &Entry) -> f64 {
-    if let Entry::Number(v) = entry { *v } else { f64::NAN }
+    entry.value()
 }
 
 /// Where a disturbance is made and in which direction: one series of the right panel.
@@ -181,9 +116,9 @@ struct Series {
 }
 
 /// The series of the right panel.
-fn series(growth: &Table) -> [Series; 3] {
+fn series(growth: &[Vec<Entry>]) -> [Series; 3] {
     let pick = |made: &str, components: &[usize]| {
-        let rows = growth.rows().into_iter().filter(|r| r[1] == Entry::from(made));
+        let rows = growth.iter().filter(|r| r[1] == Entry::from(made));
         rows.map(|r| [value(&r[0]), components.iter().map(|c| value(&r[5 + c])).fold(0.0, f64::max)]).collect()
     };
     [
@@ -228,8 +163,10 @@ impl Series {
     }
 }
 
-fn draw(tables: &[Table]) -> Sheet {
-    let [rows, visits, growth, others] = tables else { unreachable!("compute makes four tables") };
+fn draw(reading: Reading, answers: &[Arc<Answer>]) -> Sheet {
+    let tables = Study::tables(answers);
+    let [rows, visits, growth @ ..] = &tables[..] else { unreachable!("the first question has two tables") };
+    let growth: Vec<Vec<Entry>> = growth.iter().flat_map(Table::rows).collect();
     let mut digits =
         PlanePanel::new(Axis::linear("*t*", 0.0, T_END), Axis::linear("digits that are right", -2.0, 17.0));
     for visit in visits.rows() {
@@ -251,8 +188,8 @@ fn draw(tables: &[Table]) -> Sheet {
         .legend(LegendKey::Line(LineStyle::new(style::MAGENTA, style::CURVE_PT).dashed()), "visit")
         .legend_at(Corner::UpperRight);
 
-    let series = series(growth);
-    let outside: Vec<[f64; 2]> = others.rows().iter().map(|r| [value(&r[0]), value(&r[1])]).collect();
+    let series = series(&growth);
+    let outside: Vec<[f64; 2]> = outside(reading).iter().map(|&(eps, growth)| [eps, growth]).collect();
     let mut amplified =
         PlanePanel::new(Axis::log("*ε*", 6e-5, 1.6e-2), Axis::log("growth of a disturbance", 1e-4, 1e27));
     for (level, words, at, anchor) in [
@@ -320,10 +257,6 @@ fn footer(rows: &Table, visits: &Table, series: &[Series; 3]) -> Vec<String> {
     lines
 }
 
-fn study(reading: Reading, compute: fn() -> Result<Vec<Table>, JobError>) -> Vec<AnyQuestion> {
-    vec![Arc::new(Computed { kind: "digits", question: question(reading), cost: 2.0e5, compute })]
-}
-
 /// The figure's specification.
 pub fn figure() -> Figure {
     Figure::studied_in_both_readings(
@@ -333,14 +266,8 @@ pub fn figure() -> Figure {
                   singularity. (b) Growth of a small disturbance until the exit from the first visit, against ε, for disturbances made \
                   near the singularity across and along the switching layer and for disturbances made at the start.",
         [
-            Study {
-                questions: || study(Reading::Printed, || compute(Reading::Printed)),
-                draw: |answers| draw(&Study::tables(answers)),
-            },
-            Study {
-                questions: || study(Reading::Reconstructed, || compute(Reading::Reconstructed)),
-                draw: |answers| draw(&Study::tables(answers)),
-            },
+            Study { questions: || questions(Reading::Printed), draw: |answers| draw(Reading::Printed, answers) },
+            Study { questions: || questions(Reading::Reconstructed), draw: |answers| draw(Reading::Reconstructed, answers) },
         ],
     )
 }

@@ -202,7 +202,7 @@ struct Member<'a> {
     future: Option<(f64, Side)>,
 }
 
-fn side_word(side: Side) -> &'static str {
+pub(super) fn side_word(side: Side) -> &'static str {
     match side {
         Side::Plus => "plus",
         Side::Minus => "minus",
