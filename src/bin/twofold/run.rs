@@ -69,7 +69,7 @@ pub struct RunFlags {
     eps_prime: Option<f64>,
     /// Reading of eq. (10).
     #[arg(long, value_enum, default_value = "literal")]
-    hysteresis: Relaxation,
+    hysteresis: Hysteresis,
     /// Initial state [default: 0.2,0,-1 for the caricature; 0.69267,0,0 for the wheel].
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_hyphen_values = true)]
     start: Option<Vec<f64>>,
@@ -159,6 +159,24 @@ enum Switch {
     Hysteretic,
     /// The discontinuous system itself.
     Filippov,
+}
+
+/// How eq. (10)'s two divisions by eps' are read.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Hysteresis {
+    /// Literally: both.
+    Literal,
+    /// One division.
+    Single,
+}
+
+impl From<Hysteresis> for Relaxation {
+    fn from(hysteresis: Hysteresis) -> Self {
+        match hysteresis {
+            Hysteresis::Literal => Relaxation::Literal,
+            Hysteresis::Single => Relaxation::Single,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -260,7 +278,7 @@ fn spec(a: &RunFlags) -> Result<RunSpec, Misuse> {
                 return Err(Misuse::SigmaWithoutSmoothing);
             }
             let eps_prime = a.eps_prime.unwrap_or(10.0 * a.eps);
-            SwitchSpec::Hysteretic { eps: a.eps, eps_prime, relaxation: a.hysteresis, phi0: 1.0 }
+            SwitchSpec::Hysteretic { eps: a.eps, eps_prime, relaxation: a.hysteresis.into(), phi0: 1.0 }
         }
         Switch::Filippov => {
             if a.sigma.is_some() {
