@@ -4,7 +4,7 @@
 //! `cargo run --example own_system`
 
 use nalgebra::{SVector, vector};
-use twofold::integrate::filippov::{ExitRule, FilippovError, Settings, Side, Trajectory, run};
+use twofold::integrate::filippov::{ExitRule, FilippovError, ModeEvent, Settings, Side, Trajectory, run};
 use twofold::num::Elementary;
 use twofold::system::PiecewiseSmooth;
 
@@ -24,13 +24,17 @@ impl PiecewiseSmooth<2> for Refuge {
     }
 }
 
-fn main() -> Result<(), FilippovError> {
+/// The events of an orbit.
+pub fn follow() -> Result<Vec<ModeEvent<2>>, FilippovError> {
     let rule = ExitRule::AtOnce { side: Side::Plus }; // What to do where the future is not unique: must be chosen.
     let mut record = Trajectory::new(4);
-    let end = run(&Refuge { prey_needed: 1.0 }, vector![2.0, 0.8], 40.0, &Settings::default(), rule, &mut record)?;
-    for event in &record.events {
+    let _ = run(&Refuge { prey_needed: 1.0 }, vector![2.0, 0.8], 40.0, &Settings::default(), rule, &mut record)?;
+    Ok(record.events)
+}
+
+fn main() -> Result<(), FilippovError> {
+    for event in follow()? {
         println!("t = {:8.4}  prey {:.4}  predator {:.4}  {:?}", event.t, event.state[0], event.state[1], event.kind);
     }
-    println!("t = {} in {:?}: {:?}", end.t, end.mode, end.x.as_slice());
     Ok(())
 }

@@ -1,9 +1,17 @@
 //! eps -> 0: the smoothed system against the Filippov motion.
 
-use nalgebra::vector;
-use twofold::integrate::filippov::limit::{after_visit, convergence, observed_rate};
+use twofold::analyse::limit::{AfterVisitQuestion, ConvergenceQuestion, after_visit, convergence, observed_rate};
 use twofold::integrate::filippov::{FilippovError, FunnelGrid, Mode, Settings};
 use twofold::system::Caricature;
+
+fn before(times: &[f64], eps: &[f64]) -> ConvergenceQuestion {
+    ConvergenceQuestion {
+        start: vec![0.2, 0.0, -1.0],
+        times: times.into(),
+        eps: eps.into(),
+        settings: Settings::default(),
+    }
+}
 
 #[test]
 fn smoothed_orbits_converge_at_first_order_before_the_first_visit() {
@@ -11,13 +19,15 @@ fn smoothed_orbits_converge_at_first_order_before_the_first_visit() {
     // After one crossing, after three, and twice in sliding; the visit is at t = 13.196.
     let times = [2.0, 7.0, 9.0, 11.0];
     let eps = [1.6e-2, 8e-3, 4e-3, 2e-3, 1e-3, 5e-4];
-    let rows = convergence(&c, vector![0.2, 0.0, -1.0], &times, &eps, &Settings::default()).unwrap();
-    assert_eq!(rows.len(), times.len() * eps.len());
-    assert!(rows.iter().filter(|r| r.t > 8.0).all(|r| r.mode == Mode::SlidingAttracting));
+    let found = convergence(&c, &before(&times, &eps)).unwrap();
+    assert_eq!(found.rows.len(), times.len() * eps.len());
+    assert!(found.statistics.steps > 0);
+    assert!(found.rows.iter().filter(|r| r.t > 8.0).all(|r| r.mode == Mode::SlidingAttracting));
     for t in times {
-        let rate = observed_rate(&rows, t);
+        let here = || found.rows.iter().filter(|r| r.t == t);
+        let rate = observed_rate(here().map(|r| [r.eps, r.distance]));
         println!("t = {t}: rate {rate:.4}");
-        for r in rows.iter().filter(|r| r.t == t) {
+        for r in here() {
             println!("   eps {:e} distance {:.4e}", r.eps, r.distance);
         }
         assert!((rate - 1.0).abs() < 0.05, "t = {t}: rate {rate}");
@@ -25,31 +35,51 @@ fn smoothed_orbits_converge_at_first_order_before_the_first_visit() {
 }
 
 #[test]
-fn no_comparison_where_the_future_is_a_set() {
+fn questions_that_cannot_be_answered_are_refused() {
     let c = Caricature::with_reinjection(1e-1, 1e-5);
-    let error = convergence(&c, vector![0.2, 0.0, -1.0], &[14.0], &[1e-2], &Settings::default()).unwrap_err();
-    assert!(matches!(error, FilippovError::NoSuchExit { .. }), "{error}");
+    let error = convergence(&c, &before(&[14.0], &[1e-2])).unwrap_err();
+    assert!(matches!(error, FilippovError::NoSuchExit { .. }), "the future is a set there: {error}");
+    let mut short = before(&[2.0], &[1e-2]);
+    short.start.pop();
+    let error = convergence(&c, &short).unwrap_err();
+    assert!(matches!(error, FilippovError::Invalid(_)), "{error}");
 }
 
 #[test]
 fn smoothed_orbits_leave_inside_the_funnel() {
-    let grid = FunnelGrid { shortest: 1e-3, longest: 2.5, times: 80, horizon: 12.0, until_two_fold: true, per_step: 1 };
+    // The question of figures/convergence.
+    let question = AfterVisitQuestion {
+        start: vec![0.2, 0.0, -1.0],
+        t_end: 80.0,
+        eps: vec![1e-2, 3e-3, 1e-3, 3e-4, 1e-4],
+        beyond: 0.6,
+        grid: FunnelGrid { shortest: 1e-3, longest: 2.5, times: 80, horizon: 12.0, until_two_fold: true, per_step: 1 },
+        refinements: 3,
+        finer: 21,
+        settings: Settings::default(),
+    };
     for alpha in [1e-1, 1e-3] {
         let c = Caricature::with_reinjection(alpha, 1e-5);
-        let eps = [1e-2, 3e-3, 1e-3, 3e-4, 1e-4];
-        let start = vector![0.2, 0.0, -1.0];
-        let rows = after_visit(&c, start, 80.0, &eps, 0.6, &grid, &Settings::default()).unwrap();
-        for r in &rows {
+        let found = after_visit(&c, &question).unwrap();
+        assert_eq!(found.rows.len(), question.eps.len());
+        // Smoothing blurs a two-fold over a distance sqrt(eps): the orbit goes out within that of some member, in a
+        // funnel that is much wider.
+        assert!(found.width > 1.5, "{}", found.width);
+        for r in &found.rows {
             println!("alpha {alpha} {r:?}");
-            // Smoothing blurs a two-fold over a distance sqrt(eps): the orbit goes out within that of some member, in a
-            // funnel that is much wider.
-            assert!(r.width > 1.5, "{r:?}");
             assert!(r.distance < r.eps.sqrt(), "{r:?}");
+            let coarse = found.members.iter().map(|m| {
+                let squares = m.crossing.iter().zip(&r.crossing).map(|(a, b)| (a - b) * (a - b));
+                squares.sum::<f64>().sqrt()
+            });
+            let coarse = coarse.fold(f64::INFINITY, f64::min);
+            assert!(r.distance <= coarse, "the search made it worse: {r:?} {coarse}");
         }
         // The distance falls, but slowly and not steadily (figures/convergence): only the bound above and the end are certain.
-        assert!(rows[..4].iter().all(|r| rows[4].distance < r.distance), "nearest at the smallest eps");
-        // No limit: which member it follows depends on eps.
-        let times: Vec<_> = rows.iter().map(|r| r.exit_time).collect();
+        let distance = |i: usize| found.rows[i].distance;
+        assert!((0..4).all(|i| distance(4) < distance(i)), "nearest at the smallest eps");
+        // Which member it follows depends on eps.
+        let times: Vec<_> = found.rows.iter().map(|r| r.nearest.exit_time).collect();
         assert!(times.windows(2).all(|t| (t[0] / t[1] - 1.0).abs() > 0.1), "{times:?}");
     }
 }

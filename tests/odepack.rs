@@ -14,7 +14,7 @@ mod problems;
 use data::{Reference, ReferenceProblem, ReferenceRun, reference};
 use problems::{Problem, Visit, for_each};
 use twofold::integrate::lsoda::{Family, Lsoda, Switch};
-use twofold::integrate::{Radau5, Statistics, Stepper, Tolerance};
+use twofold::integrate::{Course, Ignore, Radau5, Statistics, StepCap, Stepper, Tolerance, drive};
 use twofold::system::VectorField;
 
 /// What our LSODA did.
@@ -192,10 +192,10 @@ fn radau5_reaches_the_reference_solutions() {
             let known = self.0.problems.iter().find(|p| p.name == problem.name).expect(problem.name);
             let error = |tolerance: f64| {
                 let mut radau = Radau5::new(Tolerance { rtol: tolerance, atol: tolerance * known.atol_over_rtol });
-                let cap = known.max_step.unwrap_or(f64::INFINITY);
-                let (x, _) =
-                    data::integrate(&mut radau, &problem.field, problem.start, known.t_end, cap, 100_000).unwrap();
-                known.error(x.as_slice())
+                let step_cap = known.max_step.map_or(StepCap::None, StepCap::Absolute);
+                let course = Course { step_cap, max_steps: 100_000, ..Course::to(known.t_end) };
+                let end = drive(&problem.field, problem.start, &course, &mut radau, &mut Ignore, &()).unwrap();
+                known.error(end.within_budget().unwrap().x.as_slice())
             };
             let (loose, tight) = (error(1e-6), error(1e-10));
             let floor = 4.0 * known.uncertainty();

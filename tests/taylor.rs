@@ -3,7 +3,9 @@
 
 use nalgebra::{SVector, vector};
 use twofold::analyse::Direction;
-use twofold::analyse::digits::{Agreement, ExtendedCrossing, Plane, agreement, amplification, reference};
+use twofold::analyse::digits::{Agreement, agreement};
+use twofold::analyse::growth::{GrowthQuestion, growth};
+use twofold::analyse::reference::{ExtendedCrossing, Plane, reference};
 use twofold::integrate::*;
 use twofold::num::{Arithmetic, DoubleDouble, Scalar};
 use twofold::system::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField, Wheel};
@@ -41,7 +43,9 @@ fn smoothed(alpha: f64, eps: f64) -> Smoothed<Caricature> {
 fn orbit(alpha: f64, rows: &[Row], decimal: bool) -> Vec<ExtendedCrossing> {
     let read = if decimal { DoubleDouble::from_decimal } else { DoubleDouble::from_f64 };
     let t_end = rows.last().unwrap().t + 1.0;
-    reference(&smoothed(alpha, 1e-3), SVector::from(START.map(read)), SECTION, rows.len(), t_end, decimal).unwrap()
+    reference(&smoothed(alpha, 1e-3), SVector::from(START.map(read)), SECTION, rows.len(), t_end, decimal)
+        .unwrap()
+        .crossings
 }
 
 /// Largest difference in a component of the state, and the difference in time.
@@ -164,11 +168,21 @@ fn equations_with_other_layers_need_no_telling() {
 
 #[test]
 fn a_visit_amplifies_by_digits_per_decade_of_eps() {
+    let question = GrowthQuestion {
+        start: START,
+        section: SECTION,
+        near: 0.05,
+        offsets: vec![-100.0, -0.1, 0.0],
+        at_start: 1e-8,
+        exit_by: 40.0,
+    };
     let growth = [1e-2, 1e-3].map(|eps| {
-        let visit =
-            amplification(&smoothed(1e-1, eps), SVector::from(START), SECTION, 0.05, &[-100.0, -0.1, 0.0], 40.0)
-                .unwrap()
-                .unwrap();
+        let found = growth(&smoothed(1e-1, eps), &question).unwrap();
+        let visit = found.visit.unwrap();
+        // Two ways to disturb the start: a size that gives a response in the linear range, and the size asked for.
+        for (a, b) in visit.rows[0].factors.iter().zip(found.from_start.unwrap()) {
+            assert!((a / b.unwrap() - 1.0).abs() < 0.02, "{a} {b:?}");
+        }
         for r in &visit.rows {
             println!("eps {eps} t {} x {:?} factors {:?}", r.t, r.x, r.factors);
         }

@@ -3,24 +3,15 @@
 
 use std::sync::Arc;
 
-use nalgebra::SVector;
-use rayon::prelude::*;
-use serde_json::{Value, json};
-use twofold::analyse::digits::{Plane, reference};
-use twofold::integrate::Failure;
-use twofold::integrate::filippov::limit::{ConvergenceRow, convergence, observed_rate};
-use twofold::integrate::filippov::{EventKind, FilippovError, FunnelGrid, Mode, Settings, Side, funnel};
-use twofold::job::table::{Column, Entry, Table};
-use twofold::job::{AnyQuestion, JobError};
-use twofold::num::elementary::pow;
-use twofold::num::{Arithmetic, DoubleDouble, Scalar};
-use twofold::paper::study::Computed;
+use twofold::analyse::limit::{AfterVisitQuestion, ConvergenceQuestion, observed_rate};
+use twofold::integrate::filippov::{FunnelGrid, Settings};
+use twofold::job::spec::SystemSpec;
+use twofold::job::table::{Entry, Table};
+use twofold::job::{AfterVisit, AnyQuestion, SmoothingLimit};
 use twofold::paper::wording::number;
 use twofold::paper::{Figure, Reading, Study};
 use twofold::render::sheet::*;
 use twofold::render::style;
-use twofold::system::filippov::{Region, region};
-use twofold::system::{Smoothed, Transition};
 
 /// The start of the paper's runs.
 const START: [f64; 3] = [0.2, 0.0, -1.0];
@@ -39,8 +30,6 @@ const GRID: FunnelGrid =
 const REFINEMENTS: usize = 3;
 /// Exit times of each.
 const FINER: usize = 21;
-/// More passages than a smoothed orbit makes.
-const MOST_PASSAGES: usize = 1000;
 /// Colours and shapes of the times.
 const LOOKS: [(Colour, MarkerShape); 4] = [
     (style::BLUE, MarkerShape::Dot),
@@ -57,130 +46,35 @@ fn times(reading: Reading) -> [f64; 4] {
     }
 }
 
-fn question(reading: Reading) -> Value {
-    json!({
-        "study": "convergence",
-        "system": reading.caricature(),
-        "start": START,
-        "before": { "eps": BEFORE, "times": times(reading) },
-        "after": {
-            "eps": AFTER, "beyond": BEYOND, "t_end": T_END,
-            "funnel": {
-                "shortest": GRID.shortest, "longest": GRID.longest, "times": GRID.times, "horizon": GRID.horizon,
-                "until_two_fold": GRID.until_two_fold,
-            },
-        },
-        "refinements": [REFINEMENTS, FINER],
-        "tolerance": Settings::default().tolerance,
-    })
-}
-
-fn side(side: Side) -> &'static str {
-    match side {
-        Side::Plus => "plus",
-        Side::Minus => "minus",
+fn before_question(reading: Reading) -> ConvergenceQuestion {
+    ConvergenceQuestion {
+        start: START.into(),
+        times: times(reading).into(),
+        eps: BEFORE.into(),
+        settings: Settings::default(),
     }
 }
 
-/// Where a future of the singularity crosses.
-struct Crossing {
-    exit_time: f64,
-    side: Side,
-    state: SVector<f64, 3>,
-}
-
-/// The funnel's crossings.
-struct Crossings {
-    t_visit: f64,
-    point: SVector<f64, 3>,
-    members: Vec<Crossing>,
-}
-
-/// The first upward crossing of each future farther than [`BEYOND`] from the singularity.
-fn crossings(reading: Reading, grid: &FunnelGrid) -> Result<Crossings, FilippovError> {
-    let futures = funnel(&reading.caricature(), SVector::from(START), T_END, &Settings::default(), grid)?;
-    let up = EventKind::Crossing { to: Side::Plus };
-    let members = futures.members.iter().filter_map(|m| {
-        let event = m.trajectory.events.iter().find(|e| e.kind == up && (e.state - futures.point).norm() > BEYOND)?;
-        Some(Crossing { exit_time: m.exit_time, side: m.side, state: event.state })
-    });
-    Ok(Crossings { t_visit: futures.t, point: futures.point, members: members.collect() })
-}
-
-/// The same crossing of the smoothed orbit, in double-double arithmetic: a visit costs more digits than `f64` has.
-fn smoothed(reading: Reading, eps: f64, visit: &Crossings) -> Result<Option<SVector<f64, 3>>, Failure> {
-    let system = reading.caricature();
-    let field = Smoothed { system, transition: Transition::Tanh, eps };
-    let x0 = SVector::from(START).map(DoubleDouble::from_f64);
-    let surface = Plane { coordinate: 0, value: 0.0 };
-    let passages = reference(&field, x0, surface, MOST_PASSAGES, visit.t_visit + GRID.horizon, false)?;
-    let later = passages.iter().filter(|c| c.t.to_f64() > visit.t_visit).map(|c| c.x.map(|v| v.to_f64()));
-    let mut far = later.filter(|x| (x - visit.point).norm() > BEYOND);
-    Ok(far.find(|x| region(&system, x) == Region::CrossingUp))
-}
-
-/// The member that crosses nearest to `x`: the nearest of the grid, then of finer and finer grids around it.
-fn nearest(
-    reading: Reading,
-    found: &Crossings,
-    x: &SVector<f64, 3>,
-) -> Result<Option<(f64, Side, f64)>, FilippovError> {
-    let best = |members: &[Crossing], side: Option<Side>| {
-        let those = members.iter().filter(|m| side.is_none_or(|s| s == m.side));
-        let distances = those.map(|m| (m.exit_time, m.side, (m.state - x).norm()));
-        distances.min_by(|a, b| a.2.total_cmp(&b.2))
-    };
-    let Some(mut near) = best(&found.members, None) else { return Ok(None) };
-    let mut ratio = pow(GRID.longest / GRID.shortest, 1.0 / (GRID.times - 1) as f64);
-    for _ in 0..REFINEMENTS {
-        let grid = FunnelGrid { shortest: near.0 / ratio, longest: near.0 * ratio, times: FINER, ..GRID };
-        if let Some(finer) = best(&crossings(reading, &grid)?.members, Some(near.1))
-            && finer.2 < near.2
-        {
-            near = finer;
-        }
-        ratio = pow(ratio, 2.0 / (FINER - 1) as f64);
+fn after_question() -> AfterVisitQuestion {
+    AfterVisitQuestion {
+        start: START.into(),
+        t_end: T_END,
+        eps: AFTER.into(),
+        beyond: BEYOND,
+        grid: GRID,
+        refinements: REFINEMENTS,
+        finer: FINER,
+        settings: Settings::default(),
     }
-    Ok(Some(near))
 }
 
-fn compute(reading: Reading) -> Result<Vec<Table>, JobError> {
-    let (system, x0, settings) = (reading.caricature(), SVector::from(START), Settings::default());
-    let mut before = Table::new(
-        "before",
-        [Column::numbers("eps"), Column::numbers("t"), Column::words("mode"), Column::numbers("distance")],
-    );
-    for row in convergence(&system, x0, &times(reading), &BEFORE, &settings)? {
-        let mode = if row.mode == Mode::SlidingAttracting { "sliding" } else { "free" };
-        before.push(vec![row.eps.into(), row.t.into(), mode.into(), row.distance.into()]);
-    }
-    let found = crossings(reading, &GRID)?;
-    let mut members = Table::new(
-        "funnel",
-        [Column::numbers("exit_time"), Column::words("side"), Column::numbers("y"), Column::numbers("z")],
-    );
-    let mut width = 0.0_f64;
-    for (i, a) in found.members.iter().enumerate() {
-        members.push(vec![a.exit_time.into(), side(a.side).into(), a.state[1].into(), a.state[2].into()]);
-        for b in &found.members[..i] {
-            width = width.max((a.state - b.state).norm());
-        }
-    }
-    let exits: Vec<Result<Option<SVector<f64, 3>>, Failure>> =
-        AFTER.par_iter().map(|&eps| smoothed(reading, eps, &found)).collect();
-    let columns = ["eps", "y", "z", "nearest_exit_time", "nearest_side", "distance", "width", "t_visit"]
-        .map(|name| if name == "nearest_side" { Column::words(name) } else { Column::numbers(name) });
-    let mut after = Table::new("after", columns);
-    for (eps, exit) in AFTER.into_iter().zip(exits) {
-        let Some(x) = exit? else { continue };
-        let Some((time, to, distance)) = nearest(reading, &found, &x)? else { continue };
-        let [y, z] = [x[1], x[2]];
-        let mut row: Vec<Entry> = [eps, y, z, time].map(Entry::from).into();
-        row.push(side(to).into());
-        row.extend([distance, width, found.t_visit].map(Entry::from));
-        after.push(row);
-    }
-    Ok(vec![before, members, after])
+/// What the figure asks: before the visit, after it.
+fn questions(reading: Reading) -> Vec<AnyQuestion> {
+    let system = SystemSpec::Caricature(reading.caricature());
+    vec![
+        Arc::new(SmoothingLimit { system, compared: before_question(reading) }),
+        Arc::new(AfterVisit { system, compared: after_question() }),
+    ]
 }
 
 fn value(entry: &Entry) -> f64 {
@@ -201,7 +95,7 @@ fn with_room(room: f64, distances: impl Iterator<Item = f64>) -> Axis {
 }
 
 fn draw(tables: &[Table]) -> Sheet {
-    let [before, members, after] = tables else { unreachable!("compute makes three tables") };
+    let [before, members, after] = tables else { unreachable!("the two questions have three tables") };
     let (before, members, after) = (before.rows(), members.rows(), after.rows());
     let expected = LineStyle::new(style::SOFT_INK, style::CURVE_PT).dashed();
 
@@ -223,11 +117,7 @@ fn draw(tables: &[Table]) -> Sheet {
         approach = approach.line(proportional(&points), expected).markers(points.clone(), marker);
         let mode = if rows.iter().all(|r| r[2] == Entry::from("sliding")) { "sliding" } else { "free" };
         approach = approach.legend(LegendKey::Marker(marker), format!("*t* = {} ({mode})", number(t)));
-        let slope: Vec<ConvergenceRow> = points
-            .iter()
-            .map(|p| ConvergenceRow { eps: p[0], t, mode: Mode::SlidingAttracting, distance: p[1] })
-            .collect();
-        rates.push(format!("{:.3} at *t* = {}", observed_rate(&slope, t), number(t)));
+        rates.push(format!("{:.3} at *t* = {}", observed_rate(points), number(t)));
     }
     let approach = approach.legend_at(Corner::LowerRight);
 
@@ -281,10 +171,6 @@ fn draw(tables: &[Table]) -> Sheet {
         .iter()
         .map(|r| format!("{} for *ε* = {}", number((value(&r[3]) * 1e3).round() / 1e3), number(value(&r[0]))))
         .collect();
-    let rows: Vec<ConvergenceRow> = distances
-        .iter()
-        .map(|p| ConvergenceRow { eps: p[0], t: 0.0, mode: Mode::SlidingAttracting, distance: p[1] })
-        .collect();
     Sheet::new(ColumnWidth::Double, 3, "")
         .panel_aspect(1.1)
         .panel("(a)", "before the visit", approach)
@@ -305,13 +191,9 @@ fn draw(tables: &[Table]) -> Sheet {
         ))
         .footer(format!(
             "(c) Distance in (b) to the nearest Filippov orbit, measured power of *ε* {:.2}. Its time of repelling sliding: {}.",
-            observed_rate(&rows, 0.0),
+            observed_rate(distances),
             nearest.join(", ")
         ))
-}
-
-fn study(reading: Reading, compute: fn() -> Result<Vec<Table>, JobError>) -> Vec<AnyQuestion> {
-    vec![Arc::new(Computed { kind: "convergence", question: question(reading), cost: 4.0e5, compute })]
 }
 
 /// The figure's specification.
@@ -325,11 +207,11 @@ pub fn figure() -> Figure {
                   each smoothed crossing to the nearest member, beside the width of the set.",
         [
             Study {
-                questions: || study(Reading::Printed, || compute(Reading::Printed)),
+                questions: || questions(Reading::Printed),
                 draw: |answers| draw(&Study::tables(answers)),
             },
             Study {
-                questions: || study(Reading::Reconstructed, || compute(Reading::Reconstructed)),
+                questions: || questions(Reading::Reconstructed),
                 draw: |answers| draw(&Study::tables(answers)),
             },
         ],

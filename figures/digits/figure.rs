@@ -5,24 +5,19 @@
 
 use std::sync::Arc;
 
-use nalgebra::SVector;
-use rayon::prelude::*;
-use serde_json::{Value, json};
-use twofold::analyse::digits::{
-    Agreement, ExtendedCrossing, ExtendedPoint, Plane, agreement, amplification, reference,
-};
-use twofold::integrate::{Dopri5, Failure, Lsoda, Radau5, StepCap, Taylor, Tolerance};
-use twofold::job::spec::Method;
-use twofold::job::table::{Column, Entry, Table};
-use twofold::job::{AnyQuestion, JobError};
+use twofold::analyse::digits::{Contender, DigitsQuestion};
+use twofold::analyse::growth::GrowthQuestion;
+use twofold::analyse::reference::Plane;
+use twofold::integrate::StepCap;
+use twofold::job::spec::{Method, SystemSpec};
+use twofold::job::table::{Entry, Table};
+use twofold::job::{Answer, AnyQuestion, DisturbanceGrowth, MethodDigits};
 use twofold::num::elementary::{exp10, log10};
-use twofold::num::{Arithmetic, DoubleDouble, Scalar};
-use twofold::paper::study::Computed;
+use twofold::num::fit::line;
 use twofold::paper::wording::number;
 use twofold::paper::{Figure, Reading, Study};
 use twofold::render::sheet::*;
 use twofold::render::style;
-use twofold::system::{Caricature, Smoothed, Transition};
 
 /// The start of the paper's runs.
 const START: [f64; 3] = [0.2, 0.0, -1.0];
@@ -36,8 +31,6 @@ const T_END: f64 = 100.0;
 const NEAR: f64 = 0.05;
 /// Longest step of the compared methods: that of fig. 7 (i).
 const MAX_STEP: f64 = 2.0;
-/// More passages than an orbit makes in these times.
-const MOST_PASSAGES: usize = 1000;
 /// Most steps of a compared method.
 const MAX_STEPS: u64 = 10_000_000;
 /// When disturbances are made, relative to the passage.
@@ -46,8 +39,8 @@ const OFFSETS: [f64; 3] = [-0.1, 0.0, 0.1];
 const AT_START: f64 = 1e-8;
 /// The exit of the first visit must come before this time.
 const EXIT_BY: f64 = 60.0;
-/// Growth of a disturbance made near the singularity, reconstructed reading, measured outside this project: (eps, factor).
-const OUTSIDE: [(f64, f64); 3] = [(1e-2, 1e6), (1e-3, 1e10), (1e-4, 1e12)];
+/// Growth of a disturbance made across the layer at the singularity, reconstructed reading, measured by another program: (eps, factor).
+const OUTSIDE: [(f64, f64); 3] = [(1e-2, 3.36e9), (1e-3, 7.67e12), (1e-4, 5.49e16)];
 
 /// Stiffness parameters of the right panel. The printed reading's first visit comes four times as late and is followed for fewer.
 fn ladder(reading: Reading) -> &'static [f64] {
@@ -69,22 +62,6 @@ fn methods() -> [(Method, f64, Colour, MarkerShape); 6] {
     ]
 }
 
-fn question(reading: Reading) -> Value {
-    json!({
-        "study": "digits",
-        "system": reading.caricature(),
-        "start": START,
-        "section": SECTION,
-        "near": NEAR,
-        "agreement": {
-            "eps": EPS, "t_end": T_END, "max_step": MAX_STEP, "max_steps": MAX_STEPS,
-            "methods": methods().map(|m| json!({"name": m.0, "tolerance": m.1})),
-        },
-        "growth": { "eps": ladder(reading), "offsets": OFFSETS, "at_start": AT_START, "exit_by": EXIT_BY },
-        "outside": outside(reading),
-    })
-}
-
 fn outside(reading: Reading) -> &'static [(f64, f64)] {
     match reading {
         Reading::Printed => &[],
@@ -92,120 +69,41 @@ fn outside(reading: Reading) -> &'static [(f64, f64)] {
     }
 }
 
-fn smoothed(reading: Reading, eps: f64) -> Smoothed<Caricature> {
-    Smoothed { system: reading.caricature(), transition: Transition::Tanh, eps }
-}
-
-fn start() -> ExtendedPoint {
-    SVector::from(START).map(DoubleDouble::from_f64)
-}
-
-/// Largest component of a crossing's state.
-fn extent(crossing: &ExtendedCrossing) -> f64 {
-    crossing.x.map(|c| c.to_f64()).amax()
-}
-
-fn compute(reading: Reading) -> Result<Vec<Table>, JobError> {
-    let (left, right) = rayon::join(|| digits(reading), || growth(reading));
-    let mut tables = left?;
-    tables.extend(right?);
-    Ok(tables)
-}
-
-/// The digits of each method, and the visits.
-fn digits(reading: Reading) -> Result<Vec<Table>, Failure> {
-    let field = smoothed(reading, EPS);
-    let exact = reference(&field, start(), SECTION, MOST_PASSAGES, T_END, false)?;
-    let mut visits = Table::new("visits", [Column::numbers("t"), Column::numbers("distance")]);
-    for crossing in exact.iter().filter(|c| extent(c) < NEAR) {
-        visits.push(vec![crossing.t.to_f64().into(), extent(crossing).into()]);
+fn digits_question() -> DigitsQuestion {
+    DigitsQuestion {
+        start: START,
+        section: SECTION,
+        t_end: T_END,
+        near: NEAR,
+        methods: methods().map(|(name, tolerance, _, _)| Contender { name, tolerance }).into(),
+        step_cap: StepCap::Absolute(MAX_STEP),
+        max_steps: MAX_STEPS,
     }
-    let follow = |method, tolerance| -> Result<Vec<Agreement>, Failure> {
-        let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
-        let (x0, cap) = (SVector::from(START), StepCap::Absolute(MAX_STEP));
-        match method {
-            Method::Lsoda => agreement(&field, x0, SECTION, &exact, &mut Lsoda::new(tolerance), cap, MAX_STEPS),
-            Method::Radau5 => agreement(&field, x0, SECTION, &exact, &mut Radau5::new(tolerance), cap, MAX_STEPS),
-            Method::Dopri5 => agreement(&field, x0, SECTION, &exact, &mut Dopri5::new(tolerance), cap, MAX_STEPS),
-            Method::Taylor | Method::TaylorExtended => {
-                agreement(&field, x0, SECTION, &exact, &mut Taylor::new(tolerance), cap, MAX_STEPS)
-            }
-        }
-    };
-    let mut rows = Table::new(
-        "agreement",
-        [
-            Column::words("method"),
-            Column::numbers("tolerance"),
-            Column::numbers("crossing"),
-            Column::numbers("t"),
-            Column::numbers("error"),
-            Column::numbers("digits"),
-        ],
-    );
-    for (method, tolerance, _, _) in methods() {
-        for a in follow(method, tolerance)? {
-            let numbers = [tolerance, a.crossing as f64, a.t, a.error, -a.log10_error];
-            rows.push(std::iter::once(method.name().into()).chain(numbers.map(Entry::from)).collect::<Vec<_>>());
-        }
-    }
-    Ok(vec![rows, visits])
 }
 
-/// The growth of disturbances over the first visit.
-fn growth(reading: Reading) -> Result<Vec<Table>, Failure> {
-    let found: Vec<Result<Vec<Vec<Entry>>, Failure>> =
-        ladder(reading).par_iter().map(|&eps| grown(reading, eps)).collect();
-    let mut rows = Table::new(
-        "growth",
-        [
-            Column::numbers("eps"),
-            Column::words("made"),
-            Column::numbers("t"),
-            Column::numbers("t_visit"),
-            Column::numbers("t_exit"),
-            Column::numbers("x"),
-            Column::numbers("y"),
-            Column::numbers("z"),
-        ],
-    );
-    for here in found {
-        rows.extend(here?);
+fn growth_question() -> GrowthQuestion {
+    GrowthQuestion {
+        start: START,
+        section: SECTION,
+        near: NEAR,
+        offsets: OFFSETS.into(),
+        at_start: AT_START,
+        exit_by: EXIT_BY,
     }
-    let mut others = Table::new("outside", [Column::numbers("eps"), Column::numbers("growth")]);
-    others.extend(outside(reading).iter().map(|&(eps, factor)| vec![eps.into(), factor.into()]));
-    Ok(vec![rows, others])
 }
 
-fn grown(reading: Reading, eps: f64) -> Result<Vec<Vec<Entry>>, Failure> {
-    let field = smoothed(reading, eps);
-    let Some(visit) = amplification(&field, SVector::from(START), SECTION, NEAR, &OFFSETS, EXIT_BY)? else {
-        return Ok(Vec::new());
-    };
-    let row = |made: &str, t: f64, factors: [f64; 3]| -> Vec<Entry> {
-        let mut row = vec![eps.into(), made.into(), t.into(), visit.t.into(), visit.exit_t.into()];
-        row.extend(factors.map(Entry::from));
-        row
-    };
-    let mut rows: Vec<_> = visit.rows.iter().map(|r| row("near", r.t, r.factors)).collect();
-    // From the start: the same crossing of the undisturbed and of the disturbed orbits.
-    let orbit = |x0| reference(&field, x0, SECTION, MOST_PASSAGES, visit.exit_t + 0.1, false);
-    let undisturbed = orbit(start())?;
-    let Some(exit) = undisturbed.iter().position(|c| c.t.to_f64() >= visit.exit_t) else { return Ok(rows) };
-    let mut factors = [f64::NAN; 3];
-    for component in 0..3 {
-        let mut x0 = start();
-        x0[component] += DoubleDouble::from_f64(AT_START);
-        if let Some(moved) = orbit(x0)?.get(exit) {
-            factors[component] = (moved.x - undisturbed[exit].x).map(|c| c.to_f64()).amax() / AT_START;
-        }
+/// What the figure asks: the digits first, then the growth for each eps.
+fn questions(reading: Reading) -> Vec<AnyQuestion> {
+    let system = SystemSpec::Caricature(reading.caricature());
+    let mut all: Vec<AnyQuestion> = vec![Arc::new(MethodDigits { system, eps: EPS, compared: digits_question() })];
+    for &eps in ladder(reading) {
+        all.push(Arc::new(DisturbanceGrowth { system, eps, disturbances: growth_question() }));
     }
-    rows.push(row("start", 0.0, factors));
-    Ok(rows)
+    all
 }
 
 fn value(entry: &Entry) -> f64 {
-    if let Entry::Number(v) = entry { *v } else { f64::NAN }
+    entry.value()
 }
 
 /// Where a disturbance is made and in which direction: one series of the right panel.
@@ -218,9 +116,9 @@ struct Series {
 }
 
 /// The series of the right panel.
-fn series(growth: &Table) -> [Series; 3] {
+fn series(growth: &[Vec<Entry>]) -> [Series; 3] {
     let pick = |made: &str, components: &[usize]| {
-        let rows = growth.rows().into_iter().filter(|r| r[1] == Entry::from(made));
+        let rows = growth.iter().filter(|r| r[1] == Entry::from(made));
         rows.map(|r| [value(&r[0]), components.iter().map(|c| value(&r[5 + c])).fold(0.0, f64::max)]).collect()
     };
     [
@@ -260,17 +158,15 @@ impl Series {
 
     /// Digits of growth per decade of eps: the slope of log10 of the largest growth over -log10 eps, by least squares.
     fn digits_per_decade(&self) -> f64 {
-        let points: Vec<[f64; 2]> = self.largest().iter().map(|p| [-log10(p[0]), log10(p[1])]).collect();
-        let n = points.len() as f64;
-        let mean = |i: usize| points.iter().map(|p| p[i]).sum::<f64>() / n;
-        let (x, y) = (mean(0), mean(1));
-        points.iter().map(|p| (p[0] - x) * (p[1] - y)).sum::<f64>()
-            / points.iter().map(|p| (p[0] - x) * (p[0] - x)).sum::<f64>()
+        let points: Vec<(f64, f64)> = self.largest().iter().map(|p| (-log10(p[0]), log10(p[1]))).collect();
+        line(&points).map_or(f64::NAN, |l| l.slope)
     }
 }
 
-fn draw(tables: &[Table]) -> Sheet {
-    let [rows, visits, growth, others] = tables else { unreachable!("compute makes four tables") };
+fn draw(reading: Reading, answers: &[Arc<Answer>]) -> Sheet {
+    let tables = Study::tables(answers);
+    let [rows, visits, growth @ ..] = &tables[..] else { unreachable!("the first question has two tables") };
+    let growth: Vec<Vec<Entry>> = growth.iter().flat_map(Table::rows).collect();
     let mut digits =
         PlanePanel::new(Axis::linear("*t*", 0.0, T_END), Axis::linear("digits that are right", -2.0, 17.0));
     for visit in visits.rows() {
@@ -292,8 +188,8 @@ fn draw(tables: &[Table]) -> Sheet {
         .legend(LegendKey::Line(LineStyle::new(style::MAGENTA, style::CURVE_PT).dashed()), "visit")
         .legend_at(Corner::UpperRight);
 
-    let series = series(growth);
-    let outside: Vec<[f64; 2]> = others.rows().iter().map(|r| [value(&r[0]), value(&r[1])]).collect();
+    let series = series(&growth);
+    let outside: Vec<[f64; 2]> = outside(reading).iter().map(|&(eps, growth)| [eps, growth]).collect();
     let mut amplified =
         PlanePanel::new(Axis::log("*ε*", 6e-5, 1.6e-2), Axis::log("growth of a disturbance", 1e-4, 1e27));
     for (level, words, at, anchor) in [
@@ -361,10 +257,6 @@ fn footer(rows: &Table, visits: &Table, series: &[Series; 3]) -> Vec<String> {
     lines
 }
 
-fn study(reading: Reading, compute: fn() -> Result<Vec<Table>, JobError>) -> Vec<AnyQuestion> {
-    vec![Arc::new(Computed { kind: "digits", question: question(reading), cost: 2.0e5, compute })]
-}
-
 /// The figure's specification.
 pub fn figure() -> Figure {
     Figure::studied_in_both_readings(
@@ -374,14 +266,8 @@ pub fn figure() -> Figure {
                   singularity. (b) Growth of a small disturbance until the exit from the first visit, against ε, for disturbances made \
                   near the singularity across and along the switching layer and for disturbances made at the start.",
         [
-            Study {
-                questions: || study(Reading::Printed, || compute(Reading::Printed)),
-                draw: |answers| draw(&Study::tables(answers)),
-            },
-            Study {
-                questions: || study(Reading::Reconstructed, || compute(Reading::Reconstructed)),
-                draw: |answers| draw(&Study::tables(answers)),
-            },
+            Study { questions: || questions(Reading::Printed), draw: |answers| draw(Reading::Printed, answers) },
+            Study { questions: || questions(Reading::Reconstructed), draw: |answers| draw(Reading::Reconstructed, answers) },
         ],
     )
 }

@@ -1,8 +1,8 @@
 //! Error against work for ODEPACK's LSODA (frozen, tests/data/odepack) and for this crate's methods (computed).
 
-use nalgebra::SVector;
 use serde::Deserialize;
-use twofold::integrate::{Dopri5, Failure, Lsoda, Radau5, Statistics, Stepper, Tolerance};
+use twofold::analyse::work_precision::{WorkPrecisionQuestion, weighted_error, work_precision};
+use twofold::integrate::{Method, StepCap, Tolerance};
 use twofold::system::VectorField;
 
 use super::problems::{Problem, Visit, for_each};
@@ -82,7 +82,7 @@ pub struct ShiftedRun {
 impl ReferenceProblem {
     /// max_i |x_i - r_i| / (|r_i| + atol/rtol): the error in units of rtol's weights.
     pub fn error(&self, x: &[f64]) -> f64 {
-        x.iter().zip(&self.reference).map(|(x, r)| (x - r).abs() / (r.abs() + self.atol_over_rtol)).fold(0.0, f64::max)
+        weighted_error(x, &self.reference, self.atol_over_rtol)
     }
 
     /// The same for its uncertainty.
@@ -117,29 +117,11 @@ pub struct Row {
     pub steps: u64,
 }
 
-/// Runs `stepper` over a problem.
-pub fn integrate<F: VectorField<N>, M: Stepper<N>, const N: usize>(
-    stepper: &mut M,
-    field: &F,
-    start: SVector<f64, N>,
-    t_end: f64,
-    max_step: f64,
-    most_steps: u64,
-) -> Result<(SVector<f64, N>, Statistics), Failure> {
-    stepper.restart(field, 0.0, start, t_end, max_step)?;
-    let (mut t, mut x) = (0.0, start);
-    while t < t_end {
-        let step = stepper.step(field)?;
-        (t, x) = (step.t1, step.x1);
-        if stepper.statistics().steps > most_steps {
-            return Err(Failure::TooManySteps { t, limit: most_steps, state: Failure::state(&x) });
-        }
-    }
-    Ok((x, stepper.statistics().clone()))
-}
-
 /// Steps after which a method is said not to manage a problem (Dormand-Prince on the stiff ones).
 pub const MOST_STEPS: u64 = 200_000;
+
+/// Our methods.
+const METHODS: [Method; 3] = [Method::Lsoda, Method::Radau5, Method::Dopri5];
 
 /// Every row: ODEPACK's, then ours, problem by problem. A method that fails or takes too long has no row.
 pub fn rows() -> Vec<Row> {
@@ -152,37 +134,36 @@ pub fn rows() -> Vec<Row> {
             let Self { reference, rows } = self;
             let known =
                 reference.problems.iter().find(|p| p.name == problem.name).expect("every problem has a reference");
-            let row = |method, tolerance, error, evaluations, jacobians, steps| Row {
-                problem: problem.name.to_owned(),
-                method,
-                tolerance,
-                error,
-                evaluations,
-                jacobians,
-                steps,
+            let mut row = |method, tolerance, error, evaluations, jacobians, steps| {
+                let problem = problem.name.to_owned();
+                rows.push(Row { problem, method, tolerance, error, evaluations, jacobians, steps });
             };
             for run in &known.runs {
                 let error = known.error(&run.x);
-                rows.push(row("odepack-lsoda", run.rtol, error, run.evaluations, run.jacobians, run.steps));
+                row("odepack-lsoda", run.rtol, error, run.evaluations, run.jacobians, run.steps);
             }
-            let max_step = known.max_step.unwrap_or(f64::INFINITY);
-            for method in ["lsoda", "radau5", "dopri5"] {
-                for run in &known.runs {
-                    let tolerance = Tolerance { rtol: run.rtol, atol: run.atol };
-                    let (field, start, end) = (&problem.field, problem.start, known.t_end);
-                    let result = match method {
-                        "lsoda" => integrate(&mut Lsoda::new(tolerance), field, start, end, max_step, MOST_STEPS),
-
-                        "radau5" => integrate(&mut Radau5::new(tolerance), field, start, end, max_step, MOST_STEPS),
-                        _ => integrate(&mut Dopri5::new(tolerance), field, start, end, max_step, MOST_STEPS),
-                    };
-                    let Ok((x, s)) = result else { continue };
-                    rows.push(row(method, run.rtol, known.error(x.as_slice()), s.evaluations, s.jacobians, s.steps));
-                }
+            let ours = work_precision(&problem.field, &question(known)).expect("the reference is this problem's");
+            for run in ours {
+                let (Some(error), Some(s)) = (run.error, run.statistics) else { continue };
+                row(run.method.name(), run.tolerance.rtol, error, s.evaluations, s.jacobians, s.steps);
             }
         }
     }
     let mut collect = Collect { reference: reference(), rows: Vec::new() };
     for_each(&mut collect);
     collect.rows
+}
+
+/// What our methods are asked about a problem: what ODEPACK was.
+fn question(known: &ReferenceProblem) -> WorkPrecisionQuestion {
+    WorkPrecisionQuestion {
+        start: known.start.clone(),
+        t_end: known.t_end,
+        step_cap: known.max_step.map_or(StepCap::None, StepCap::Absolute),
+        solution: known.reference.clone(),
+        scale: known.atol_over_rtol,
+        methods: METHODS.into(),
+        tolerances: known.runs.iter().map(|r| Tolerance { rtol: r.rtol, atol: r.atol }).collect(),
+        max_steps: MOST_STEPS,
+    }
 }

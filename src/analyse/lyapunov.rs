@@ -15,10 +15,10 @@
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
-use super::attractor::mean;
 use super::tangent::Tangent;
 use crate::integrate::{Dopri5, Failure, Kick, Kicker, Stepper, Tolerance};
 use crate::num::elementary::{ln, sqrt};
+use crate::num::fit::mean;
 use crate::system::VectorField;
 
 /// A largest Lyapunov exponent.

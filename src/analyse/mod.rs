@@ -5,12 +5,16 @@
 pub mod attractor;
 pub mod digits;
 pub mod floquet;
+pub mod growth;
+pub mod limit;
 pub mod lyapunov;
 pub mod motion;
 pub mod path;
+pub mod reference;
 pub mod section;
 pub mod tangent;
 pub mod tangle;
+pub mod work_precision;
 
 pub use motion::{Motion, MotionRecorder};
 pub use path::{PathRecorder, Sample};

@@ -140,7 +140,7 @@ pub fn from_bits(bytes: &[u8]) -> Result<Vec<Table>, Malformed> {
     Ok(tables)
 }
 
-/// What a CSV file says about itself in its first line.
+/// What a file says about itself: a CSV file in its first line, a Parquet file in its metadata.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Heading {
@@ -166,6 +166,16 @@ pub struct ColumnHeading {
     pub kind: Kind,
 }
 
+/// What a file of this table says about itself.
+pub(super) fn heading(table: &Table, about: &Value) -> Heading {
+    Heading {
+        made_by: concat!("twofold ", env!("CARGO_PKG_VERSION")).to_owned(),
+        table: table.name.clone(),
+        about: about.clone(),
+        columns: headings(table),
+    }
+}
+
 fn headings(table: &Table) -> Vec<ColumnHeading> {
     let heading = |c: &Column| ColumnHeading { name: c.name.clone(), unit: c.unit.clone(), kind: c.kind() };
     table.columns.iter().map(heading).collect()
@@ -177,14 +187,8 @@ const COMMENT: &str = "# ";
 /// CSV: a comment line of metadata as JSON (`about` is whatever its maker wants to say), a line of column names, then a row per line with
 /// shortest round-trip numbers; blanks are empty.
 pub fn csv(table: &Table, about: &Value) -> Vec<u8> {
-    let heading = Heading {
-        made_by: concat!("twofold ", env!("CARGO_PKG_VERSION")).to_owned(),
-        table: table.name.clone(),
-        about: about.clone(),
-        columns: headings(table),
-    };
     let mut bytes = COMMENT.as_bytes().to_vec();
-    bytes.extend(canonical_json(&heading));
+    bytes.extend(canonical_json(&heading(table, about)));
     bytes.push(b'\n');
     let mut writer = csv::Writer::from_writer(bytes);
     let written = (|| {

@@ -4,14 +4,23 @@
 //! it took, and why it ended. A [`Desk`] computes each question once and keeps answers in a [`Store`]. Everything that is shown, checked
 //! or published is a view of answers.
 //!
-//! Kinds of questions: a run ([`Run`]), what it settles on ([`Classification`]), its largest exponent ([`LargestExponent`]), how alike two paths
-//! are ([`PathComparison`]). Rooms above add their own by implementing [`Question`].
+//! | question | asks |
+//! |---|---|
+//! | [`Run`] | what happens from a start: a path, a section, a Filippov motion, a funnel of futures |
+//! | [`Classification`] | what a run settles on |
+//! | [`LargestExponent`] | how fast neighbours part |
+//! | [`PathComparison`] | how alike two paths are |
+//! | [`MethodDigits`] | how many digits of an orbit methods get right |
+//! | [`DisturbanceGrowth`] | what a visit to a two-fold makes of a small disturbance |
+//! | [`SmoothingLimit`], [`AfterVisit`] | what smoothed orbits tend to as the switch steepens, before and after a visit |
+//!
+//! Rooms above add their own by implementing [`Question`].
 //!
 //! ```
 //! use twofold::job::{Desk, Run, Recording, spec::*};
-//! use twofold::paper::Reading;
+//! use twofold::system::Caricature;
 //! let run = RunSpec {
-//!     system: SystemSpec::Caricature(Reading::Reconstructed.caricature()),
+//!     system: SystemSpec::Caricature(Caricature::with_reinjection(1e-1, 1e-5)),
 //!     switch: SwitchSpec::tanh(1e-3),
 //!     start: [0.2, 0.0, -1.0],
 //!     t_end: 20.0,
@@ -30,8 +39,13 @@ pub mod answer;
 pub mod classification;
 pub mod comparison;
 pub mod desk;
+pub mod digits;
 pub mod encode;
 pub mod exponent;
+pub mod growth;
+pub mod limit;
+#[cfg(feature = "parquet")]
+pub mod parquet;
 pub mod question;
 pub mod recording;
 pub mod run;
@@ -44,7 +58,10 @@ pub use answer::{Answer, Stop};
 pub use classification::Classification;
 pub use comparison::PathComparison;
 pub use desk::{Desk, JobWatch, Progress};
+pub use digits::MethodDigits;
 pub use exponent::LargestExponent;
+pub use growth::DisturbanceGrowth;
+pub use limit::{AfterVisit, SmoothingLimit};
 pub use question::{AnyQuestion, JobError, Question};
 pub use recording::{Data, Recording};
 pub use run::Run;

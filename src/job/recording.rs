@@ -202,7 +202,7 @@ struct Member<'a> {
     future: Option<(f64, Side)>,
 }
 
-fn side_word(side: Side) -> &'static str {
+pub(super) fn side_word(side: Side) -> &'static str {
     match side {
         Side::Plus => "plus",
         Side::Minus => "minus",
@@ -369,4 +369,62 @@ fn event_of(events: &Table, row: usize, at: &Sample) -> Option<ModeEvent<3>> {
         from: mode_of(&word("from")),
         to: mode_of(&word("to")),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::filippov::SlidingLaw;
+    use crate::integrate::{Schedule, StepCap, Tolerance};
+    use crate::job::simulate::simulate;
+    use crate::job::spec::*;
+    use crate::system::{Caricature, Relaxation};
+
+    fn run(switch: SwitchSpec, observe: Observation) -> RunSpec {
+        RunSpec {
+            system: SystemSpec::Caricature(Caricature::with_reinjection(1e-1, 1e-5)),
+            switch,
+            start: [0.2, 0.0, -1.0],
+            t_end: 40.0,
+            method: MethodSpec {
+                name: Method::Dopri5,
+                tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
+                step_cap: StepCap::None,
+                max_steps: DEFAULT_MAX_STEPS,
+            },
+            schedule: Schedule::default(),
+            observe,
+        }
+    }
+
+    #[test]
+    fn every_kind_of_recording_comes_back_from_its_tables() {
+        let path = Observation::Path { chord: 1e-2 };
+        let section = Observation::Section { coordinate: 1, value: 0.0 };
+        let random =
+            ExitRule::Random { law: SlidingLaw::Exponential { mean: 0.5 }, plus_probability: 0.5, seed: 1, stream: 2 };
+        let funnel = FunnelSpec { shortest: 0.1, longest: 1.0, times: 3, horizon: 5.0, until_two_fold: true };
+        for run in [
+            run(SwitchSpec::tanh(1e-2), path),
+            run(SwitchSpec::hysteretic(1e-2, Relaxation::Single), section),
+            run(SwitchSpec::Filippov { exit: random, funnel: None }, path),
+            run(SwitchSpec::Filippov { exit: random, funnel: None }, section),
+            run(SwitchSpec::Filippov { exit: ExitRule::All, funnel: Some(funnel) }, path),
+        ] {
+            let recording = simulate(&run, &()).unwrap();
+            assert!(!recording.data.is_empty());
+            let answer = recording.to_answer(&run);
+            assert_eq!(Recording::of_answer(&run, &answer).unwrap(), recording, "{:?}", run.switch);
+            // And through the bytes that a store keeps.
+            let tables = crate::job::encode::from_bits(&crate::job::encode::bits(&answer.tables)).unwrap();
+            assert_eq!(Recording::of_answer(&run, &Answer { tables, ..answer }).unwrap(), recording);
+        }
+    }
+
+    #[test]
+    fn an_answer_of_another_kind_is_no_recording() {
+        let run = run(SwitchSpec::tanh(1e-2), Observation::Path { chord: 1e-2 });
+        let error = Recording::of_answer(&run, &Answer::of_tables(Vec::new())).unwrap_err();
+        assert!(error.to_string().contains("path"), "{error}");
+    }
 }

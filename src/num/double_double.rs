@@ -22,7 +22,7 @@ pub struct DoubleDouble {
 
 /// a + b = s + e exactly (Knuth).
 #[inline]
-fn two_sum(a: f64, b: f64) -> (f64, f64) {
+pub(super) fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let s = a + b;
     let bb = s - a;
     (s, (a - (s - bb)) + (b - bb))
@@ -46,7 +46,7 @@ fn split(a: f64) -> (f64, f64) {
 
 /// a b = p + e exactly, unless a part over- or underflows (Dekker 1971).
 #[inline]
-fn two_product(a: f64, b: f64) -> (f64, f64) {
+pub(super) fn two_product(a: f64, b: f64) -> (f64, f64) {
     let p = a * b;
     let ((a1, a2), (b1, b2)) = (split(a), split(b));
     (p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2)
@@ -60,13 +60,15 @@ fn power_of_two(k: i32) -> f64 {
 impl DoubleDouble {
     /// Spacing of numbers near 1, about: 2^-105. Operations err by a few of these.
     pub const EPSILON: f64 = 2.465_190_328_815_662e-32;
+    /// Zero.
+    pub const ZERO: Self = Self { high: 0.0, low: 0.0 };
     /// ln 2.
     pub const LN_2: Self = Self { high: std::f64::consts::LN_2, low: 2.319_046_813_846_299_6e-17 };
     /// pi.
     pub const PI: Self = Self { high: std::f64::consts::PI, low: 1.224_646_799_147_353_2e-16 };
     /// pi/2, and the part that does not fit (for argument reduction).
-    const HALF_PI: Self = Self { high: std::f64::consts::FRAC_PI_2, low: 6.123_233_995_736_766e-17 };
-    const HALF_PI_REST: f64 = -1.497_384_904_859_169_8e-33;
+    pub(super) const HALF_PI: Self = Self { high: std::f64::consts::FRAC_PI_2, low: 6.123_233_995_736_766e-17 };
+    pub(super) const HALF_PI_REST: f64 = -1.497_384_904_859_169_8e-33;
     /// Doublings that undo the division by [`Self::REDUCTION`] in exp.
     const HALVINGS: u32 = 9;
     const REDUCTION: f64 = 512.0;
@@ -155,7 +157,7 @@ impl DoubleDouble {
     }
 
     /// self * 2^k; exact unless it over- or underflows.
-    fn times_power_of_two(self, k: i32) -> Self {
+    pub(super) fn times_power_of_two(self, k: i32) -> Self {
         // In two halves, because 2^k itself may leave the range although the product does not.
         let (a, b) = (power_of_two((k / 2).clamp(-1022, 1023)), power_of_two((k - k / 2).clamp(-1022, 1023)));
         Self { high: self.high * a * b, low: self.low * a * b }

@@ -136,7 +136,11 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
 impl<S: Elementary, const N: usize> Elementary for Dual<S, N> {
     fn tanh(self) -> Self {
         let t = self.value.tanh();
-        self.chain(t, S::one() - t * t)
+        self.chain(t, self.value.sech_squared().unwrap_or_else(|| S::one() - t * t))
+    }
+    fn sech_squared(self) -> Option<Self> {
+        let s = self.value.sech_squared()?;
+        Some(self.chain(s, -(self.value.tanh() * s).scale(2.0)))
     }
     fn exp(self) -> Self {
         let e = self.value.exp();

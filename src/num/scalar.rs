@@ -57,6 +57,12 @@ pub trait Arithmetic:
 pub trait Elementary: Arithmetic {
     /// Hyperbolic tangent.
     fn tanh(self) -> Self;
+    /// 1 - tanh^2, by number types that know it better than from the tanh: where tanh is within rounding of 1, its slope would
+    /// lose all digits, and an enclosure its meaning.
+    #[inline]
+    fn sech_squared(self) -> Option<Self> {
+        None
+    }
     /// Exponential.
     fn exp(self) -> Self;
     /// Sine.

@@ -209,8 +209,14 @@ impl<S: Elementary + FromDecimal> Solution<S> {
             Recurrence::Tanh(a) if k == 0 => series(a)[0].tanh(),
             // u' = a' (1 - u^2)
             Recurrence::Tanh(a) => one_over(weighted(series(a), series(this + 1), k)),
-            // As (1 - u)(1 + u): exactly zero where tanh is saturated, and accurate near it.
-            Recurrence::TanhSlope(u) if k == 0 => (S::one() - series(u)[0]) * (S::one() + series(u)[0]),
+            Recurrence::TanhSlope(u) if k == 0 => {
+                let known = match self.recurrences[u - self.dimension] {
+                    Recurrence::Tanh(a) => series(a)[0].sech_squared(),
+                    _ => None,
+                };
+                // As (1 - u)(1 + u): exactly zero where tanh is saturated, and accurate near it.
+                known.unwrap_or_else(|| (S::one() - series(u)[0]) * (S::one() + series(u)[0]))
+            }
             Recurrence::TanhSlope(u) => -square(series(u), k),
             Recurrence::Sin(a) if k == 0 => series(a)[0].sin(),
             Recurrence::Sin(a) => one_over(weighted(series(a), series(this + 1), k)),

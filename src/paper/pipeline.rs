@@ -12,7 +12,7 @@ use crate::job::encode;
 use crate::job::question::question_hash;
 use crate::job::spec::RunSpec;
 use crate::job::{Answer, AnyQuestion, Desk, JobError, Recording, Run, Stop};
-use crate::record::{Hash, PanelEntry, PictureEntry};
+use crate::record::{Hash, PanelEntry, PictureEntry, VerdictEntry};
 use crate::render::{Pixels, RenderError, Rendered, render};
 
 /// A computed picture: its files' bytes and what is known about them.
@@ -160,7 +160,12 @@ pub fn compute(picture: &Picture, desk: &Desk<'_>) -> Result<Computed, PipelineE
             label: label.clone(),
             spec: question_hash(&**question),
             data: answer.hash(),
-            verdict: verdicts.iter().find(|v| v.panel == *label).map(Hash::of_json),
+            verdict: verdicts.iter().find(|v| v.panel == *label).map(|v| VerdictEntry {
+                claim: v.claim_text.clone(),
+                found: v.found.clone(),
+                agrees: v.agrees,
+                sha256: Hash::of_json(v),
+            }),
         })
         .collect();
     let joined = |hash: fn(&PanelEntry) -> Option<&Hash>| {
@@ -169,7 +174,7 @@ pub fn compute(picture: &Picture, desk: &Desk<'_>) -> Result<Computed, PipelineE
         Hash::of(hashes.join("\n").as_bytes())
     };
     let (spec, data) = (joined(|e| Some(&e.spec)), joined(|e| Some(&e.data)));
-    let verdict = joined(|e| e.verdict.as_ref());
+    let verdict = joined(|e| e.verdict.as_ref().map(|v| &v.sha256));
 
     let mut panels = Vec::new();
     let drawn = match &picture.view {

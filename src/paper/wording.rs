@@ -77,6 +77,13 @@ pub fn switch(switch: &SwitchSpec) -> String {
         SwitchSpec::Smoothed { eps, transition: Transition::PerturbedTanh { sigma } } => {
             format!("perturbed tanh smoothing, *ε* = {}, *σ* = {}", number(*eps), number(*sigma))
         }
+        SwitchSpec::Smoothed { eps, transition: Transition::Arctan } => {
+            format!("arctan smoothing, *ε* = {}", number(*eps))
+        }
+        SwitchSpec::Smoothed { eps, transition: Transition::Algebraic } => {
+            format!("algebraic smoothing, *ε* = {}", number(*eps))
+        }
+        SwitchSpec::Smoothed { eps, transition: Transition::Erf } => format!("erf smoothing, *ε* = {}", number(*eps)),
         SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. } => format!(
             "hysteresis ({}), *ε* = {}, *ε*′ = {}",
             match relaxation {

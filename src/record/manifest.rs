@@ -58,9 +58,23 @@ pub struct PanelEntry {
     pub spec: Hash,
     /// Hash of the answer: tables (little-endian bits), facts, stop reason.
     pub data: Hash,
-    /// Hash of the verdict's canonical JSON, if the paper claims something of the panel.
+    /// The verdict, if something is claimed of the panel.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub verdict: Option<Hash>,
+    pub verdict: Option<VerdictEntry>,
+}
+
+/// A panel's verdict in brief, and the hash of the whole of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VerdictEntry {
+    /// What is claimed.
+    pub claim: String,
+    /// What was found.
+    pub found: String,
+    /// Whether they agree.
+    pub agrees: bool,
+    /// Hash of the verdict's canonical JSON, evidence included.
+    pub sha256: Hash,
 }
 
 /// A layer of a picture, from question to file.
@@ -210,7 +224,7 @@ impl PictureEntry {
         let panels = match layer {
             Layer::Spec => panels_differing(|p| Some(&p.spec)),
             Layer::Data => panels_differing(|p| Some(&p.data)),
-            Layer::Verdict => panels_differing(|p| p.verdict.as_ref()),
+            Layer::Verdict => panels_differing(|p| p.verdict.as_ref().map(|v| &v.sha256)),
             _ => Vec::new(),
         };
         Some(Difference { layer, panels })
@@ -223,7 +237,7 @@ mod tests {
 
     fn entry() -> PictureEntry {
         let h = |s: &str| Hash::of(s.as_bytes());
-        let panel = |l: &str| PanelEntry { label: l.into(), spec: h("s"), data: h("d"), verdict: Some(h("v")) };
+        let panel = |l: &str| PanelEntry { label: l.into(), spec: h("s"), data: h("d"), verdict: None };
         PictureEntry {
             name: "fig7-printed".into(),
             spec: h("1"),

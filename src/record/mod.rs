@@ -10,4 +10,4 @@ pub mod manifest;
 pub use files::{FileError, write};
 pub use folder::{FileBytes, Tree, read_tree};
 pub use hash::Hash;
-pub use manifest::{Layer, Manifest, PanelEntry, PictureEntry};
+pub use manifest::{Layer, Manifest, PanelEntry, PictureEntry, VerdictEntry};

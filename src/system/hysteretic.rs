@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::smoothed::blend;
 use super::{PiecewiseSmooth, VectorField};
-use crate::num::Elementary;
+use crate::num::tape::Recorded;
+use crate::num::{Arithmetic, Elementary};
 
 /// How eq. (10)'s two divisions by eps' are read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -17,6 +18,19 @@ pub enum Relaxation {
     Literal,
     /// One division: phi relaxes to (1 + tanh((h + eps (2 phi - 1))/eps'))/2.
     Single,
+}
+
+impl Relaxation {
+    /// phi' as operations.
+    pub(super) fn record(self, h: Recorded, phi: Recorded, eps: Recorded, eps_prime: Recorded) -> Recorded {
+        let width = match self {
+            Relaxation::Literal => eps_prime * eps_prime,
+            Relaxation::Single => eps_prime,
+        };
+        let w = h + (phi.scale(2.0) - Recorded::one()) * eps;
+        let psi = (Recorded::one() + (w / width).tanh()).scale(0.5);
+        (psi - phi) / eps_prime
+    }
 }
 
 /// x' = f- + (f+ - f-) phi, eps' phi' = psi - phi. State (x, phi), dimension `N + 1`.

@@ -8,8 +8,15 @@
 //! Equations are generic over [`Scalar`], so that each is written once.
 
 pub mod caricature;
+pub mod definition;
+pub mod diagnostic;
+mod document;
+pub mod expression;
+pub mod field;
 pub mod filippov;
 pub mod hysteretic;
+pub mod instance;
+pub mod library;
 pub mod normal_form;
 pub mod relay;
 pub mod reversed;
@@ -26,7 +33,13 @@ use crate::num::tape::Recorded;
 use crate::num::{Dual, Elementary, Tape};
 
 pub use caricature::Caricature;
+pub use definition::Definition;
+pub use diagnostic::Diagnostic;
+pub use document::Canonical;
+pub use expression::Expression;
+pub use field::{BoundField, Field};
 pub use hysteretic::{Hysteretic, Relaxation};
+pub use instance::{Bound, Compiled, DimensionError, ParameterError, System};
 pub use normal_form::TwoFoldNormalForm;
 pub use relay::{Feedback, Relay};
 pub use reversed::Reversed;

@@ -3,9 +3,9 @@
 //! The last point has phase 0, the one before it phase 1, ..., modulo the period.
 
 use super::Thresholds;
-use super::fit::{Line, line, median};
 use super::verdict::Rate;
 use crate::num::elementary::{atan2, cos, ln, sin, sqrt};
+use crate::num::fit::{Line, line, median};
 
 type Point = [f64; 2];
 

@@ -5,8 +5,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::fit::{line, mean, median};
 use crate::num::elementary::{ln, sqrt};
+use crate::num::fit::{line, mean, median};
 
 /// Returns followed.
 const HORIZON: usize = 12;

@@ -19,7 +19,6 @@
 mod claim;
 mod cycle;
 mod divergence;
-mod fit;
 mod occupancy;
 mod thresholds;
 mod verdict;
@@ -31,8 +30,6 @@ pub use occupancy::{Overlap, overlap};
 pub use thresholds::Thresholds;
 pub use verdict::{Cycle, CyclePoint, Evidence, Rate, Verdict};
 pub use zero_one::zero_one;
-
-pub(crate) use fit::mean;
 
 use super::lyapunov::Exponent;
 use cycle::{Captured, Turns};

@@ -118,7 +118,7 @@ impl std::fmt::Display for Verdict {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Periodic(c) => {
-                write!(f, "period {}", c.period)?;
+                write!(f, "period {}, captured at t = {:.0}", c.period, c.captured_at)?;
                 match c.settled_at {
                     Some(t) => write!(f, ", settled at t = {t:.0}"),
                     None => Ok(()),
@@ -127,7 +127,7 @@ impl std::fmt::Display for Verdict {
             Self::Spiralling(c) => {
                 write!(
                     f,
-                    "spiralling onto period {} since t = {:.0}, radius {:.3}",
+                    "spiralling onto period {}, captured at t = {:.0}, not settled, radius {:.3}",
                     c.period, c.captured_at, c.radius
                 )?;
                 match c.approach {

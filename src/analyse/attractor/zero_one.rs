@@ -1,8 +1,8 @@
 //! The 0-1 test for chaos: Gottwald & Melbourne (2009), "On the implementation of the 0-1 test for chaos", SIAM J. Appl. Dyn.
 //! Syst. 8, 129-145.
 
-use super::fit::median;
 use crate::num::elementary::{cos, sin, sqrt};
+use crate::num::fit::median;
 use crate::num::random::RandomStream;
 
 /// Frequencies tried. The median over them is not disturbed by the few that resonate with the signal.

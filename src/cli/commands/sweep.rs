@@ -83,7 +83,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let out = arguments.out.as_deref();
     try_delivery(out)?;
     let progress = Progress::with_grace(arguments.quiet);
-    let rows: Vec<Option<Row>> = in_pool(arguments.threads, || {
+    let rows: Vec<Option<Box<Row>>> = in_pool(arguments.threads, || {
         (1..=arguments.runs)
             .into_par_iter()
             .map(|k| {
@@ -95,7 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             })
             .collect()
     })?;
-    let rows: Vec<Row> = rows.into_iter().flatten().collect();
+    let rows: Vec<Row> = rows.into_iter().flatten().map(|row| *row).collect();
     let mut counts: BTreeMap<String, u32> = BTreeMap::new();
     for row in &rows {
         *counts.entry(row.kind()).or_default() += 1;
@@ -129,13 +129,13 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 }
 
 /// One run, or nothing if it was interrupted.
-fn one(spec: &RunSpec, shift: f64, progress: &Progress) -> Option<Row> {
+fn one(spec: &RunSpec, shift: f64, progress: &Progress) -> Option<Box<Row>> {
     let mut shifted = *spec;
     shifted.start[0] += shift;
     // A desk of its own: what it has computed is forgotten with it, however many runs there are.
     match Classification::of(shifted).ask(&Desk::new(None, progress)) {
         Err(JobError::Interrupted) => None,
-        end => Some(Row { shift, end }),
+        end => Some(Box::new(Row { shift, end })),
     }
 }
 

@@ -1,6 +1,7 @@
 //! The funnel: all futures of a set-valued point, indexed by exit time and side.
 
 use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
 
 use super::engine::{Departure, Origin};
 use super::two_fold::SlidingAtTwoFold;
@@ -11,7 +12,8 @@ use crate::system::filippov::{Region, region};
 use crate::system::{PiecewiseSmooth, Reversed, VectorField};
 
 /// Which members of the funnel to compute: exit times between the shortest and the longest, both sides of each.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct FunnelGrid {
     /// The shortest time of repelling sliding.
     pub shortest: f64,
@@ -93,7 +95,7 @@ where
         statistics: there.statistics,
         members: Vec::new(),
     };
-    family.members = members_of(system, &family, settings, grid, None)?;
+    family.members = family.members_on(system, settings, grid, None)?;
     Ok(family)
 }
 
@@ -172,47 +174,52 @@ where
     Ok(path)
 }
 
-/// The members on `grid` of the family that starts at the set-valued point of `family`; of one side only, if given.
-pub(super) fn members_of<P, const N: usize, const M: usize>(
-    system: &P,
-    family: &Funnel<N>,
-    settings: &Settings,
-    grid: &FunnelGrid,
-    only: Option<Side>,
-) -> Result<Vec<FunnelMember<N>>, FilippovError>
-where
-    P: PiecewiseSmooth<N>,
-    for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
-{
-    let departure = if family.at_two_fold {
-        Departure::TwoFold(SlidingAtTwoFold::near(system, &family.point).map(Box::new))
-    } else {
-        Departure::Repelling
-    };
-    let mut members = Vec::new();
-    let mut points = 0;
-    for k in 0..grid.times {
-        let fraction = if grid.times > 1 { k as f64 / (grid.times - 1) as f64 } else { 1.0 };
-        let exit_time = grid.shortest * pow(grid.longest / grid.shortest, fraction);
-        for side in [Side::Plus, Side::Minus] {
-            if only.is_some_and(|s| s != side) {
-                continue;
+impl<const N: usize> Funnel<N> {
+    /// The futures on another grid; of one side only, if given.
+    ///
+    /// # Errors
+    /// Those of [`run`](super::run).
+    pub fn members_on<P, const M: usize>(
+        &self,
+        system: &P,
+        settings: &Settings,
+        grid: &FunnelGrid,
+        only: Option<Side>,
+    ) -> Result<Vec<FunnelMember<N>>, FilippovError>
+    where
+        P: PiecewiseSmooth<N>,
+        for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
+    {
+        let departure = if self.at_two_fold {
+            Departure::TwoFold(SlidingAtTwoFold::near(system, &self.point).map(Box::new))
+        } else {
+            Departure::Repelling
+        };
+        let mut members = Vec::new();
+        let mut points = 0;
+        for k in 0..grid.times {
+            let fraction = if grid.times > 1 { k as f64 / (grid.times - 1) as f64 } else { 1.0 };
+            let exit_time = grid.shortest * pow(grid.longest / grid.shortest, fraction);
+            for side in [Side::Plus, Side::Minus] {
+                if only.is_some_and(|s| s != side) {
+                    continue;
+                }
+                let mut trajectory = Trajectory::new(grid.per_step);
+                if grid.until_two_fold {
+                    trajectory = trajectory.until_two_fold();
+                }
+                let rule = ExitRule::AfterTime { time: exit_time, side };
+                let origin = Origin { t: self.t, x: self.point, departure: departure.clone() };
+                let until = self.t + grid.horizon;
+                let summary =
+                    engine::run_from(system, origin, until, settings, rule, &mut trajectory, &())?.within_budget()?;
+                points += trajectory.points().count();
+                if points > MOST_POINTS {
+                    return Err(FilippovError::TooManyPoints { limit: MOST_POINTS, members: members.len() });
+                }
+                members.push(FunnelMember { exit_time, side, trajectory, summary });
             }
-            let mut trajectory = Trajectory::new(grid.per_step);
-            if grid.until_two_fold {
-                trajectory = trajectory.until_two_fold();
-            }
-            let rule = ExitRule::AfterTime { time: exit_time, side };
-            let origin = Origin { t: family.t, x: family.point, departure: departure.clone() };
-            let until = family.t + grid.horizon;
-            let summary =
-                engine::run_from(system, origin, until, settings, rule, &mut trajectory, &())?.within_budget()?;
-            points += trajectory.points().count();
-            if points > MOST_POINTS {
-                return Err(FilippovError::TooManyPoints { limit: MOST_POINTS, members: members.len() });
-            }
-            members.push(FunnelMember { exit_time, side, trajectory, summary });
         }
+        Ok(members)
     }
-    Ok(members)
 }

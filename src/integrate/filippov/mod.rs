@@ -46,7 +46,6 @@ mod engine;
 mod exit;
 mod flow;
 mod funnel;
-pub mod limit;
 mod trajectory;
 pub mod two_fold;
 

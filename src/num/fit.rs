@@ -1,18 +1,21 @@
-//! Straight lines and means.
+//! Straight lines, means and medians.
 
-use crate::num::elementary::sqrt;
+use super::elementary::sqrt;
 
 /// A least-squares line y = intercept + slope x.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Line {
+pub struct Line {
+    /// The slope.
     pub slope: f64,
+    /// Its standard error.
     pub slope_error: f64,
+    /// The value at x = 0.
     pub intercept: f64,
 }
 
 /// The line through the points (x, y); `None` with fewer than two different x. The error of the slope comes from the scatter
 /// about the line (zero for two points).
-pub(super) fn line(points: &[(f64, f64)]) -> Option<Line> {
+pub fn line(points: &[(f64, f64)]) -> Option<Line> {
     let n = points.len() as f64;
     let (mut mx, mut my) = (0.0, 0.0);
     for (x, y) in points {
@@ -35,7 +38,7 @@ pub(super) fn line(points: &[(f64, f64)]) -> Option<Line> {
 }
 
 /// Mean and standard error of the mean of independent values.
-pub(crate) fn mean(values: &[f64]) -> (f64, f64) {
+pub fn mean(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     if values.len() < 2 {
@@ -46,7 +49,7 @@ pub(crate) fn mean(values: &[f64]) -> (f64, f64) {
 }
 
 /// The middle value (upper of two); sorts its argument.
-pub(super) fn median(values: &mut [f64]) -> f64 {
+pub fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]
 }

@@ -1,0 +1,179 @@
+//! Reference orbits in double-double arithmetic, about 32 digits: what other methods are measured against.
+
+use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
+
+use super::section::Direction;
+use crate::integrate::{Failure, Statistics, Stepper, StopReason, Taylor, Tolerance, roots::sign_changes};
+use crate::num::Arithmetic;
+use crate::num::{DoubleDouble, Elementary, Scalar};
+use crate::system::{PiecewiseSmooth, VectorField};
+
+/// A point in double-double precision.
+pub type ExtendedPoint<const N: usize = 3> = SVector<DoubleDouble, N>;
+
+/// The local tolerance of reference orbits: at the precision of the arithmetic.
+pub const REFERENCE_TOLERANCE: Tolerance = Tolerance { rtol: 1e-32, atol: 1e-32 };
+
+/// The plane through which crossings are counted: `state[coordinate] = value`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plane {
+    /// Index of the coordinate.
+    pub coordinate: usize,
+    /// Its value on the plane.
+    pub value: f64,
+}
+
+/// A surface that orbits are watched at: the zeros of a height, which is evaluated in whatever arithmetic the orbit has.
+pub trait Surface<const N: usize> {
+    /// The height of `x` over the surface.
+    fn height<S: Elementary>(&self, x: &SVector<S, N>) -> S;
+}
+
+impl<const N: usize> Surface<N> for Plane {
+    fn height<S: Elementary>(&self, x: &SVector<S, N>) -> S {
+        x[self.coordinate] - S::from_f64(self.value)
+    }
+}
+
+/// The switching surface h = 0 of a system.
+#[derive(Clone, Copy, Debug)]
+pub struct SwitchingSurface<'a, P>(pub &'a P);
+
+impl<P: PiecewiseSmooth<N>, const N: usize> Surface<N> for SwitchingSurface<'_, P> {
+    fn height<S: Elementary>(&self, x: &SVector<S, N>) -> S {
+        self.0.switching(x)
+    }
+}
+
+/// A passage through a surface, in double-double precision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExtendedCrossing<const N: usize = 3> {
+    /// Time.
+    pub t: DoubleDouble,
+    /// State.
+    pub x: ExtendedPoint<N>,
+    /// Sense.
+    pub direction: Direction,
+}
+
+impl<const N: usize> ExtendedCrossing<N> {
+    /// The largest component of the state.
+    pub fn extent(&self) -> f64 {
+        self.x.iter().map(|c| c.to_f64().abs()).fold(0.0, f64::max)
+    }
+}
+
+/// Crossings of a reference orbit, and how it ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReferenceOrbit<const N: usize = 3> {
+    /// The crossings, in order of time.
+    pub crossings: Vec<ExtendedCrossing<N>>,
+    /// Work done.
+    pub statistics: Statistics,
+    /// [`StopReason::EndTime`], or [`StopReason::Observer`] when the count was reached.
+    pub stop: StopReason,
+}
+
+/// The first `count` crossings of `surface` by the orbit through `x0` at t = 0, in double-double arithmetic; fewer if `t_end`
+/// comes first. `decimal`: read the equation's constants as decimal numbers
+/// ([`Constants::Decimal`](crate::num::series::Constants)); without, the equation is the one that `f64` methods solve.
+///
+/// # Errors
+/// [`Failure`] of the method; [`Failure::TooManySteps`] on an orbit that takes more than two million.
+pub fn reference<F: VectorField<N>, const N: usize>(
+    field: &F,
+    x0: ExtendedPoint<N>,
+    surface: impl Surface<N>,
+    count: usize,
+    t_end: f64,
+    decimal: bool,
+) -> Result<ReferenceOrbit<N>, Failure> {
+    let mut stepper = Taylor::extended(REFERENCE_TOLERANCE);
+    if decimal {
+        stepper = stepper.with_decimal_constants();
+    }
+    stepper.restart_from(field, DoubleDouble::zero(), x0, t_end, f64::INFINITY)?;
+    let mut found = Vec::new();
+    while found.len() < count && stepper.state().0.to_f64() < t_end {
+        next_crossings(&mut stepper, field, &surface, |crossing| found.push(crossing))?;
+    }
+    let stop = if found.len() >= count { StopReason::Observer } else { StopReason::EndTime };
+    found.truncate(count);
+    Ok(ReferenceOrbit { crossings: found, statistics: stepper.statistics().clone(), stop })
+}
+
+/// The first crossing of `surface` from (t, x) on, before `t_end`, that `wanted` accepts; the work is added to `work`.
+///
+/// # Errors
+/// Those of [`reference()`].
+pub(super) fn first_crossing<F: VectorField<N>, const N: usize>(
+    field: &F,
+    (t, x): (DoubleDouble, ExtendedPoint<N>),
+    surface: impl Surface<N>,
+    wanted: impl Fn(&ExtendedCrossing<N>) -> bool,
+    t_end: f64,
+    work: &mut Statistics,
+) -> Result<Option<ExtendedCrossing<N>>, Failure> {
+    let mut stepper = Taylor::extended(REFERENCE_TOLERANCE);
+    stepper.restart_from(field, t, x, t_end, f64::INFINITY)?;
+    let mut found = None;
+    while found.is_none() && stepper.state().0.to_f64() < t_end {
+        next_crossings(&mut stepper, field, &surface, |c| {
+            if found.is_none() && wanted(&c) {
+                found = Some(c);
+            }
+        })?;
+    }
+    *work += stepper.statistics();
+    Ok(found)
+}
+
+/// Steps of one reference orbit. The orbits of the paper's first 200 units of time take some 1e4; the stiff far attractor
+/// takes as many per unit of time and would never end.
+const MOST_STEPS: u64 = 2_000_000;
+
+/// One step; its crossings go to `found`.
+fn next_crossings<F: VectorField<N>, const N: usize>(
+    stepper: &mut Taylor<N, DoubleDouble>,
+    field: &F,
+    surface: &impl Surface<N>,
+    mut found: impl FnMut(ExtendedCrossing<N>),
+) -> Result<(), Failure> {
+    if stepper.statistics().steps >= MOST_STEPS {
+        let (t, x) = stepper.state();
+        let state = Failure::state(&x.map(|c| c.to_f64()));
+        return Err(Failure::TooManySteps { t: t.to_f64(), limit: MOST_STEPS, state });
+    }
+    let step = stepper.step(field)?;
+    let mut before = surface.height(&step.x0);
+    for theta in sign_changes(&step, |x| surface.height(x)) {
+        let direction = if before < 0.0 { Direction::Up } else { Direction::Down };
+        before = -before;
+        let (t, x) = refine(stepper, surface, theta);
+        found(ExtendedCrossing { t, x, direction });
+    }
+    Ok(())
+}
+
+/// The crossing near the fraction `theta` of the last step, by the secant method: from 16 digits to all.
+fn refine<const N: usize>(
+    stepper: &Taylor<N, DoubleDouble>,
+    surface: &impl Surface<N>,
+    theta: f64,
+) -> (DoubleDouble, ExtendedPoint<N>) {
+    let height = |s| surface.height(&stepper.at(s).1);
+    let mut a = DoubleDouble::new(theta, 1e-9);
+    let mut b = DoubleDouble::from_f64(theta);
+    let mut ha = height(a);
+    for _ in 0..4 {
+        let hb = height(b);
+        if hb == ha || hb == DoubleDouble::zero() {
+            break;
+        }
+        let next = b - hb * (b - a) / (hb - ha);
+        (a, ha, b) = (b, hb, next);
+    }
+    stepper.at(b)
+}

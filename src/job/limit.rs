@@ -1,0 +1,110 @@
+//! The questions of what smoothed orbits tend to as the switch steepens: before the first visit to a two-fold, and after it.
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::answer::{Answer, Stop};
+use super::desk::Desk;
+use super::question::{JobError, Question};
+use super::recording::side_word;
+use super::spec::SystemSpec;
+use super::table::{Column, Entry, Table};
+use crate::analyse::limit::{AfterVisitQuestion, ConvergenceQuestion, after_visit, convergence};
+use crate::integrate::Watch;
+use crate::integrate::filippov::Mode;
+
+/// Distance of smoothed orbits from the Filippov orbit before its first visit to a two-fold. Table `before`: a row per eps and time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SmoothingLimit {
+    /// The system.
+    pub system: SystemSpec,
+    /// Which orbits, when.
+    pub compared: ConvergenceQuestion,
+}
+
+impl Question for SmoothingLimit {
+    fn kind(&self) -> &'static str {
+        "smoothing-limit"
+    }
+
+    fn json(&self) -> Value {
+        serde_json::to_value(self).expect("questions are plain data")
+    }
+
+    fn label(&self) -> String {
+        "smoothed orbits before the visit".into()
+    }
+
+    fn cost(&self) -> f64 {
+        5e4
+    }
+
+    fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        let found = match self.system {
+            SystemSpec::Caricature(system) => convergence(&system, &self.compared),
+            SystemSpec::Wheel(system) => convergence(&system, &self.compared),
+        }?;
+        let columns =
+            [Column::numbers("eps"), Column::numbers("t"), Column::words("mode"), Column::numbers("distance")];
+        let mut table = Table::new("before", columns);
+        for row in &found.rows {
+            let mode = if row.mode == Mode::SlidingAttracting { "sliding" } else { "free" };
+            table.push([row.eps.into(), row.t.into(), mode.into(), row.distance.into()]);
+        }
+        Ok(Answer { statistics: Some(found.statistics), stop: Stop::Finished, ..Answer::of_tables(vec![table]) })
+    }
+}
+
+/// Where smoothed orbits go after the first visit to a two-fold, and the member of the funnel of Filippov futures that goes nearest. Tables: `funnel`, a
+/// row per future that makes the crossing; `after`, a row per eps. Facts: `t_visit`, `width` (the funnel's, at the crossing).
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AfterVisit {
+    /// The system.
+    pub system: SystemSpec,
+    /// Which orbits, which futures.
+    pub compared: AfterVisitQuestion,
+}
+
+impl Question for AfterVisit {
+    fn kind(&self) -> &'static str {
+        "after-visit"
+    }
+
+    fn json(&self) -> Value {
+        serde_json::to_value(self).expect("questions are plain data")
+    }
+
+    fn label(&self) -> String {
+        "smoothed orbits after the visit".into()
+    }
+
+    fn cost(&self) -> f64 {
+        self.compared.eps.iter().map(|eps| 600.0 / eps.max(1e-9)).sum()
+    }
+
+    fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        let found = match self.system {
+            SystemSpec::Caricature(system) => after_visit(&system, &self.compared),
+            SystemSpec::Wheel(system) => after_visit(&system, &self.compared),
+        }?;
+        let kinds = |name: &str| if name.ends_with("side") { Column::words(name) } else { Column::numbers(name) };
+        let [_, b, c] = self.system.coordinates();
+        let mut members = Table::new("funnel", ["exit_time", "side", b, c].map(kinds));
+        for m in &found.members {
+            members.push([m.exit_time.into(), side_word(m.side).into(), m.crossing[1].into(), m.crossing[2].into()]);
+        }
+        let columns = ["eps", b, c, "nearest_exit_time", "nearest_side", "distance", "width", "t_visit"];
+        let mut after = Table::new("after", columns.map(kinds));
+        for r in &found.rows {
+            let mut row: Vec<Entry> =
+                [r.eps, r.crossing[1], r.crossing[2], r.nearest.exit_time].map(Entry::from).into();
+            row.push(side_word(r.nearest.side).into());
+            row.extend([r.distance, found.width, found.t_visit].map(Entry::from));
+            after.push(row);
+        }
+        let answer = Answer::of_tables(vec![members, after]);
+        Ok(Answer { statistics: Some(found.statistics.clone()), stop: Stop::Finished, ..answer }
+            .with_fact("t_visit", &found.t_visit)
+            .with_fact("width", &found.width))
+    }
+}

@@ -1,0 +1,41 @@
+//! CONTRIBUTING's worked examples are built and run, and do what they say.
+
+#[allow(dead_code)]
+#[path = "../examples/own_figure.rs"]
+mod own_figure;
+#[allow(dead_code)]
+#[path = "../examples/own_method.rs"]
+mod own_method;
+#[allow(dead_code)]
+#[path = "../examples/own_system.rs"]
+mod own_system;
+
+use twofold::integrate::filippov::EventKind;
+use twofold::job::Desk;
+
+#[test]
+fn own_system_slides_on_its_surface() {
+    let events = own_system::follow().unwrap();
+    // It lands on prey = 1 and slides there: too many predators to let the prey grow, too few prey to be hunted.
+    assert!(matches!(events[0].kind, EventKind::Landing { .. }), "{events:?}");
+    assert!(events.iter().all(|e| (e.state[0] - 1.0).abs() < 1e-9), "{events:?}");
+}
+
+#[test]
+fn own_method_agrees_with_dormand_prince() {
+    let passages = own_method::compare().unwrap();
+    // A pendulum released at 1 radian swings with period 4 K(sin(1/2)) = 6.6996: nine passages in 30.
+    assert_eq!(passages.len(), 9);
+    assert!((passages[2][0] - passages[0][0] - 6.699_6).abs() < 1e-3, "{passages:?}");
+    assert!(passages.iter().all(|[ours, theirs]| (ours - theirs).abs() < 1e-6), "{passages:?}");
+}
+
+#[test]
+fn own_figure_is_written_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let records = twofold::cli::make(&[own_figure::figure()], folder.path(), &Desk::quiet()).unwrap();
+    assert_eq!(records.len(), 1);
+    for file in ["own.png", "own.svg", "own.pdf", "own.json", "own-a.csv", "own-b.csv"] {
+        assert!(folder.path().join("own").join(file).metadata().unwrap().len() > 500, "{file}");
+    }
+}
