@@ -13,6 +13,57 @@ use serde_json::Value;
 /// Long enough for anything that is refused at once, on any machine; far too short for what is refused.
 const AT_ONCE: Duration = Duration::from_secs(60);
 
+/// A program under way. A test that fails does not leave it running.
+struct Running(Option<Child>);
+
+impl Running {
+    fn start(arguments: &[&str]) -> Self {
+        let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin("twofold"));
+        command.args(arguments).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        Self(Some(command.spawn().unwrap()))
+    }
+
+    fn child(&mut self) -> &mut Child {
+        self.0.as_mut().unwrap()
+    }
+
+    /// Nobody reads what it says any more.
+    fn unread(mut self) -> Self {
+        self.child().stdout = None;
+        self.child().stderr = None;
+        self
+    }
+
+    fn ended(&mut self) -> bool {
+        self.child().try_wait().unwrap().is_some()
+    }
+
+    /// Waits for its end, for a minute.
+    fn output(mut self) -> Output {
+        let child = self.0.take().unwrap();
+        let id = child.id().to_string();
+        let (done, waits) = std::sync::mpsc::channel::<()>();
+        let guard = std::thread::spawn(move || {
+            if waits.recv_timeout(AT_ONCE) == Err(std::sync::mpsc::RecvTimeoutError::Timeout) {
+                std::process::Command::new("kill").args(["-KILL", &id]).status().ok();
+            }
+        });
+        let output = child.wait_with_output().unwrap();
+        drop(done);
+        guard.join().unwrap();
+        output
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if let Some(child) = &mut self.0 {
+            child.kill().ok();
+            child.wait().ok();
+        }
+    }
+}
+
 fn twofold(arguments: &[&str]) -> Output {
     Command::cargo_bin("twofold").unwrap().args(arguments).timeout(AT_ONCE).output().unwrap()
 }
@@ -136,13 +187,7 @@ fn exit_codes_are_those_of_the_help() {
     assert_eq!(rows.lines().filter(|l| l.contains(",failed,")).count(), 2, "{rows}");
     assert_eq!(figure("fig1", &["--quiet", "--out", here]).status.code(), Some(0));
     assert_eq!(figure("fig1", &["--quiet", "--out", here, "--only", "i"]).status.code(), Some(2));
-    let stiff =
-        ["--quiet", "--out", here, "--reading", "printed", "--method", "radau5", "--t-end", "1e12", "--only", "i"];
-    assert_eq!(
-        figure("fig7", &[&stiff[..], &["--print-spec"]].concat()).status.code(),
-        Some(2),
-        "--out with --print-spec"
-    );
+    assert_eq!(twofold(&["figure", "fig7", "--print-spec", "--out", here]).status.code(), Some(2));
     for text in [twofold(&["--help"]).stdout, twofold(&["run", "--help"]).stdout, figure("fig7", &["--help"]).stdout] {
         let text = String::from_utf8(text).unwrap();
         assert!(text.contains("Example") || text.contains("Exit codes"), "{text}");
@@ -246,33 +291,24 @@ fn a_full_disk_is_an_error() {
 #[test]
 fn an_unread_standard_error_costs_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    let start = |program: &str, arguments: &[&str]| {
-        let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin(program));
-        command.args(arguments).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
-    };
-    let mut child = start("fig3", &["--out", folder.path().to_str().unwrap()]);
-    drop(child.stderr.take());
-    drop(child.stdout.take());
-    assert_eq!(child.wait().unwrap().code(), Some(0));
+    let out = folder.path().to_str().unwrap();
+    let output = Running::start(&["figure", "fig3", "--fresh", "--out", out]).unread().output();
+    assert_eq!(output.status.code(), Some(0));
     let made = files(&folder.path().join("fig3"));
     assert!(
         ["fig3.json", "fig3.pdf", "fig3.png", "fig3.svg"].iter().all(|f| made.contains(&f.to_string())),
         "{made:?}"
     );
-    // Errors cannot be said, but are; and a program may be without both streams.
-    let mut child = start("twofold", &["run", "--t-end", "0"]);
-    drop(child.stderr.take());
-    assert_eq!(child.wait().unwrap().code(), Some(2));
-    let mut child = start("twofold", &["run", "--t-end", "50"]);
-    drop(child.stderr.take());
-    drop(child.stdout.take());
-    assert_eq!(child.wait().unwrap().code(), Some(0));
+    // Errors cannot be said, but are.
+    assert_eq!(Running::start(&["run", "--t-end", "0"]).unread().output().status.code(), Some(2));
+    assert_eq!(Running::start(&["run", "--t-end", "50"]).unread().output().status.code(), Some(0));
+    assert_eq!(Running::start(&["--help"]).unread().output().status.code(), Some(0));
 }
 
 #[cfg(unix)]
-fn signal(child: &Child, name: &str) {
-    let sent = std::process::Command::new("kill").args([format!("-{name}"), child.id().to_string()]).status().unwrap();
-    assert!(sent.success());
+fn signal(running: &mut Running, name: &str) {
+    let id = running.child().id().to_string();
+    assert!(std::process::Command::new("kill").args([format!("-{name}"), id]).status().unwrap().success());
 }
 
 /// Waits until `ready`, or fails after a minute.
@@ -288,40 +324,36 @@ fn wait_until(what: &str, mut ready: impl FnMut() -> bool) {
 #[cfg(unix)]
 #[test]
 fn signals_leave_at_once_and_keep_what_is_finished() {
-    for (name, code, word) in [("INT", 130, "interrupted"), ("TERM", 143, "interrupted")] {
+    for (name, code) in [("INT", 130), ("TERM", 143)] {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("orbit.csv");
         fs::write(&out, "the last whole one").unwrap();
-        let spawn = |program: &str, arguments: &[&str]| {
-            let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin(program));
-            command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
-        };
-        let ends = |child: Child, words: &[&str]| {
+        let ends = |mut running: Running, words: &[&str]| {
             // Long enough for the program to have begun: it listens before it does anything else.
             std::thread::sleep(Duration::from_millis(1500));
             let begun = Instant::now();
-            signal(&child, name);
-            let output = child.wait_with_output().unwrap();
+            signal(&mut running, name);
+            let output = running.output();
             assert!(begun.elapsed() < Duration::from_secs(4), "{name}: {:?}", begun.elapsed());
-            let said = String::from_utf8(output.stderr.clone()).unwrap();
             refuses(&output, code, words);
+            let said = String::from_utf8(output.stderr.clone()).unwrap();
             assert_eq!(said.lines().count(), 1, "{said}");
             output
         };
         // A run: its points so far beside the place, and the old file as it was.
-        let run =
-            spawn("twofold", &["run", "--quiet", "--t-end", "1e9", "--section", "y=0", "--out", out.to_str().unwrap()]);
-        ends(run, &[word, "orbit.csv.part"]);
+        let long = ["run", "--quiet", "--t-end", "1e9", "--section"];
+        let run = Running::start(&[&long[..], &["y=0", "--out", out.to_str().unwrap()]].concat());
+        ends(run, &["interrupted at t = ", "orbit.csv.part"]);
         assert_eq!(fs::read_to_string(&out).unwrap(), "the last whole one");
         let part = fs::read_to_string(folder.path().join("orbit.csv.part")).unwrap();
-        assert!(part.starts_with("t,x,y,z,direction\n") && part.ends_with('\n') && part.lines().count() > 100);
+        assert!(part.contains("\"interrupted\"") && part.ends_with('\n') && part.lines().count() > 50, "{part}");
         assert_eq!(files(folder.path()), ["orbit.csv", "orbit.csv.part"]);
-        // The same on standard output, which is read by nobody until the program has ended: few enough points for a pipe.
-        let run = spawn("twofold", &["run", "--quiet", "--t-end", "1e9", "--section", "y=1e9"]);
-        assert_eq!(ends(run, &["interrupted", "standard output"]).stdout, b"t,x,y,z,direction\n");
+        // The same on standard output.
+        let output = ends(Running::start(&[&long[..], &["y=1e9"]].concat()), &["interrupted at", "standard output"]);
+        assert!(String::from_utf8(output.stdout).unwrap().contains("interrupted"));
         // A figure: what is finished is there, and nothing else.
         let figures = folder.path().join("figures");
-        let made = spawn("fig7", &["--quiet", "--out", figures.to_str().unwrap()]);
+        let made = Running::start(&["figure", "fig7", "--fresh", "--quiet", "--out", figures.to_str().unwrap()]);
         ends(made, &[if name == "INT" { "interrupted" } else { "terminated" }]);
         assert!(files(&figures.join("fig7")).is_empty());
     }
@@ -333,21 +365,25 @@ fn signals_leave_at_once_and_keep_what_is_finished() {
 fn an_interrupted_sweep_keeps_its_rows() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("sweep.csv");
-    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("twofold"))
-        .args(["sweep", "--runs", "1000000", "--t-end", "300", "--threads", "1", "--out", out.to_str().unwrap()])
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut lines = std::io::BufRead::lines(std::io::BufReader::new(child.stderr.take().unwrap()));
-    let finished: Vec<String> = lines.by_ref().take(3).map(Result::unwrap).collect();
-    assert!(finished.iter().all(|l| l.contains("done")), "{finished:?}");
-    signal(&child, "INT");
+    let to = out.to_str().unwrap();
+    let mut sweep = Running::start(&["sweep", "--runs", "1000000", "--t-end", "300", "--threads", "1", "--out", to]);
+    let mut lines = std::io::BufRead::lines(std::io::BufReader::new(sweep.child().stderr.take().unwrap()));
+    // A classification's line comes after those of the runs that it rests on.
+    let finished = lines.by_ref().map(Result::unwrap).filter(|l| l.contains("what becomes of")).take(3).count();
+    assert_eq!(finished, 3);
+    signal(&mut sweep, "INT");
     let rest: Vec<String> = lines.map(Result::unwrap).collect();
-    assert_eq!(child.wait().unwrap().code(), Some(130), "{rest:?}");
+    assert_eq!(sweep.output().status.code(), Some(130), "{rest:?}");
     assert!(rest.last().unwrap().contains("runs are finished"), "{rest:?}");
     let rows = fs::read_to_string(folder.path().join("sweep.csv.part")).unwrap();
     assert!(rows.starts_with("shift,verdict") && rows.lines().count() >= 4 && rows.ends_with('\n'), "{rows}");
     assert_eq!(files(folder.path()), ["sweep.csv.part"]);
+}
+
+/// A short fig. 7 on one thread, into `folder`.
+fn short_fig7(folder: &Path, t_end: &str) -> Running {
+    let to = folder.to_str().unwrap();
+    Running::start(&["figure", "fig7", "--fresh", "--quiet", "--threads", "1", "--t-end", t_end, "--out", to])
 }
 
 /// Figures are not lost without a word when something removes their folder meanwhile.
@@ -355,19 +391,11 @@ fn an_interrupted_sweep_keeps_its_rows() {
 fn a_folder_removed_meanwhile_is_noticed() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("fig7");
-    let arguments = ["--quiet", "--threads", "1", "--t-end", "3000", "--out", folder.path().to_str().unwrap()];
-    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("fig7"))
-        .args(arguments)
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut made = short_fig7(folder.path(), "1000");
     let record = |reading: &str| out.join(format!("fig7-{reading}-shortened.json"));
-    wait_until("the first picture", || {
-        ["printed", "reconstructed"].iter().any(|r| record(r).exists()) || child.try_wait().unwrap().is_some()
-    });
+    wait_until("the first picture", || ["printed", "reconstructed"].iter().any(|r| record(r).exists()) || made.ended());
     fs::remove_dir_all(&out).unwrap();
-    let output = child.wait_with_output().unwrap();
-    refuses(&output, 2, &["fig7", "run this again"]);
+    refuses(&made.output(), 2, &["fig7", "run this again"]);
 }
 
 #[test]
@@ -469,35 +497,28 @@ fn what_was_found_can_be_read_by_programs() {
 }
 
 #[test]
-fn help_speaks_of_the_figure_and_fits_a_terminal() {
-    let text = |program: &str, arguments: &[&str]| {
-        let output = Command::cargo_bin(program).unwrap().args(arguments).env("COLUMNS", "80").output().unwrap();
+fn help_fits_a_terminal_and_has_its_companions() {
+    let text = |arguments: &[&str]| {
+        let output = Command::cargo_bin("twofold").unwrap().args(arguments).env("COLUMNS", "80").output().unwrap();
         assert!(output.status.success());
         String::from_utf8(output.stdout).unwrap()
     };
-    for (program, title) in
-        [("fig1", "The wheel assembly"), ("fig7", "three iteration schemes"), ("digits", "in digits")]
-    {
-        assert!(text(program, &["-h"]).contains(title), "{program}");
-        assert!(text(program, &["--help"]).contains(&format!("{program} --out pictures")), "{program}");
-    }
-    for (program, arguments) in [("twofold", vec!["run", "--help"]), ("fig7", vec!["--help"]), ("twofold", vec!["-h"])]
-    {
+    for arguments in [vec!["run", "--help"], vec!["figure", "--help"], vec!["-h"]] {
         // Examples are for copying and keep their lines.
-        for line in text(program, &arguments).lines().filter(|l| !l.trim_start().starts_with(program)) {
-            assert!(line.chars().count() <= 120, "{line}");
+        for line in text(&arguments).lines().filter(|l| !l.trim_start().starts_with("twofold") && !l.contains(" | ")) {
+            assert!(line.chars().count() <= 100, "{line}");
         }
     }
-    let version = text("twofold", &["--version"]);
+    let version = text(&["--version"]);
     for word in [env!("CARGO_PKG_VERSION"), "commit ", "compiler rustc 1.", "target "] {
         assert!(version.contains(word), "{version}");
     }
-    assert_eq!(text("twofold", &["-V"]), format!("twofold {}\n", env!("CARGO_PKG_VERSION")));
+    assert_eq!(text(&["-V"]), format!("twofold {}\n", env!("CARGO_PKG_VERSION")));
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
-        assert!(text("twofold", &["completions", shell]).contains("plus-probability"), "{shell}");
+        assert!(text(&["completions", shell]).contains("plus-probability"), "{shell}");
     }
     let folder = tempfile::tempdir().unwrap();
-    text("twofold", &["man", folder.path().to_str().unwrap()]);
+    text(&["man", folder.path().to_str().unwrap()]);
     let pages = files(folder.path());
     assert!(pages.contains(&"twofold.1".into()) && pages.contains(&"twofold-run.1".into()), "{pages:?}");
     let page = fs::read_to_string(folder.path().join("twofold-run.1")).unwrap();
@@ -555,7 +576,8 @@ fn blessing_needs_a_reason() {
 }
 
 fn figure(name: &str, arguments: &[&str]) -> Output {
-    Command::cargo_bin(name).unwrap().args(arguments).timeout(AT_ONCE).output().unwrap()
+    let mut command = Command::cargo_bin("twofold").unwrap();
+    command.args(["figure", name, "--fresh"]).args(arguments).timeout(AT_ONCE).output().unwrap()
 }
 
 #[test]
@@ -578,8 +600,8 @@ fn figure_binaries_refuse_the_same_way() {
         refuses(&figure(name, &[&["--quiet", "--out", out], &flags[..]].concat()), 2, &[flags[0], "no effect", name]);
     }
     let still = ["--quiet", "--out", out, "--only", "i", "--seed", "5"];
-    refuses(&figure("fig9", &still), 2, &["--seed", "nothing in this panel is random"]);
-    refuses(&figure("fig1", &["--print-spec"]), 2, &["--print-spec", "no effect"]);
+    refuses(&figure("fig9", &still), 2, &["--seed", "random"]);
+    refuses(&twofold(&["figure", "fig1", "--print-spec"]), 2, &["--print-spec", "no effect"]);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is written on bad usage");
     let blocker = folder.path().join("file");
     fs::write(&blocker, "").unwrap();
@@ -615,16 +637,15 @@ fn is_whole(path: &Path) -> bool {
 }
 
 /// Killed without warning: whole files only. What a kill between two instructions leaves, the next run sweeps away. (`make torture`
-/// kills at hundreds of random moments.)
+/// kills at many random moments.)
 #[test]
 fn a_killed_run_leaves_only_whole_files() {
     let folder = tempfile::tempdir().unwrap();
-    let arguments = ["--quiet", "--threads", "1", "--t-end", "3000", "--out", folder.path().to_str().unwrap()];
-    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("fig7")).args(arguments).spawn().unwrap();
     let out = folder.path().join("fig7");
-    wait_until("the first picture", || files(&out).iter().any(|n| !n.starts_with('.')));
-    child.kill().unwrap();
-    child.wait().unwrap();
+    let mut made = short_fig7(folder.path(), "1000");
+    wait_until("the first file", || files(&out).iter().any(|n| !n.starts_with('.')));
+    made.child().kill().unwrap();
+    made.output();
     let left: Vec<PathBuf> = files(&out).iter().filter(|n| !n.starts_with('.')).map(|n| out.join(n)).collect();
     assert!(!left.is_empty());
     assert!(left.iter().all(|f| is_whole(f)), "{left:?}");
@@ -633,7 +654,7 @@ fn a_killed_run_leaves_only_whole_files() {
     let mut living = fs::File::create(out.join(".twofold-bbbbbb.tmp")).unwrap();
     living.write_all(b"half").unwrap();
     living.lock().unwrap();
-    let again = figure("fig7", &arguments.map(|a| if a == "3000" { "30" } else { a }));
+    let again = short_fig7(folder.path(), "30").output();
     assert!(again.status.success(), "{}", String::from_utf8_lossy(&again.stderr));
     let hidden: Vec<String> = files(&out).into_iter().filter(|n| n.starts_with('.')).collect();
     assert_eq!(hidden, [".twofold-bbbbbb.tmp"]);
