@@ -43,7 +43,12 @@ pub fn figure() -> Figure {
 fn main() -> Result<(), CliError> {
     let out = std::env::args_os().nth(1).map_or_else(|| PathBuf::from("target/own"), PathBuf::from);
     for record in make(&[figure()], &out, &Desk::quiet())? {
-        println!("{}: data {}, pixels {}", record.hashes.name, record.hashes.data.short(), record.hashes.pixels.short());
+        println!(
+            "{}: data {}, pixels {}",
+            record.hashes.name,
+            record.hashes.data.short(),
+            record.hashes.pixels.short()
+        );
     }
     println!("written to {}", out.display());
     Ok(())

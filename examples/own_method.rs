@@ -41,7 +41,14 @@ impl<const N: usize> ClassicalRungeKutta<N> {
     fn new(h: f64) -> Self {
         let zero = SVector::zeros();
         let dense = Hermite { ends: [zero; 2], slopes: [zero; 2] };
-        Self { h, t: 0.0, x: zero, t_end: 0.0, dense, statistics: Statistics { highest_order: 4, ..Default::default() } }
+        Self {
+            h,
+            t: 0.0,
+            x: zero,
+            t_end: 0.0,
+            dense,
+            statistics: Statistics { highest_order: 4, ..Default::default() },
+        }
     }
 }
 
