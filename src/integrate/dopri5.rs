@@ -3,6 +3,7 @@
 
 use nalgebra::SVector;
 
+use super::starting_step::starting_step;
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
 use crate::num::elementary::{pow, sqrt};
 use crate::system::VectorField;
@@ -121,19 +122,13 @@ impl<const N: usize> Dopri5<N> {
         sqrt(sum / N as f64)
     }
 
-    /// A first step size: Hairer et al. (1993), sec. II.4, "Starting step size".
     fn first_step<F: VectorField<N>>(&mut self, field: &F) -> f64 {
         let x = self.x;
-        let d0 = self.norm(&x, |i| x[i].abs());
-        let d1 = self.norm(&self.fsal, |i| x[i].abs());
-        let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 };
-        let h0 = h0.min(self.max_step).min(self.t_end - self.t);
-        let f1 = field.eval(&(x + self.fsal * h0));
+        let longest = self.max_step.min(self.t_end - self.t);
+        let norm = |v: &SVector<f64, N>| self.norm(v, |i| x[i].abs());
+        let h = starting_step(&x, &self.fsal, norm, 0.2, longest, |y| field.eval(y));
         self.statistics.evaluations += 1;
-        let d2 = self.norm(&(f1 - self.fsal), |i| x[i].abs()) / h0;
-        let d = d1.max(d2);
-        let h1 = if d <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { pow(0.01 / d, 0.2) };
-        if h1.is_finite() { (100.0 * h0).min(h1) } else { h0 }
+        h
     }
 }
 

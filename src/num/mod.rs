@@ -13,6 +13,7 @@ pub mod fit;
 pub mod interval;
 pub mod interval_extended;
 pub mod jet;
+pub mod linear;
 pub mod random;
 pub mod scalar;
 pub mod series;
