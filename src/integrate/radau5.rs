@@ -11,7 +11,7 @@ use nalgebra::{Complex, Matrix3, SMatrix, SVector, Vector3};
 use super::linear::Lu;
 use super::starting_step::starting_step;
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
-use crate::num::elementary::{pow, sqrt};
+use crate::num::elementary::{rough_pow, sqrt};
 use crate::system::{VectorField, jacobian};
 
 /// The method's numbers, each from its definition.
@@ -247,7 +247,7 @@ impl<const N: usize> Radau5<N> {
         let mut w_complex = combine_complex(&z, &t.l_complex);
         let rtol = self.tolerance.rtol.max(1e-14);
         let kappa = (10.0 * f64::EPSILON / rtol).max(sqrt(rtol).min(0.03));
-        let mut eta = pow(self.eta.max(f64::EPSILON), 0.8);
+        let mut eta = rough_pow(self.eta.max(f64::EPSILON), 0.8);
         let mut rate = 0.0;
         let mut size_before = 0.0;
         for iteration in 1..=control::MOST_ITERATIONS {
@@ -283,8 +283,8 @@ impl<const N: usize> Radau5<N> {
                     return None;
                 }
                 eta = rate / (1.0 - rate);
-                let left = (control::MOST_ITERATIONS - iteration) as f64;
-                if eta * size * pow(rate, left) > kappa {
+                let left = control::MOST_ITERATIONS - iteration;
+                if (0..left).fold(eta * size, |expected, _| expected * rate) > kappa {
                     return None;
                 }
             }

@@ -2,7 +2,7 @@
 
 use nalgebra::SVector;
 
-use crate::num::elementary::pow;
+use crate::num::elementary::rough_pow;
 
 /// Hairer, Norsett & Wanner (1993), sec. II.4, "Starting step size", for an autonomous equation.
 ///
@@ -22,6 +22,6 @@ pub(super) fn starting_step<const N: usize>(
     let there = eval(&(x + derivative * h0));
     let d2 = norm(&(there - derivative)) / h0;
     let d = d1.max(d2);
-    let h1 = if d <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { pow(0.01 / d, exponent) };
+    let h1 = if d <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { rough_pow(0.01 / d, exponent) };
     if h1.is_finite() { (100.0 * h0).min(h1) } else { h0 }
 }
