@@ -5,7 +5,7 @@ FIGURES := fig1 fig2 fig3 fig4 fig5 fig6 fig7 fig8 fig9 lottery workprecision di
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help figures report check bless test rigor-test browser-test lint bench ci clean
+.PHONY: help figures report check bless test elementary rigor-test browser-test lint bench ci clean
 
 help: ## this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -29,6 +29,9 @@ test: ## all tests, in the debug profile
 
 rigor-test: ## millions of interval operations against exact integer arithmetic (minutes)
 	@$(CARGO) test --release --locked --test rigor_interval -- --ignored
+
+elementary: ## tanh and exp against double-double arithmetic: 2^24 and 2^30 points each (half an hour)
+	@$(CARGO) test --release --locked --lib num::elementary -- --include-ignored --nocapture
 
 browser-test: ## the report in a headless Chromium, if there is one (needs Node)
 	@$(CARGO) build --release --locked --bins

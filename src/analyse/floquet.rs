@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::tangent::Tangent;
 use crate::integrate::{Dopri5, Failure, Stepper, Tolerance, roots};
 use crate::num::elementary::{ln, sqrt};
+use crate::num::linear::solve;
 use crate::system::VectorField;
 
 /// The plane `x[axis] = value`, crossed in one direction.
@@ -97,10 +98,16 @@ pub enum Error {
         /// Iterations made.
         iterations: usize,
     },
+    /// Zero returns were asked for.
+    #[error("a closed orbit crosses its plane at least once per turn: ask for one return or more")]
+    NoReturns,
     /// The derivative of the return map minus the identity is singular.
     #[error("the closed orbit is not isolated here (the return map has multiplier 1)")]
     NotIsolated,
 }
+
+/// Pivots below this share of the largest entry are rounding.
+const SINGULAR: f64 = 1e-14;
 
 /// The return after a number of crossings, with the map's derivative.
 struct Return<const N: usize> {
@@ -114,6 +121,9 @@ struct Return<const N: usize> {
 
 /// The closed orbit that crosses `plane` `returns` times per turn in its direction, by Newton's method from `guess` (its component
 /// `plane.axis` is set to `plane.value`). `M` is `N` (`N` + 1): `closed_orbit::<3, 12, _>(...)`.
+///
+/// # Errors
+/// See [`enum@Error`].
 pub fn closed_orbit<const N: usize, const M: usize, F>(
     field: &F,
     plane: Plane,
@@ -126,6 +136,9 @@ where
     for<'a> Tangent<'a, F, N>: VectorField<M>,
 {
     const { assert!(M == N * (N + 1)) };
+    if returns == 0 {
+        return Err(Error::NoReturns);
+    }
     let mut u = guess;
     u[plane.axis] = plane.value;
     let mut residual = f64::INFINITY;
@@ -152,7 +165,8 @@ where
         // (DP - 1) du = -(P(u) - u) in the plane; the row and column of the axis become the identity's.
         let mut matrix = r.derivative - SMatrix::identity();
         matrix[(plane.axis, plane.axis)] = 1.0;
-        let step = solve(matrix, -difference).ok_or(Error::NotIsolated)?;
+        let scale = matrix.amax();
+        let step = solve(matrix, -difference, SINGULAR * scale).ok_or(Error::NotIsolated)?;
         u += step;
         u[plane.axis] = plane.value;
     }
@@ -228,33 +242,6 @@ where
     Err(Error::NoReturn { from: Failure::state(&u), within: settings.longest_return })
 }
 
-/// The solution of a x = b by elimination with row pivoting; `None` when `a` is singular to rounding.
-fn solve<const N: usize>(mut a: SMatrix<f64, N, N>, mut b: SVector<f64, N>) -> Option<SVector<f64, N>> {
-    let scale = a.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-    for k in 0..N {
-        let p = (k..N).max_by(|i, j| a[(*i, k)].abs().total_cmp(&a[(*j, k)].abs()))?;
-        if a[(p, k)].abs() <= 1e-14 * scale || a[(p, k)].is_nan() {
-            return None;
-        }
-        a.swap_rows(k, p);
-        b.swap_rows(k, p);
-        for i in k + 1..N {
-            let m = a[(i, k)] / a[(k, k)];
-            for j in k..N {
-                a[(i, j)] -= m * a[(k, j)];
-            }
-            b[i] -= m * b[k];
-        }
-    }
-    for k in (0..N).rev() {
-        for j in k + 1..N {
-            b[k] -= a[(k, j)] * b[j];
-        }
-        b[k] /= a[(k, k)];
-    }
-    Some(b)
-}
-
 /// Eigenvalues of the matrix without row and column `axis`, by falling modulus, from its characteristic polynomial (dimension at most
 /// three). The large ones, which decide stability, are accurate; a strongly contracted one is lost below rounding of the
 /// largest.
@@ -320,6 +307,13 @@ mod tests {
             assert!((o.rate - 2.0 * a).abs() < 1e-8, "{o:?}");
             assert!((o.points[0][0] - 1.0).abs() < 1e-8 && (o.opposite[0][0] + 1.0).abs() < 1e-8);
         }
+    }
+
+    #[test]
+    fn no_returns_are_refused() {
+        let plane = Plane { axis: 1, value: 0.0, upward: true };
+        let found = closed_orbit::<2, 6, _>(&Hopf(0.5), plane, 0, SVector::from([1.2, 0.0]), &Settings::default());
+        assert_eq!(found, Err(Error::NoReturns));
     }
 
     #[test]

@@ -4,6 +4,7 @@
 
 pub mod attractor;
 pub mod digits;
+pub mod divider;
 pub mod floquet;
 pub mod growth;
 pub mod limit;
@@ -13,7 +14,7 @@ pub mod path;
 pub mod reference;
 pub mod section;
 pub mod tangent;
-pub mod tangle;
+
 pub mod work_precision;
 
 pub use motion::{Motion, MotionRecorder};

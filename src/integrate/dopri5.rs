@@ -3,8 +3,9 @@
 
 use nalgebra::SVector;
 
+use super::starting_step::starting_step;
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
-use crate::num::elementary::{pow, sqrt};
+use crate::num::elementary::{rough_exp2, rough_log2, sqrt};
 use crate::system::VectorField;
 
 /// Dormand & Prince (1980), table 2.
@@ -47,11 +48,16 @@ mod tableau {
 }
 use tableau::*;
 
-/// Step control, Hairer et al. (1993), sec. IV.2 (PI control after Gustafsson 1991): h_new = h safety err^-alpha err_old^beta.
+/// Step control, Hairer et al. (1993), sec. IV.2 (PI control after Gustafsson 1991): h_new = h safety err^-alpha err_old^beta. Errors are
+/// kept squared, as the norm's sum gives them, and their powers are made of one logarithm a step.
 mod control {
     pub const SAFETY: f64 = 0.9;
     pub const BETA: f64 = 0.04;
     pub const ALPHA: f64 = 0.2 - BETA * 0.75;
+    /// log2 of the smallest error that the next step is told of, squared: 1e-4^2.
+    pub const LEAST_LOG: f64 = -26.575_424_759_098_897;
+    /// Squares below this are taken for it: the step then grows by as much as it may.
+    pub const LEAST_SQUARE: f64 = 1e-40;
     /// h may shrink at most by this factor ...
     pub const SHRINK: f64 = 0.2;
     /// ... and grow at most by this.
@@ -71,8 +77,8 @@ pub struct Dopri5<const N: usize> {
     max_step: f64,
     /// Step to try next.
     h: f64,
-    /// Error of the last accepted step, for the PI controller.
-    last_error: f64,
+    /// log2 of the square of the last accepted step's error, for the PI controller.
+    last_log: f64,
     dense: Dense<N>,
 }
 
@@ -106,34 +112,34 @@ impl<const N: usize> Dopri5<N> {
             t_end: 0.0,
             max_step: f64::INFINITY,
             h: 0.0,
-            last_error: 1e-4,
+            last_log: control::LEAST_LOG,
             dense: Dense { r: [zero; 5] },
         }
     }
 
     /// Root mean square of e_i / (atol + rtol |x_i|).
     fn norm(&self, e: &SVector<f64, N>, x: impl Fn(usize) -> f64) -> f64 {
+        sqrt(self.mean_square(e, x))
+    }
+
+    /// Its square.
+    #[inline]
+    fn mean_square(&self, e: &SVector<f64, N>, x: impl Fn(usize) -> f64) -> f64 {
         let mut sum = 0.0;
         for i in 0..N {
             let q = e[i] / (self.tolerance.atol + self.tolerance.rtol * x(i));
             sum += q * q;
         }
-        sqrt(sum / N as f64)
+        sum / N as f64
     }
 
-    /// A first step size: Hairer et al. (1993), sec. II.4, "Starting step size".
     fn first_step<F: VectorField<N>>(&mut self, field: &F) -> f64 {
         let x = self.x;
-        let d0 = self.norm(&x, |i| x[i].abs());
-        let d1 = self.norm(&self.fsal, |i| x[i].abs());
-        let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 };
-        let h0 = h0.min(self.max_step).min(self.t_end - self.t);
-        let f1 = field.eval(&(x + self.fsal * h0));
+        let longest = self.max_step.min(self.t_end - self.t);
+        let norm = |v: &SVector<f64, N>| self.norm(v, |i| x[i].abs());
+        let h = starting_step(&x, &self.fsal, norm, 0.2, longest, |y| field.eval(y));
         self.statistics.evaluations += 1;
-        let d2 = self.norm(&(f1 - self.fsal), |i| x[i].abs()) / h0;
-        let d = d1.max(d2);
-        let h1 = if d <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { pow(0.01 / d, 0.2) };
-        if h1.is_finite() { (100.0 * h0).min(h1) } else { h0 }
+        h
     }
 }
 
@@ -150,7 +156,7 @@ impl<const N: usize> Stepper<N> for Dopri5<N> {
         self.x = x;
         self.t_end = t_end;
         self.max_step = max_step;
-        self.last_error = 1e-4;
+        self.last_log = control::LEAST_LOG;
         self.fsal = field.eval(&x);
         self.statistics.evaluations += 1;
         self.statistics.restarts += 1;
@@ -172,18 +178,21 @@ impl<const N: usize> Stepper<N> for Dopri5<N> {
             if h.abs() <= t0.abs() * f64::EPSILON || h < f64::MIN_POSITIVE {
                 return Err(Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) });
             }
+            // Each sum ends with the derivative that was computed last: nothing but it is waited for.
             let k2 = field.eval(&(x0 + k1 * (h * A21)));
-            let k3 = field.eval(&(x0 + (k1 * A31 + k2 * A32) * h));
-            let k4 = field.eval(&(x0 + (k1 * A41 + k2 * A42 + k3 * A43) * h));
-            let k5 = field.eval(&(x0 + (k1 * A51 + k2 * A52 + k3 * A53 + k4 * A54) * h));
-            let k6 = field.eval(&(x0 + (k1 * A61 + k2 * A62 + k3 * A63 + k4 * A64 + k5 * A65) * h));
-            let x1 = x0 + (k1 * A71 + k3 * A73 + k4 * A74 + k5 * A75 + k6 * A76) * h;
+            let k3 = field.eval(&(x0 + k1 * (h * A31) + k2 * (h * A32)));
+            let k4 = field.eval(&(x0 + k1 * (h * A41) + k2 * (h * A42) + k3 * (h * A43)));
+            let k5 = field.eval(&(x0 + k1 * (h * A51) + k2 * (h * A52) + k3 * (h * A53) + k4 * (h * A54)));
+            let k6 =
+                field.eval(&(x0 + k1 * (h * A61) + k2 * (h * A62) + k3 * (h * A63) + k4 * (h * A64) + k5 * (h * A65)));
+            // The increment by itself: one rounding at the size of the state, not five.
+            let x1 = x0 + (k1 * (h * A71) + k3 * (h * A73) + k4 * (h * A74) + k5 * (h * A75) + k6 * (h * A76));
             let k7 = field.eval(&x1);
             self.statistics.evaluations += 6;
 
-            let e = (k1 * E1 + k3 * E3 + k4 * E4 + k5 * E5 + k6 * E6 + k7 * E7) * h;
-            let error = self.norm(&e, |i| x0[i].abs().max(x1[i].abs()));
-            if !error.is_finite() || !finite(&x1) || !finite(&k7) {
+            let e = k1 * (h * E1) + k3 * (h * E3) + k4 * (h * E4) + k5 * (h * E5) + k6 * (h * E6) + k7 * (h * E7);
+            let square = self.mean_square(&e, |i| x0[i].abs().max(x1[i].abs()));
+            if !square.is_finite() || !finite(&x1) || !finite(&k7) {
                 // A trial point may leave the domain although the orbit does not: retry much shorter, then give up.
                 self.statistics.rejected += 1;
                 self.h = h * 0.1;
@@ -193,9 +202,10 @@ impl<const N: usize> Stepper<N> for Dopri5<N> {
                 }
                 continue;
             }
-            let shrink = pow(error, control::ALPHA);
-            if error <= 1.0 {
-                let factor = (shrink / pow(self.last_error, control::BETA) / control::SAFETY)
+            let log = rough_log2(square.max(control::LEAST_SQUARE));
+            if square <= 1.0 {
+                let factor = (rough_exp2(0.5 * (control::ALPHA * log - control::BETA * self.last_log))
+                    / control::SAFETY)
                     .clamp(1.0 / control::GROW, 1.0 / control::SHRINK);
                 let mut next = h / factor;
                 if rejected_before {
@@ -203,7 +213,7 @@ impl<const N: usize> Stepper<N> for Dopri5<N> {
                 }
                 // A step shortened only to reach the end says nothing about the size to go on with.
                 self.h = next.min(self.max_step);
-                self.last_error = error.max(1e-4);
+                self.last_log = log.max(control::LEAST_LOG);
                 let difference = x1 - x0;
                 let bspl = k1 * h - difference;
                 self.dense.r = [
@@ -221,7 +231,8 @@ impl<const N: usize> Stepper<N> for Dopri5<N> {
             }
             self.statistics.rejected += 1;
             rejected_before = true;
-            self.h = h / (shrink / control::SAFETY).min(1.0 / control::SHRINK);
+            let factor = rough_exp2(0.5 * control::ALPHA * log) / control::SAFETY;
+            self.h = h / factor.min(1.0 / control::SHRINK);
         }
     }
 

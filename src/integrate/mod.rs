@@ -13,6 +13,7 @@ pub mod method;
 pub mod radau5;
 pub mod roots;
 pub mod schedule;
+mod starting_step;
 pub mod step;
 pub mod taylor;
 

@@ -9,8 +9,9 @@
 use nalgebra::{Complex, Matrix3, SMatrix, SVector, Vector3};
 
 use super::linear::Lu;
+use super::starting_step::starting_step;
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
-use crate::num::elementary::{pow, sqrt};
+use crate::num::elementary::{rough_pow, sqrt};
 use crate::system::{VectorField, jacobian};
 
 /// The method's numbers, each from its definition.
@@ -204,19 +205,14 @@ impl<const N: usize> Radau5<N> {
         self.x.map(|x| 1.0 / (atol + rtol * x.abs()))
     }
 
-    /// A first step size: Hairer, Norsett & Wanner (1993), sec. II.4, for an error estimate of order 3.
+    /// A first step size, for an error estimate of order 3.
     fn first_step<F: VectorField<N>>(&mut self, field: &F) -> f64 {
         let weights = self.weights();
-        let d0 = norm(&self.x, &weights);
-        let d1 = norm(&self.derivative, &weights);
-        let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 };
-        let h0 = h0.min(self.max_step).min(self.t_end - self.t);
-        let f1 = field.eval(&(self.x + self.derivative * h0));
+        let longest = self.max_step.min(self.t_end - self.t);
+        let norm = |v: &SVector<f64, N>| norm(v, &weights);
+        let h = starting_step(&self.x, &self.derivative, norm, 0.25, longest, |y| field.eval(y));
         self.statistics.evaluations += 1;
-        let d2 = norm(&(f1 - self.derivative), &weights) / h0;
-        let d = d1.max(d2);
-        let h1 = if d <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { pow(0.01 / d, 0.25) };
-        if h1.is_finite() { (100.0 * h0).min(h1) } else { h0 }
+        h
     }
 
     /// Factorises for the step `h`, unless that is done already. `None`: singular.
@@ -251,7 +247,7 @@ impl<const N: usize> Radau5<N> {
         let mut w_complex = combine_complex(&z, &t.l_complex);
         let rtol = self.tolerance.rtol.max(1e-14);
         let kappa = (10.0 * f64::EPSILON / rtol).max(sqrt(rtol).min(0.03));
-        let mut eta = pow(self.eta.max(f64::EPSILON), 0.8);
+        let mut eta = rough_pow(self.eta.max(f64::EPSILON), 0.8);
         let mut rate = 0.0;
         let mut size_before = 0.0;
         for iteration in 1..=control::MOST_ITERATIONS {
@@ -287,8 +283,8 @@ impl<const N: usize> Radau5<N> {
                     return None;
                 }
                 eta = rate / (1.0 - rate);
-                let left = (control::MOST_ITERATIONS - iteration) as f64;
-                if eta * size * pow(rate, left) > kappa {
+                let left = control::MOST_ITERATIONS - iteration;
+                if (0..left).fold(eta * size, |expected, _| expected * rate) > kappa {
                     return None;
                 }
             }

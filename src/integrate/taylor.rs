@@ -13,7 +13,7 @@
 use nalgebra::SVector;
 
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
-use crate::num::elementary::{exp, ln, pow};
+use crate::num::elementary::{exp, ln, rough_pow};
 use crate::num::series::{Constants, Solution};
 use crate::num::{DoubleDouble, FromDecimal, Scalar, Tape};
 use crate::system::VectorField;
@@ -195,7 +195,7 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
                 return f64::NAN;
             }
             if size > 0.0 {
-                h = h.min(pow(size, -1.0 / degree as f64));
+                h = h.min(rough_pow(size, -1.0 / degree as f64));
             }
         }
         h * exp(SAFETY_EXPONENT / (p - 1) as f64)

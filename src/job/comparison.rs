@@ -9,11 +9,11 @@ use super::recording::{Data, Recording};
 use super::run::Run;
 use super::spec::RunSpec;
 use crate::analyse::Sample;
-use crate::analyse::tangle::{STRIDES, Tangle, common_box};
+use crate::analyse::divider::{DividerWalk, STRIDES, common_box};
 use crate::integrate::Watch;
 
 /// How organised two runs' paths are, and what they share. Facts: `freshness` (share of each path's strides into new places) and
-/// `shared` ([`Shared`](crate::analyse::tangle::Shared)).
+/// `shared` ([`Shared`](crate::analyse::divider::Shared)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathComparison(pub RunSpec, pub RunSpec);
 
@@ -37,7 +37,7 @@ impl Question for PathComparison {
     fn compute(&self, desk: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
         let (a, b) = (path(desk, &self.0)?, path(desk, &self.1)?);
         let range = common_box([&a[..], &b[..]]);
-        let (a, b) = (Tangle::new(&a, &range), Tangle::new(&b, &range));
+        let (a, b) = (DividerWalk::new(&a, &range), DividerWalk::new(&b, &range));
         Ok(Answer::of_tables(Vec::new())
             .with_fact("freshness", &[a.freshness(), b.freshness()])
             .with_fact("shared", &a.compare(&b)))

@@ -1,30 +1,58 @@
 //! Elementary functions with the same bits on every machine.
 //!
 //! The platform's `tanh` differs by an ulp or two between C libraries, and one ulp made near a two-fold
-//! singularity is visible in a picture after the first visit. Everything here is the pure-Rust translation of
+//! singularity is visible in a picture after the first visit. [`tanh`] and [`exp`] are our own (`elementary/kernels.rs`): straight-line
+//! code that a compiler can vectorise, with the same bits in a lane as alone. The others are the pure-Rust translation of
 //! musl's functions in the `libm` crate, pinned by `Cargo.lock`.
 //!
 //! Why not the correctly rounded `pxfm`? Because it chooses between code with and without fused multiply-add by
-//! looking at the CPU at run time; equal results are then a hope about rounding, not a property of the code. `libm`
-//! has one code path. Its last-bit error is a fact of the computation, the same everywhere.
+//! looking at the CPU at run time; equal results are then a hope about rounding, not a property of the code. Ours and `libm`'s
+//! have one code path. Their last-bit error is a fact of the computation, the same everywhere.
 
-/// Hyperbolic tangent.
+pub(crate) mod kernels;
+
+/// Hyperbolic tangent. Odd to the bit; exactly +-1 from 19.1 on; NaN gives NaN.
+///
+/// Error at most 0.54 units in the last place, measured on 2^30 points (`make elementary`).
 #[inline]
 pub fn tanh(x: f64) -> f64 {
-    // Beyond 22 the result rounds to +-1 in f64 (musl takes the same branch, but only after bit inspection).
-    if x > 22.0 {
-        1.0
-    } else if x < -22.0 {
-        -1.0
-    } else {
-        libm::tanh(x)
-    }
+    // The kernel gives the same; this only saves its work, and outside the layer there is no other.
+    if x.abs() >= kernels::TANH_IS_ONE { 1.0_f64.copysign(x) } else { tanh_inside(x) }
+}
+
+/// Out of line, so that an equation stays small enough to be inlined.
+#[inline(never)]
+fn tanh_inside(x: f64) -> f64 {
+    kernels::tanh(x)
 }
 
 /// Exponential, base e.
+///
+/// Error at most 0.70 units in the last place where the result is a normal number, measured on 2^30 points (`make elementary`); at most one in a subnormal one.
 #[inline]
 pub fn exp(x: f64) -> f64 {
-    libm::exp(x)
+    kernels::exp(x)
+}
+
+/// `base` to the power `exponent` for step control: to about 1e-14 for a `base` that is not negative and an exponent between
+/// -1 and 1. Base 0 counts as 2^-1077; results are kept between 2^-1022 and 2^1023; NaN gives NaN.
+///
+/// A step size wants no last digit, only the same one everywhere: this is several times cheaper than [`pow`].
+#[inline]
+pub fn rough_pow(base: f64, exponent: f64) -> f64 {
+    kernels::rough_exp2(exponent * kernels::rough_log2(base))
+}
+
+/// Logarithm, base 2, for step control: see [`rough_pow`].
+#[inline]
+pub fn rough_log2(x: f64) -> f64 {
+    kernels::rough_log2(x)
+}
+
+/// 2^x for step control: see [`rough_pow`].
+#[inline]
+pub fn rough_exp2(x: f64) -> f64 {
+    kernels::rough_exp2(x)
 }
 
 /// Natural logarithm.
@@ -88,27 +116,4 @@ pub fn exp10(x: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn tanh_saturates_exactly_outside_the_layer() {
-        // SCIENCE: in f64, tanh is exactly +-1 for arguments beyond 19.1; the field there is a polynomial.
-        for x in [19.1, 20.0, 22.0, 22.5, 1e300] {
-            assert_eq!(tanh(x), 1.0);
-            assert_eq!(tanh(-x), -1.0);
-        }
-        assert!(tanh(18.7) < 1.0);
-    }
-
-    #[test]
-    fn known_bits() {
-        // Frozen bits: a change of library or version shows here before it shows in a picture.
-        assert_eq!(tanh(0.5).to_bits(), 0.46211715726000973_f64.to_bits());
-        // One ulp above the correctly rounded e: libm promises an error below one ulp, not correct rounding.
-        assert_eq!(exp(1.0).to_bits(), std::f64::consts::E.to_bits() + 1);
-        assert_eq!(ln(2.0).to_bits(), std::f64::consts::LN_2.to_bits());
-        assert_eq!(atan(1.0).to_bits(), std::f64::consts::FRAC_PI_4.to_bits());
-        assert_eq!(erf(0.5).to_bits(), 0.520_499_877_813_046_5_f64.to_bits());
-    }
-}
+mod tests;

@@ -60,14 +60,19 @@ impl RandomStream {
 mod tests {
     use super::*;
 
+    const STREAM_0: [u64; 3] = [0x0eda_eda7_02cc_bb80, 0x1fb6_f0df_1efd_38ac, 0x22b8_2cd4_e4f6_87bf];
+    const STREAM_1: [u64; 3] = [0x428c_389f_ec6a_f3bc, 0x46a5_217c_8306_523d, 0x1250_c060_17f8_ad79];
+
     #[test]
     fn stream_is_frozen() {
-        let mut r = RandomStream::new(2013, 0);
-        let first: Vec<u64> = (0..3).map(|_| r.uniform().to_bits()).collect();
-        let mut again = RandomStream::new(2013, 0);
-        assert_eq!(first, (0..3).map(|_| again.uniform().to_bits()).collect::<Vec<_>>());
-        let mut other = RandomStream::new(2013, 1);
-        assert_ne!(first[0], other.uniform().to_bits());
+        // ChaCha8 with the key 2013, 0, 0, ... in little-endian order, computed outside this project from its definition
+        // (Bernstein 2008): the first words of 64 bits of streams 0 and 1, without their lowest 11 bits.
+        for (stream, words) in [(0, STREAM_0), (1, STREAM_1)] {
+            let mut r = RandomStream::new(2013, stream);
+            for word in words {
+                assert_eq!(r.uniform(), (word >> 11) as f64 / 9_007_199_254_740_992.0);
+            }
+        }
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::integrate::Statistics;
 use crate::job::encode;
 use crate::job::question::question_hash;
 use crate::job::spec::RunSpec;
-use crate::job::{Answer, AnyQuestion, Desk, JobError, Recording, Run, Stop};
+use crate::job::{Answer, AnyQuestion, Desk, JobError, Recording, Run, Stop, Table};
 use crate::record::{Hash, PanelEntry, PictureEntry, VerdictEntry};
 use crate::render::{Pixels, RenderError, Rendered, render};
 
@@ -202,28 +202,7 @@ pub fn compute(picture: &Picture, desk: &Desk<'_>) -> Result<Computed, PipelineE
     let rendered = render(&drawn).map_err(|source| PipelineError::Render { picture: picture.name.clone(), source })?;
 
     let runs = !panels.is_empty();
-    let mut tables = Vec::new();
-    let mut table_records = Vec::new();
-    for ((label, question), answer) in parts.iter().zip(&answers) {
-        for table in &answer.tables {
-            // A run's main table is called after its panel.
-            let ending = match (runs, table.name.as_str()) {
-                (true, "path" | "section" | "motion") => label.clone(),
-                (true, other) => format!("{label}-{other}"),
-                (false, other) => other.to_owned(),
-            };
-            let about =
-                json!({ "kind": question.kind(), "question_sha256": question_hash(&**question), "stop": answer.stop });
-            let bytes = encode::csv(table, &about);
-            table_records.push(TableRecord {
-                file: format!("{}-{ending}.csv", picture.name),
-                panel: runs.then(|| label.clone()),
-                sha256: Hash::of(&bytes),
-                rows: table.len(),
-            });
-            tables.push((ending, bytes));
-        }
-    }
+    let (tables, table_records) = files(picture, runs, &parts, &answers);
     let hashes = PictureEntry {
         name: picture.name.clone(),
         spec,
@@ -247,6 +226,59 @@ pub fn compute(picture: &Picture, desk: &Desk<'_>) -> Result<Computed, PipelineE
         tables: table_records,
     };
     Ok(Computed { rendered, tables, record })
+}
+
+/// A CSV file per table, and what is recorded of it. Tables of one name are one file: a study may ask the same of several parameters.
+fn files(
+    picture: &Picture,
+    runs: bool,
+    parts: &[(String, AnyQuestion)],
+    answers: &[Arc<Answer>],
+) -> (Vec<(String, Vec<u8>)>, Vec<TableRecord>) {
+    struct File {
+        ending: String,
+        panel: Option<String>,
+        table: Table,
+        about: Vec<Value>,
+    }
+    let mut files: Vec<File> = Vec::new();
+    for ((label, question), answer) in parts.iter().zip(answers) {
+        let about =
+            json!({ "kind": question.kind(), "question_sha256": question_hash(&**question), "stop": answer.stop });
+        for table in &answer.tables {
+            // A run's main table is called after its panel.
+            let ending = match (runs, table.name.as_str()) {
+                (true, "path" | "section" | "motion") => label.clone(),
+                (true, other) => format!("{label}-{other}"),
+                (false, other) => other.to_owned(),
+            };
+            match files.iter_mut().find(|f| f.ending == ending) {
+                Some(file) => {
+                    file.table.extend(table.rows());
+                    file.about.push(about.clone());
+                }
+                None => files.push(File {
+                    ending,
+                    panel: runs.then(|| label.clone()),
+                    table: table.clone(),
+                    about: vec![about.clone()],
+                }),
+            }
+        }
+    }
+    files
+        .into_iter()
+        .map(|file| {
+            let bytes = encode::csv(&file.table, &Value::Array(file.about));
+            let record = TableRecord {
+                file: format!("{}-{}.csv", picture.name, file.ending),
+                panel: file.panel,
+                sha256: Hash::of(&bytes),
+                rows: file.table.len(),
+            };
+            ((file.ending, bytes), record)
+        })
+        .unzip()
 }
 
 /// An answer that may be published: half a run must not look like a whole one.

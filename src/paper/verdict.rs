@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::{Picture, Reading};
 pub use crate::analyse::attractor::Claim as SectionClaim;
 use crate::analyse::attractor::Evidence;
-use crate::analyse::tangle::Shared;
+use crate::analyse::divider::Shared;
 use crate::job::{AnyQuestion, Classification, Desk, JobError, PathComparison};
 
 /// What the paper says of a panel.

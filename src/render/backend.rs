@@ -9,7 +9,7 @@ use plotters_backend::{
     FontTransform,
 };
 
-use super::font::{CAP_HEIGHT, Cut};
+use super::font::{CAP_HEIGHT, FontFace};
 use super::rich_text::{self, RichTextError, Turn};
 use super::scene::{Paint, Scene, UNITS_PER_POINT, units};
 use super::sheet::Colour;
@@ -37,11 +37,11 @@ fn paint(colour: BackendColor) -> Paint {
     Paint { colour: Colour::rgb(r, g, b), opacity: (colour.alpha.clamp(0.0, 1.0) * 100.0).round() as u8 }
 }
 
-fn cut(style: FontStyle) -> Cut {
+fn face(style: FontStyle) -> FontFace {
     match style {
-        FontStyle::Normal => Cut::Regular,
-        FontStyle::Italic | FontStyle::Oblique => Cut::Italic,
-        FontStyle::Bold => Cut::Bold,
+        FontStyle::Normal => FontFace::Regular,
+        FontStyle::Italic | FontStyle::Oblique => FontFace::Italic,
+        FontStyle::Bold => FontFace::Bold,
     }
 }
 
@@ -108,7 +108,7 @@ impl DrawingBackend for SceneBackend<'_> {
     }
 
     fn draw_text<T: BackendTextStyle>(&mut self, text: &str, style: &T, pos: BackendCoord) -> Outcome {
-        let line = rich_text::set(text, cut(style.style())).map_err(DrawingErrorKind::DrawingError)?;
+        let line = rich_text::set(text, face(style.style())).map_err(DrawingErrorKind::DrawingError)?;
         let size = style.size() / f64::from(UNITS_PER_POINT);
         let width = units(line.width * size);
         let along = match style.anchor().h_pos {
@@ -140,7 +140,7 @@ impl DrawingBackend for SceneBackend<'_> {
         text: &str,
         style: &T,
     ) -> Result<(u32, u32), DrawingErrorKind<RichTextError>> {
-        let line = rich_text::set(text, cut(style.style())).map_err(DrawingErrorKind::DrawingError)?;
+        let line = rich_text::set(text, face(style.style())).map_err(DrawingErrorKind::DrawingError)?;
         Ok(((line.width * style.size()).round() as u32, style.size().round() as u32))
     }
 }

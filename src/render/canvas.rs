@@ -14,7 +14,7 @@ use super::rich_text::{self, RichTextError};
 use super::scene::{Position, UNITS_PER_POINT, units};
 use super::sheet::{Anchor, Colour, Dash, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle, Note};
 use super::style;
-use super::{font::Cut, sheet::Corner};
+use super::{font::FontFace, sheet::Corner};
 use crate::num::elementary;
 
 /// Tolerance of thinning in units: an eighth of a pixel.
@@ -92,7 +92,7 @@ impl Ranged for Span {
 
 /// How text is set.
 #[derive(Clone, Copy)]
-pub struct Type {
+pub struct TextFormat {
     /// Size in points.
     pub size: f64,
     /// Colour.
@@ -109,7 +109,7 @@ pub struct Type {
     pub v: VPos,
 }
 
-impl Type {
+impl TextFormat {
     /// Text of this size, anchored by the left end of its baseline.
     pub fn new(size: f64) -> Self {
         Self { size, colour: style::INK, bold: false, upwards: false, halo: false, h: HPos::Left, v: VPos::Bottom }
@@ -148,7 +148,7 @@ impl Type {
 
 /// Width of a text in units.
 pub fn text_width(text: &str, size: f64) -> i32 {
-    units(rich_text::width(text, Cut::Regular, size))
+    units(rich_text::width(text, FontFace::Regular, size))
 }
 
 fn rgba(colour: Colour, opacity: u8) -> RGBAColor {
@@ -167,13 +167,13 @@ impl<'a> Canvas<'a> {
     }
 
     /// Sets a text.
-    pub fn text(&self, text: &str, at: Position, how: Type) -> Result<(), RenderError> {
+    pub fn text(&self, text: &str, at: Position, how: TextFormat) -> Result<(), RenderError> {
         if text.is_empty() {
             return Ok(());
         }
-        let cut = if how.bold { FontStyle::Bold } else { FontStyle::Normal };
+        let face = if how.bold { FontStyle::Bold } else { FontStyle::Normal };
         let family = if how.halo { HALO_FAMILY } else { "serif" };
-        let mut font = (family, how.size * f64::from(UNITS_PER_POINT), cut).into_font();
+        let mut font = (family, how.size * f64::from(UNITS_PER_POINT), face).into_font();
         if how.upwards {
             font = font.transform(FontTransform::Rotate270);
         }
@@ -297,7 +297,7 @@ impl<'a> Canvas<'a> {
             Anchor::Above => (at.0 - width / 2, at.1 - gap),
             Anchor::Below => (at.0 - width / 2, at.1 + gap + cap),
         };
-        self.text(&note.text, (x, baseline), Type::new(note.size).colour(note.colour).halo())
+        self.text(&note.text, (x, baseline), TextFormat::new(note.size).colour(note.colour).halo())
     }
 
     /// Width of a legend entry.
@@ -327,7 +327,7 @@ impl<'a> Canvas<'a> {
                 self.fill(Rect { x: x + key / 6, y: middle - h / 2, w: key * 2 / 3, h }, colour, opacity)?;
             }
         }
-        let how = Type::new(style::TICK_PT).anchor(HPos::Left, VPos::Center);
+        let how = TextFormat::new(style::TICK_PT).anchor(HPos::Left, VPos::Center);
         self.text(&entry.text, (x + key + units(KEY_GAP_PT), middle), how)
     }
 

@@ -10,9 +10,9 @@ static ITALIC: &[u8] = include_bytes!("../../assets/fonts/LibertinusSerif-Italic
 static BOLD: &[u8] = include_bytes!("../../assets/fonts/LibertinusSerif-Bold.otf");
 static BOLD_ITALIC: &[u8] = include_bytes!("../../assets/fonts/LibertinusSerif-BoldItalic.otf");
 
-/// A cut of the font family.
+/// A face of the font family: upright or italic, regular or bold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cut {
+pub enum FontFace {
     /// Upright.
     Regular,
     /// Italic: variables.
@@ -31,14 +31,14 @@ struct Loaded {
     kerning: Vec<PairAdjustment<'static>>,
 }
 
-fn loaded(cut: Cut) -> &'static Loaded {
+fn loaded(face: FontFace) -> &'static Loaded {
     static FONTS: OnceLock<[Loaded; 4]> = OnceLock::new();
     let fonts = FONTS.get_or_init(|| [REGULAR, ITALIC, BOLD, BOLD_ITALIC].map(load));
-    match cut {
-        Cut::Regular => &fonts[0],
-        Cut::Italic => &fonts[1],
-        Cut::Bold => &fonts[2],
-        Cut::BoldItalic => &fonts[3],
+    match face {
+        FontFace::Regular => &fonts[0],
+        FontFace::Italic => &fonts[1],
+        FontFace::Bold => &fonts[2],
+        FontFace::BoldItalic => &fonts[3],
     }
 }
 
@@ -61,34 +61,34 @@ fn load(bytes: &'static [u8]) -> Loaded {
     Loaded { face, kerning }
 }
 
-/// A glyph of a cut.
+/// A glyph of a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Glyph {
-    /// The cut it comes from.
-    pub cut: Cut,
+    /// The face it comes from.
+    pub face: FontFace,
     id: GlyphId,
 }
 
-/// The glyph of a character; signs that a cut lacks come from the regular one. `None` if the family has no such sign.
-pub fn glyph(cut: Cut, character: char) -> Option<Glyph> {
-    [cut, Cut::Regular].into_iter().find_map(|cut| {
-        let id = loaded(cut).face.glyph_index(character)?;
-        Some(Glyph { cut, id })
+/// The glyph of a character; signs that a face lacks come from the regular one. `None` if the family has no such sign.
+pub fn glyph(face: FontFace, character: char) -> Option<Glyph> {
+    [face, FontFace::Regular].into_iter().find_map(|face| {
+        let id = loaded(face).face.glyph_index(character)?;
+        Some(Glyph { face, id })
     })
 }
 
 /// Advance width of a glyph as a share of the font size.
 pub fn advance(glyph: Glyph) -> f64 {
-    let face = &loaded(glyph.cut).face;
+    let face = &loaded(glyph.face).face;
     f64::from(face.glyph_hor_advance(glyph.id).unwrap_or(0)) / f64::from(face.units_per_em())
 }
 
 /// Correction of the distance between two neighbouring glyphs as a share of the font size.
 pub fn kern(left: Glyph, right: Glyph) -> f64 {
-    if left.cut != right.cut {
+    if left.face != right.face {
         return 0.0;
     }
-    let font = loaded(left.cut);
+    let font = loaded(left.face);
     for pair in &font.kerning {
         let Some(index) = pair.coverage().get(left.id) else { continue };
         let value = match pair {
@@ -121,7 +121,7 @@ pub enum Stroke {
 
 /// The outline of a glyph.
 pub fn outline(glyph: Glyph) -> Vec<Stroke> {
-    let face = &loaded(glyph.cut).face;
+    let face = &loaded(glyph.face).face;
     let mut collector = Collector { scale: f64::from(face.units_per_em()), last: [0.0; 2], strokes: Vec::new() };
     // A glyph without ink, such as a space, has no outline.
     let _ = face.outline_glyph(glyph.id, &mut collector);
@@ -174,32 +174,32 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_cut_has_the_letters_and_the_regular_one_the_signs() {
-        for cut in [Cut::Regular, Cut::Italic, Cut::Bold, Cut::BoldItalic] {
+    fn every_face_has_the_letters_and_the_regular_one_the_signs() {
+        for face in [FontFace::Regular, FontFace::Italic, FontFace::Bold, FontFace::BoldItalic] {
             for c in "AZaz09()[]+,.;:=/αβγδεθλμνπρσφψωΓΔΛΣΦΨΩ−×≤".chars() {
-                let g = glyph(cut, c).unwrap();
-                assert_eq!(g.cut, cut, "{c}");
+                let g = glyph(face, c).unwrap();
+                assert_eq!(g.face, face, "{c}");
                 assert!(!outline(g).is_empty(), "{c}");
             }
         }
         for c in "±×·−≤≥≈≠∞∂∇√∫∈→←↑↓⇒′″°…–—⟨⟩∥∝∼≪≫⊥".chars()
         {
-            assert!(glyph(Cut::Regular, c).is_some(), "{c}");
-            assert!(glyph(Cut::Italic, c).is_some(), "{c}");
+            assert!(glyph(FontFace::Regular, c).is_some(), "{c}");
+            assert!(glyph(FontFace::Italic, c).is_some(), "{c}");
         }
-        assert!(glyph(Cut::Regular, '\u{4e2d}').is_none());
+        assert!(glyph(FontFace::Regular, '\u{4e2d}').is_none());
     }
 
     #[test]
     fn kerning_pulls_a_capital_t_over_an_o() {
-        let [t, o, n] = ['T', 'o', 'n'].map(|c| glyph(Cut::Regular, c).unwrap());
+        let [t, o, n] = ['T', 'o', 'n'].map(|c| glyph(FontFace::Regular, c).unwrap());
         assert!(kern(t, o) < -0.02, "{}", kern(t, o));
         assert_eq!(kern(n, n), 0.0);
     }
 
     #[test]
     fn the_stated_heights_are_those_of_the_font() {
-        let face = &loaded(Cut::Regular).face;
+        let face = &loaded(FontFace::Regular).face;
         assert_eq!(f64::from(face.capital_height().unwrap()) / 1000.0, CAP_HEIGHT);
     }
 }

@@ -4,8 +4,8 @@ use plotters::style::text_anchor::{HPos, VPos};
 
 use super::RenderError;
 use super::backend::SceneBackend;
-use super::canvas::{Canvas, Rect, Type};
-use super::font::{CAP_HEIGHT, Cut};
+use super::canvas::{Canvas, Rect, TextFormat};
+use super::font::{CAP_HEIGHT, FontFace};
 use super::plane::{self, Insets};
 use super::rich_text;
 use super::scene::{DPI, Scene, UNITS_PER_PIXEL, UNITS_PER_POINT, units};
@@ -41,7 +41,7 @@ pub fn draw(sheet: &Sheet) -> Result<Scene, RenderError> {
     let canvas = Canvas::new(SceneBackend::new(&mut scene));
     let margin = units(style::MARGIN_PT);
     for (text, size, bold, baseline) in &plan.heading {
-        let how = Type::new(*size).anchor(HPos::Center, VPos::Bottom);
+        let how = TextFormat::new(*size).anchor(HPos::Center, VPos::Bottom);
         canvas.text(text, (width / 2, *baseline), if *bold { how.bold() } else { how })?;
     }
     if let Some((lines, rect)) = &plan.banner {
@@ -49,16 +49,16 @@ pub fn draw(sheet: &Sheet) -> Result<Scene, RenderError> {
         for (i, line) in lines.iter().enumerate() {
             let leading = units(style::BANNER_PT * style::LEADING);
             let middle = rect.y + rect.h / 2 + leading * i as i32 - leading * (lines.len() as i32 - 1) / 2;
-            let how = Type::new(style::BANNER_PT).bold().colour(style::WHITE).anchor(HPos::Center, VPos::Center);
+            let how = TextFormat::new(style::BANNER_PT).bold().colour(style::WHITE).anchor(HPos::Center, VPos::Center);
             canvas.text(line, (width / 2, middle), how)?;
         }
     }
     for (panel, (rect, baseline)) in sheet.panels.iter().zip(&plan.panels) {
-        let label_how = Type::new(style::LABEL_PT).bold();
+        let label_how = TextFormat::new(style::LABEL_PT).bold();
         canvas.text(&panel.label, (rect.x, *baseline), label_how)?;
-        let label = rich_text::width(&panel.label, Cut::Bold, style::LABEL_PT);
+        let label = rich_text::width(&panel.label, FontFace::Bold, style::LABEL_PT);
         let shift = if panel.label.is_empty() { 0 } else { units(label + 4.0) };
-        canvas.text(&panel.title, (rect.x + shift, *baseline), Type::new(style::LABEL_PT))?;
+        canvas.text(&panel.title, (rect.x + shift, *baseline), TextFormat::new(style::LABEL_PT))?;
         match &panel.content {
             Content::Plane(p) => plane::draw(&canvas, p, *rect)?,
             Content::Space(p) => space::draw(&canvas, p, *rect)?,
@@ -69,7 +69,7 @@ pub fn draw(sheet: &Sheet) -> Result<Scene, RenderError> {
         canvas.legend_row(row, margin, width - 2 * margin, *middle)?;
     }
     for (line, baseline) in &plan.footer {
-        canvas.text(line, (margin, *baseline), Type::new(style::FOOTER_PT).colour(style::SOFT_INK))?;
+        canvas.text(line, (margin, *baseline), TextFormat::new(style::FOOTER_PT).colour(style::SOFT_INK))?;
     }
     drop(canvas);
     Ok(scene)
@@ -82,8 +82,8 @@ fn plan(sheet: &Sheet, width: i32) -> Plan {
     let mut heading = Vec::new();
     for (text, size, bold) in [(&sheet.title, style::TITLE_PT, true), (&sheet.subtitle, style::LABEL_PT, false)] {
         let Some(text) = text else { continue };
-        let cut = if bold { Cut::Bold } else { Cut::Regular };
-        for line in rich_text::wrap(text, cut, size, f64::from(inner) / f64::from(UNITS_PER_POINT)) {
+        let face = if bold { FontFace::Bold } else { FontFace::Regular };
+        for line in rich_text::wrap(text, face, size, f64::from(inner) / f64::from(UNITS_PER_POINT)) {
             heading.push((line, size, bold, y + units(size * 0.8)));
             y += units(size * style::LEADING);
         }
@@ -93,7 +93,7 @@ fn plan(sheet: &Sheet, width: i32) -> Plan {
     }
     let banner = sheet.banner.as_ref().map(|text| {
         let limit = f64::from(inner - units(8.0)) / f64::from(UNITS_PER_POINT);
-        let lines = rich_text::wrap(text, Cut::Bold, style::BANNER_PT, limit);
+        let lines = rich_text::wrap(text, FontFace::Bold, style::BANNER_PT, limit);
         let h = units(style::BANNER_PT * style::LEADING) * lines.len() as i32 + units(4.0);
         let rect = Rect { x: margin, y, w: inner, h };
         y += h + units(5.0);
@@ -113,7 +113,7 @@ fn plan(sheet: &Sheet, width: i32) -> Plan {
     if !sheet.footer.is_empty() {
         y += units(4.0);
         let limit = f64::from(inner) / f64::from(UNITS_PER_POINT);
-        for line in sheet.footer.iter().flat_map(|l| rich_text::wrap(l, Cut::Regular, style::FOOTER_PT, limit)) {
+        for line in sheet.footer.iter().flat_map(|l| rich_text::wrap(l, FontFace::Regular, style::FOOTER_PT, limit)) {
             footer.push((line, y + units(style::FOOTER_PT * 0.8)));
             y += units(style::FOOTER_PT * style::LEADING);
         }
@@ -218,7 +218,7 @@ pub fn check_texts(sheet: &Sheet) -> Result<(), RenderError> {
         }
     }
     for text in texts {
-        rich_text::set(text, Cut::Regular)?;
+        rich_text::set(text, FontFace::Regular)?;
     }
     Ok(())
 }

@@ -118,7 +118,7 @@ pub fn render(sheet: &Sheet) -> Result<Rendered, RenderError> {
     }
     let pixels = raster::rasterise(&scene).ok_or(RenderError::TooLarge)?;
     let title = match &sheet.title {
-        Some(title) => rich_text::set(title, font::Cut::Regular)?.plain,
+        Some(title) => rich_text::set(title, font::FontFace::Regular)?.plain,
         None => "Figure".to_owned(),
     };
     let sealed = Sealed::new(&sheet.provenance);

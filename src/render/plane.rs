@@ -3,7 +3,7 @@
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::RenderError;
-use super::canvas::{Canvas, Chart, Rect, Span, Type, text_width};
+use super::canvas::{Canvas, Chart, Rect, Span, TextFormat, text_width};
 use super::font::CAP_HEIGHT;
 use super::scene::{Position, UNITS_PER_POINT, units};
 use super::sheet::{Axis, PlaneLayer, PlanePanel};
@@ -223,21 +223,21 @@ fn draw_axes(
     let gap = units(style::TICK_GAP_PT);
     for t in &xt.major {
         let px = chart.position(&[scaled(&panel.x, t.value), y.lower]).0;
-        let how = Type::new(style::TICK_PT).anchor(HPos::Center, VPos::Top);
+        let how = TextFormat::new(style::TICK_PT).anchor(HPos::Center, VPos::Top);
         canvas.text(&t.label, (px, rect.bottom() + gap + units(0.8)), how)?;
     }
     for t in &yt.major {
         let py = chart.position(&[x.lower, scaled(&panel.y, t.value)]).1;
-        canvas.text(&t.label, (rect.x - gap, py), Type::new(style::TICK_PT).anchor(HPos::Right, VPos::Center))?;
+        canvas.text(&t.label, (rect.x - gap, py), TextFormat::new(style::TICK_PT).anchor(HPos::Right, VPos::Center))?;
     }
     let room = insets(panel, rect.w, rect.h);
     let base = rect.bottom() + room.bottom - units(DESCENT_PT);
     canvas.text(
         &panel.x.title,
         (rect.x + rect.w / 2, base),
-        Type::new(style::LABEL_PT).anchor(HPos::Center, VPos::Bottom),
+        TextFormat::new(style::LABEL_PT).anchor(HPos::Center, VPos::Bottom),
     )?;
     let left = rect.x - room.left + units(CAP_HEIGHT * style::LABEL_PT);
-    let how = Type::new(style::LABEL_PT).anchor(HPos::Center, VPos::Bottom).upwards();
+    let how = TextFormat::new(style::LABEL_PT).anchor(HPos::Center, VPos::Bottom).upwards();
     canvas.text(&panel.y.title, (left, rect.y + rect.h / 2), how)
 }

@@ -3,7 +3,7 @@
 //! `*x*` is italic; `^{...}` and `_{...}` raise and lower (one character needs no braces); a backslash
 //! takes the next character literally. A hyphen before a number or inside a superscript or subscript becomes a minus sign.
 
-use super::font::{self, Cut, Glyph, Stroke};
+use super::font::{self, FontFace, Glyph, Stroke};
 use super::scene::{Position, Segment, units};
 
 /// Why a text cannot be set.
@@ -61,14 +61,14 @@ struct Setter<'a> {
     characters: Vec<char>,
     next: usize,
     italic: bool,
-    base: Cut,
+    base: FontFace,
     pen: f64,
     previous: Option<Glyph>,
     line: Line,
 }
 
-/// Sets a line of rich text in the given cut.
-pub fn set(source: &str, base: Cut) -> Result<Line, RichTextError> {
+/// Sets a line of rich text in the given face.
+pub fn set(source: &str, base: FontFace) -> Result<Line, RichTextError> {
     let mut setter = Setter {
         source,
         characters: source.chars().collect(),
@@ -145,16 +145,16 @@ impl Setter<'_> {
     }
 
     fn place(&mut self, c: char, scale: f64, rise: f64) -> Result<(), RichTextError> {
-        let cut = match (self.italic, self.base) {
-            (true, Cut::Bold) => Cut::BoldItalic,
-            (true, _) => Cut::Italic,
+        let face = match (self.italic, self.base) {
+            (true, FontFace::Bold) => FontFace::BoldItalic,
+            (true, _) => FontFace::Italic,
             (false, base) => base,
         };
         let glyph =
-            font::glyph(cut, c).ok_or_else(|| RichTextError::Glyph { text: self.source.to_owned(), character: c })?;
+            font::glyph(face, c).ok_or_else(|| RichTextError::Glyph { text: self.source.to_owned(), character: c })?;
         if let Some(previous) = self.previous {
             self.pen += font::kern(previous, glyph) * scale;
-            let leans = |g: Glyph| matches!(g.cut, Cut::Italic | Cut::BoldItalic);
+            let leans = |g: Glyph| matches!(g.face, FontFace::Italic | FontFace::BoldItalic);
             if leans(previous) && !leans(glyph) && !c.is_whitespace() {
                 // Italic correction: a leaning letter must not touch an upright neighbour.
                 self.pen += 0.035 * scale;
@@ -206,19 +206,19 @@ impl Line {
 }
 
 /// Width in points of a text at a font size, or zero for a text that cannot be set (which drawing it then reports).
-pub fn width(source: &str, cut: Cut, size: f64) -> f64 {
-    set(source, cut).map_or(0.0, |line| line.width * size)
+pub fn width(source: &str, face: FontFace, size: f64) -> f64 {
+    set(source, face).map_or(0.0, |line| line.width * size)
 }
 
 /// Breaks a text at spaces outside braces into lines no wider than `limit` points. A single long word stays whole. An italic passage
 /// must not contain a break; each line has to be complete markup, so a break inside one is not taken.
-pub fn wrap(source: &str, cut: Cut, size: f64, limit: f64) -> Vec<String> {
+pub fn wrap(source: &str, face: FontFace, size: f64, limit: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let mut current = String::new();
     for word in source.split(' ') {
         let longer = if current.is_empty() { word.to_owned() } else { format!("{current} {word}") };
-        let complete = current.is_empty() || set(&current, cut).is_ok();
-        let fits = set(&longer, cut).map_or(true, |line| line.width * size <= limit);
+        let complete = current.is_empty() || set(&current, face).is_ok();
+        let fits = set(&longer, face).map_or(true, |line| line.width * size <= limit);
         if fits || !complete || current.is_empty() {
             current = longer;
         } else {
@@ -234,7 +234,7 @@ mod tests {
     use super::*;
 
     fn plain(source: &str) -> String {
-        set(source, Cut::Regular).unwrap().plain
+        set(source, FontFace::Regular).unwrap().plain
     }
 
     #[test]
@@ -249,7 +249,7 @@ mod tests {
 
     #[test]
     fn scripts_are_smaller_raised_and_lowered() {
-        let line = set("x^{2}y_{3}", Cut::Regular).unwrap();
+        let line = set("x^{2}y_{3}", FontFace::Regular).unwrap();
         let [x, two, y, three] = line.glyphs[..] else { panic!("{line:?}") };
         assert_eq!((x.scale, x.y, y.y), (1.0, 0.0, 0.0));
         assert!(two.scale < 0.8 && two.y > 0.2 && three.y < -0.1);
@@ -257,28 +257,28 @@ mod tests {
     }
 
     #[test]
-    fn italics_change_the_cut_and_end_again() {
-        let line = set("*x* = 1", Cut::Regular).unwrap();
-        assert_eq!(line.glyphs[0].glyph.cut, Cut::Italic);
-        assert!(line.glyphs[1..].iter().all(|g| g.glyph.cut == Cut::Regular));
+    fn italics_change_the_face_and_end_again() {
+        let line = set("*x* = 1", FontFace::Regular).unwrap();
+        assert_eq!(line.glyphs[0].glyph.face, FontFace::Italic);
+        assert!(line.glyphs[1..].iter().all(|g| g.glyph.face == FontFace::Regular));
     }
 
     #[test]
     fn faulty_markup_is_named() {
-        assert!(matches!(set("a_{b", Cut::Regular), Err(RichTextError::Braces { .. })));
-        assert!(matches!(set("a}", Cut::Regular), Err(RichTextError::Braces { .. })));
-        assert!(matches!(set("a^", Cut::Regular), Err(RichTextError::Braces { .. })));
-        assert!(matches!(set("*a", Cut::Regular), Err(RichTextError::Italic { .. })));
-        assert!(matches!(set("\u{4e2d}", Cut::Regular), Err(RichTextError::Glyph { character: '\u{4e2d}', .. })));
+        assert!(matches!(set("a_{b", FontFace::Regular), Err(RichTextError::Braces { .. })));
+        assert!(matches!(set("a}", FontFace::Regular), Err(RichTextError::Braces { .. })));
+        assert!(matches!(set("a^", FontFace::Regular), Err(RichTextError::Braces { .. })));
+        assert!(matches!(set("*a", FontFace::Regular), Err(RichTextError::Italic { .. })));
+        assert!(matches!(set("\u{4e2d}", FontFace::Regular), Err(RichTextError::Glyph { character: '\u{4e2d}', .. })));
         assert_eq!(plain("\\*\\{\\_"), "*{_");
     }
 
     #[test]
     fn wrapping_keeps_every_word_and_the_limit() {
         let text = "reading printed, *α* = 10^{-3}, *β* = 10^{-5}, *ε* = 10^{-3}, *t* = 2×10^{5}, restart every 20";
-        let lines = wrap(text, Cut::Regular, 7.0, 120.0);
+        let lines = wrap(text, FontFace::Regular, 7.0, 120.0);
         assert!(lines.len() > 1);
         assert_eq!(lines.join(" "), text);
-        assert!(lines.iter().all(|l| width(l, Cut::Regular, 7.0) <= 120.0));
+        assert!(lines.iter().all(|l| width(l, FontFace::Regular, 7.0) <= 120.0));
     }
 }

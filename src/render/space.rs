@@ -7,7 +7,7 @@
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::RenderError;
-use super::canvas::{Canvas, Chart, Rect, Span, THINNING, Type, text_width};
+use super::canvas::{Canvas, Chart, Rect, Span, THINNING, TextFormat, text_width};
 use super::font::CAP_HEIGHT;
 use super::plane;
 use super::polyline;
@@ -247,7 +247,7 @@ pub fn draw(canvas: &Canvas, panel: &SpacePanel, rect: Rect) -> Result<(), Rende
     if panel.boxed {
         for label in labels(panel, &bounds, scale) {
             let at = (centre.0 + label.rect.x + label.rect.w / 2, centre.1 + label.rect.y + label.rect.h / 2);
-            canvas.text(&label.text, at, Type::new(label.size).anchor(HPos::Center, VPos::Center))?;
+            canvas.text(&label.text, at, TextFormat::new(label.size).anchor(HPos::Center, VPos::Center))?;
         }
     }
     canvas.legend(&panel.legend, rect, panel.legend_corner)

@@ -17,7 +17,7 @@ pub struct Smoothed<P> {
 }
 
 impl<P: PiecewiseSmooth<N>, const N: usize> VectorField<N> for Smoothed<P> {
-    #[inline]
+    #[inline(always)]
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
         let phi = self.transition.eval(self.system.switching(x), self.eps);
         blend(&self.system, x, phi)

@@ -173,6 +173,61 @@ impl Sliding {
     fn mode(&self) -> Mode {
         if self.repelling { Mode::SlidingRepelling } else { Mode::SlidingAttracting }
     }
+
+    /// The sign with which the desingularised flow runs forward in time.
+    fn direction(&self) -> f64 {
+        if self.repelling { -1.0 } else { 1.0 }
+    }
+
+    /// How far L+h and L-h are from zero; both are positive inside the region.
+    fn margins<P: PiecewiseSmooth<N>, const N: usize>(&self, system: &P, x: &SVector<f64, N>) -> [f64; 2] {
+        let (p, q) = lie_derivatives(system, x);
+        [-self.direction() * p, self.direction() * q]
+    }
+}
+
+/// A state of the sliding flow without its clock.
+fn without_clock<const N: usize, const M: usize>(z: &SVector<f64, M>) -> SVector<f64, N> {
+    SVector::from_fn(|i, _| z[i])
+}
+
+/// Lengths of the chords of the first part, up to the fraction `theta`, of a step of the sliding flow.
+fn chords<const N: usize, const M: usize>(step: &Step<'_, M>, theta: f64) -> [f64; CHORDS] {
+    let mut last = without_clock::<N, M>(&step.x0);
+    std::array::from_fn(|k| {
+        let point = without_clock(&step.at(theta * (k + 1) as f64 / CHORDS as f64));
+        let length = (point - last).norm();
+        last = point;
+        length
+    })
+}
+
+/// The two-fold that sliding may be running into.
+struct TwoFoldAhead<const N: usize> {
+    local: Option<SlidingAtTwoFold<N>>,
+    /// The margins when it was last looked for.
+    tried_at: f64,
+}
+
+impl<const N: usize> TwoFoldAhead<N> {
+    fn new() -> Self {
+        Self { local: None, tried_at: f64::INFINITY }
+    }
+
+    /// Looks for it from `x`, each time the Lie derivatives have halved.
+    fn look<P: PiecewiseSmooth<N>>(&mut self, system: &P, x: &SVector<f64, N>, margins: [f64; 2]) {
+        let size = margins.into_iter().fold(0.0, f64::max);
+        if size >= 0.5 * self.tried_at || size.is_nan() {
+            return;
+        }
+        self.tried_at = size;
+        // From far away Newton's method may have found another two-fold: trust only the latest answer.
+        if let Some(point) = locate(system, x)
+            && self.local.as_ref().is_none_or(|l| (l.point - point).amax() > LIMITS.same_point * (1.0 + point.amax()))
+        {
+            self.local = SlidingAtTwoFold::at(system, point);
+        }
+    }
 }
 
 enum State<const N: usize> {
@@ -210,13 +265,69 @@ impl Zeno {
             (self.in_a_row, self.first) = (1, duration);
         }
         self.last = duration;
-        let resolution = 16.0 * f64::EPSILON * t.abs();
-        self.in_a_row >= 8 && (duration < 1e-8 * self.first || duration <= resolution)
+        self.in_a_row >= LIMITS.zeno_flights
+            && (duration < LIMITS.zeno_ratio * self.first || duration <= LIMITS.zeno_resolution * t.abs())
     }
 }
 
 /// A long stretch without events must not keep a watch waiting.
 const STEPS_BETWEEN_WATCHES: u32 = 4096;
+
+/// Chords of a step by which its length is measured.
+const CHORDS: usize = 16;
+
+/// The numbers by which the engine decides what rounding blurs. None is a tolerance of the motion; those are in [`Settings`].
+struct Limits {
+    /// A first Lie derivative below this share of |grad h| |f| is zero: some fifty roundings.
+    lie: f64,
+    /// A two-fold is looked for where both Lie derivatives are below so many of those ...
+    near_two_fold: f64,
+    /// ... and taken for the present state, or for one found before, within this share of its size.
+    same_point: f64,
+    /// Newton steps that sharpen a touch of the surface, which a root finder knows only to half of the digits ...
+    touch_steps: usize,
+    /// ... as long as they move it by less than this fraction of the step.
+    touch_range: f64,
+    /// Flights in a row, each shorter than the one before, that may be the beginning of an accumulation ...
+    zeno_flights: u64,
+    /// ... and are one when the last is below this share of the first ...
+    zeno_ratio: f64,
+    /// ... or below so many spacings of the numbers at the present time.
+    zeno_resolution: f64,
+    /// A sliding step that advances time by no more than this share of it is idle ...
+    idle: f64,
+    /// ... and so many of them are arrival at a degenerate point.
+    idle_steps: u32,
+    /// Closer to a two-fold than so many tolerances there is nothing to integrate.
+    blur: f64,
+    /// Sliding restarts on the surface when it has drifted off by this ...
+    drift: f64,
+    /// ... or by so many absolute tolerances, whichever is more.
+    drift_in_tolerances: f64,
+    /// Chords by which the path out of a two-fold is measured.
+    departure_chords: usize,
+    /// Departures shorter than this share of the shortest one are raised to it: closer to the two-fold the signs of the Lie
+    /// derivatives are rounding.
+    shortest_departure: f64,
+}
+
+const LIMITS: Limits = Limits {
+    lie: 1e-14,
+    near_two_fold: 1e5,
+    same_point: 1e-9,
+    touch_steps: 4,
+    touch_range: 1e-3,
+    zeno_flights: 8,
+    zeno_ratio: 1e-8,
+    zeno_resolution: 16.0 * f64::EPSILON,
+    idle: 4.0 * f64::EPSILON,
+    idle_steps: 32,
+    blur: 300.0,
+    drift: 1e-10,
+    drift_in_tolerances: 10.0,
+    departure_chords: 256,
+    shortest_departure: 1e-6,
+};
 
 const DEGENERATE_END: &str =
     "sliding runs into a point where both Lie derivatives vanish and which is not a regular two-fold";
@@ -301,8 +412,8 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
             mm: along(&q, &minus),
             pm: along(&p, &minus),
             mp: along(&q, &plus),
-            zero_p: 1e-14 * slope * plus.norm(),
-            zero_q: 1e-14 * slope * minus.norm(),
+            zero_p: LIMITS.lie * slope * plus.norm(),
+            zero_q: LIMITS.lie * slope * minus.norm(),
         }
     }
 
@@ -363,11 +474,12 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
 
     /// A two-fold at the present state, if both Lie derivatives are almost zero there.
     fn two_fold_here(&self, l: &Lie) -> Option<SlidingAtTwoFold<N>> {
-        if l.p.abs() > 1e5 * l.zero_p.max(l.zero_q) || l.q.abs() > 1e5 * l.zero_p.max(l.zero_q) {
+        let near = LIMITS.near_two_fold * l.zero_p.max(l.zero_q);
+        if l.p.abs() > near || l.q.abs() > near {
             return None;
         }
         let local = SlidingAtTwoFold::near(self.system, &self.x)?;
-        ((local.point - self.x).norm() <= 1e-9 * local.radius.min(1.0)).then_some(local)
+        ((local.point - self.x).norm() <= LIMITS.same_point * local.radius.min(1.0)).then_some(local)
     }
 
     /// The state is in the repelling region: ask the rule.
@@ -428,14 +540,14 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
                     let mut theta = zero.theta();
                     if matches!(zero, Zero::Touch(_)) {
                         // A touch is known only to the root of the rounding; the tangency itself is a simple zero.
-                        for _ in 0..4 {
+                        for _ in 0..LIMITS.touch_steps {
                             let l = self.lie(&step.at(theta));
                             let (rate, second) = match side {
                                 Side::Plus => (l.p, l.pp),
                                 Side::Minus => (l.q, l.mm),
                             };
                             let moved = theta - rate / (second * length);
-                            if !((moved - theta).abs() < 1e-3 && (0.0..=1.0).contains(&moved)) {
+                            if !((moved - theta).abs() < LIMITS.touch_range && (0.0..=1.0).contains(&moved)) {
                                 break;
                             }
                             theta = moved;
@@ -521,147 +633,59 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
     where
         for<'b> SlidingFlow<'b, P, N>: VectorField<M>,
     {
-        /// Chords of a step by which its length is measured.
-        const CHORDS: usize = 16;
-        /// So many steps without progress in time are taken for arrival at a degenerate point.
-        const IDLE_STEPS: u32 = 32;
-        let mut idle = 0;
         let system = self.system;
-        let direction = if sliding.repelling { -1.0 } else { 1.0 };
         let mode = sliding.mode();
-        let flow = SlidingFlow { system, direction };
+        let flow = SlidingFlow { system, direction: sliding.direction() };
         let mut method = Dopri5::<M>::new(self.settings.tolerance);
         let lift = |x: &SVector<f64, N>| SVector::<f64, M>::from_fn(|i, _| if i < N { x[i] } else { 0.0 });
-        let drop = |z: &SVector<f64, M>| SVector::<f64, N>::from_fn(|i, _| z[i]);
-        // Inside the region both of these are positive.
-        let margins = |x: &SVector<f64, N>| {
-            let (p, q) = lie_derivatives(system, x);
-            [-direction * p, direction * q]
-        };
         // The clock of the flow starts at zero with each restart, so that short times keep their digits.
         let mut t_base = self.t;
         let mut fresh = true;
-        let mut local: Option<SlidingAtTwoFold<N>> = None;
-        let mut tried_at = f64::INFINITY;
+        let mut idle = 0;
+        let mut ahead = TwoFoldAhead::new();
         method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY)?;
         let next = loop {
             let step = method.step(&flow)?;
-            let (before, after) = (step.x0[N], step.x1[N]);
-            let mut ends: Option<(f64, SlidingEnd)> = None;
-            let mut propose = |theta: f64, end: SlidingEnd| {
-                if ends.is_none_or(|(best, _)| theta < best) {
-                    ends = Some((theta, end));
-                }
-            };
-            for (i, side) in [Side::Plus, Side::Minus].into_iter().enumerate() {
-                let mut start = Start::Away;
-                if fresh {
-                    let l = self.lie(&self.x);
-                    let (value, zero, rate) = match side {
-                        Side::Plus => (-direction * l.p, l.zero_p, -(l.q * l.pp - l.p * l.pm)),
-                        Side::Minus => (direction * l.q, l.zero_q, l.q * l.mp - l.p * l.mm),
-                    };
-                    // Sliding that begins on a fold: the margin's own zero there is not an exit.
-                    if value <= zero {
-                        if rate <= 0.0 {
-                            propose(0.0, SlidingEnd::Fold(side));
-                            continue;
-                        }
-                        start = Start::Simple(rate * step.length());
-                    }
-                }
-                if let Some(zero) = first_zero(|s| margins(&drop(&step.at(s)))[i], start) {
-                    propose(zero.theta(), SlidingEnd::Fold(side));
-                }
-            }
+            let end = self.sliding_end(&step, &sliding, t_base, fresh);
             fresh = false;
-            let clock = |s: f64| step.at(s)[N];
-            let mut stop_at = |moment: f64, end: SlidingEnd| {
-                if after >= moment {
-                    let theta = if after == moment {
-                        1.0
-                    } else {
-                        brent(|s| clock(s) - moment, 0.0, 1.0, before - moment, after - moment)
-                    };
-                    propose(theta, end);
-                }
-            };
-            stop_at(self.t_end - t_base, SlidingEnd::Time);
-            let mut arc = 0.0;
-            if let Some(plan) = sliding.plan {
-                stop_at(self.t - t_base + (plan.time - sliding.time), SlidingEnd::Planned);
-                let mut last = drop(&step.x0);
-                for k in 1..=CHORDS {
-                    let point = drop(&step.at(k as f64 / CHORDS as f64));
-                    let chord = (point - last).norm();
-                    if sliding.arc + arc + chord >= plan.arc {
-                        let part = (plan.arc - sliding.arc - arc) / chord;
-                        propose((k as f64 - 1.0 + part) / CHORDS as f64, SlidingEnd::Planned);
-                        break;
-                    }
-                    arc += chord;
-                    last = point;
-                }
-            }
-            let end = ends;
             let theta = end.map_or(1.0, |(theta, _)| theta);
             let z1 = step.at(theta);
-            let x1 = project(system, &drop(&z1));
+            let x1 = project(system, &without_clock(&z1));
             let t1 = match end {
                 Some((_, SlidingEnd::Time)) => self.t_end,
                 _ => (t_base + z1[N]).min(self.t_end),
             };
-            if end.is_some() && sliding.plan.is_some() {
-                let mut last = drop(&step.x0);
-                arc = 0.0;
-                for k in 1..=CHORDS {
-                    let point = drop(&step.at(theta * k as f64 / CHORDS as f64));
-                    arc += (point - last).norm();
-                    last = point;
-                }
-            }
             sliding.time += t1 - self.t;
-            sliding.arc += arc;
-            let interpolant = InPhysicalTime { system, inner: step.interpolant, end: theta, clock: (before, z1[N]) };
-            let drift = system.switching(&drop(&z1)).abs();
-            idle = if t1 - self.t <= 4.0 * f64::EPSILON * t1.abs() { idle + 1 } else { 0 };
+            if sliding.plan.is_some() {
+                sliding.arc += chords::<N, M>(&step, theta).iter().sum::<f64>();
+            }
+            let clock = (step.x0[N], z1[N]);
+            let interpolant = InPhysicalTime { system, inner: step.interpolant, end: theta, clock };
+            let drift = system.switching(&without_clock(&z1)).abs();
+            idle = if t1 - self.t <= LIMITS.idle * t1.abs() { idle + 1 } else { 0 };
             self.take(mode, t1, x1, &interpolant);
             if let Some((_, end)) = end {
                 break Some(end);
             }
-            if idle >= IDLE_STEPS {
+            if idle >= LIMITS.idle_steps {
                 return Err(self.non_transversal(DEGENERATE_END));
             }
-            if self.stop.is_some() {
+            if self.stop.is_some() || method.statistics().steps > self.settings.max_steps {
                 break Some(SlidingEnd::Time);
             }
-            if method.statistics().steps > self.settings.max_steps {
-                break Some(SlidingEnd::Time);
-            }
-
-            // Running into a two-fold? Look again each time the Lie derivatives have halved.
-            let size = margins(&self.x).into_iter().fold(0.0, f64::max);
-            if size < 0.5 * tried_at {
-                tried_at = size;
-                // From far away Newton's method may have found another two-fold: trust only the latest answer.
-                if let Some(point) = locate(system, &self.x)
-                    && local.as_ref().is_none_or(|l| (l.point - point).amax() > 1e-9 * (1.0 + point.amax()))
-                {
-                    local = SlidingAtTwoFold::at(system, point);
-                }
-            }
-            if let Some(fold) = &local {
+            ahead.look(system, &self.x, sliding.margins(system, &self.x));
+            if let Some(fold) = &ahead.local {
                 let distance = (fold.point - self.x).norm();
                 // Nearer than the tolerances resolve there is nothing to integrate.
                 let Tolerance { rtol, atol } = self.settings.tolerance;
-                let blur = 300.0 * (atol + rtol * self.x.amax());
+                let blur = LIMITS.blur * (atol + rtol * self.x.amax());
                 if distance <= (self.settings.leg * fold.radius).max(blur)
                     && let Some((leg, error)) = fold.time_to_arrive(system, &self.x, sliding.repelling)
                 {
                     break self.arrive(fold.point, leg, error, mode);
                 }
             }
-            if drift > 1e-10_f64.max(10.0 * self.settings.tolerance.atol) {
+            if drift > LIMITS.drift.max(LIMITS.drift_in_tolerances * self.settings.tolerance.atol) {
                 t_base = self.t;
                 method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY)?;
             }
@@ -669,7 +693,7 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
         self.count(method.statistics());
         let from = Some(mode);
         match next {
-            None => match local {
+            None => match ahead.local {
                 Some(fold) if self.t < self.t_end && self.stop.is_none() => Ok(State::TwoFold(Box::new(fold))),
                 Some(fold) if self.x == fold.point => Ok(State::TwoFold(Box::new(fold))),
                 _ => Ok(State::Sliding(sliding)),
@@ -681,6 +705,70 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
             }
             Some(SlidingEnd::Fold(side)) => self.leave_at_fold(side, &sliding),
         }
+    }
+
+    /// The first end of sliding within a step of the sliding flow, and the fraction of the step at which it comes.
+    fn sliding_end<const M: usize>(
+        &self,
+        step: &Step<'_, M>,
+        sliding: &Sliding,
+        t_base: f64,
+        fresh: bool,
+    ) -> Option<(f64, SlidingEnd)> {
+        let (system, direction) = (self.system, sliding.direction());
+        let mut first: Option<(f64, SlidingEnd)> = None;
+        let mut propose = |theta: f64, end: SlidingEnd| {
+            if first.is_none_or(|(best, _)| theta < best) {
+                first = Some((theta, end));
+            }
+        };
+        for (i, side) in [Side::Plus, Side::Minus].into_iter().enumerate() {
+            let mut start = Start::Away;
+            if fresh {
+                let l = self.lie(&self.x);
+                let (value, zero, rate) = match side {
+                    Side::Plus => (-direction * l.p, l.zero_p, -(l.q * l.pp - l.p * l.pm)),
+                    Side::Minus => (direction * l.q, l.zero_q, l.q * l.mp - l.p * l.mm),
+                };
+                // Sliding that begins on a fold: the margin's own zero there is not an exit.
+                if value <= zero {
+                    if rate <= 0.0 {
+                        propose(0.0, SlidingEnd::Fold(side));
+                        continue;
+                    }
+                    start = Start::Simple(rate * step.length());
+                }
+            }
+            let margin = |s| sliding.margins(system, &without_clock(&step.at(s)))[i];
+            if let Some(zero) = first_zero(margin, start) {
+                propose(zero.theta(), SlidingEnd::Fold(side));
+            }
+        }
+        let (before, after) = (step.x0[N], step.x1[N]);
+        let mut stop_at = |moment: f64, end: SlidingEnd| {
+            if after >= moment {
+                let theta = if after == moment {
+                    1.0
+                } else {
+                    brent(|s| step.at(s)[N] - moment, 0.0, 1.0, before - moment, after - moment)
+                };
+                propose(theta, end);
+            }
+        };
+        stop_at(self.t_end - t_base, SlidingEnd::Time);
+        if let Some(plan) = sliding.plan {
+            stop_at(self.t - t_base + (plan.time - sliding.time), SlidingEnd::Planned);
+            let mut arc = 0.0;
+            for (k, length) in chords::<N, M>(step, 1.0).into_iter().enumerate() {
+                if sliding.arc + arc + length >= plan.arc {
+                    let part = (plan.arc - sliding.arc - arc) / length;
+                    propose((k as f64 + part) / CHORDS as f64, SlidingEnd::Planned);
+                    break;
+                }
+                arc += length;
+            }
+        }
+        first
     }
 
     /// The last leg into a two-fold. `None`, as the loop's result, says that no other end was met.
@@ -767,8 +855,8 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
         // Arc along the curve up to a time, by chords.
         let arc_until = |t: f64| {
             let (end, mut last, mut arc) = (curve.sigma(t, limit), local.point, 0.0);
-            for k in 1..=256 {
-                let point = curve.at(end * k as f64 / 256.0);
+            for k in 1..=LIMITS.departure_chords {
+                let point = curve.at(end * k as f64 / LIMITS.departure_chords as f64);
                 arc += (point - last).norm();
                 last = point;
             }
@@ -783,8 +871,7 @@ impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P
         let planned = match (repelling, planned > 0.0) {
             (false, _) => f64::INFINITY,
             (true, false) => shortest,
-            // Closer to the two-fold than this the signs of the Lie derivatives are rounding.
-            (true, true) => planned.max(1e-6 * shortest),
+            (true, true) => planned.max(LIMITS.shortest_departure * shortest),
         };
         let duration = planned.min(longest);
         let whole = AlongCurve { curve, from: 0.0, to: duration, limit };

@@ -26,6 +26,7 @@ use crate::integrate::step::Interpolant;
 use crate::num::Dual;
 use crate::num::elementary::{pow, sqrt};
 use crate::num::jet::Jet;
+use crate::num::linear::solve;
 use crate::system::PiecewiseSmooth;
 use crate::system::filippov::lie_derivatives;
 use crate::system::variables;
@@ -267,30 +268,6 @@ impl<const N: usize> SlidingAtTwoFold<N> {
     }
 }
 
-/// Solves a x = b by elimination with partial pivoting; `None` if singular.
-fn solve<const N: usize>(mut a: SMatrix<f64, N, N>, mut b: SVector<f64, N>) -> Option<SVector<f64, N>> {
-    for k in 0..N {
-        let pivot = (k..N).max_by(|&i, &j| a[(i, k)].abs().total_cmp(&a[(j, k)].abs()))?;
-        if a[(pivot, k)] == 0.0 {
-            return None;
-        }
-        a.swap_rows(k, pivot);
-        b.swap_rows(k, pivot);
-        for i in k + 1..N {
-            let factor = a[(i, k)] / a[(k, k)];
-            for j in k..N {
-                a[(i, j)] -= factor * a[(k, j)];
-            }
-            b[i] -= factor * b[k];
-        }
-    }
-    for k in (0..N).rev() {
-        let known: f64 = (k + 1..N).map(|j| a[(k, j)] * b[j]).sum();
-        b[k] = (b[k] - known) / a[(k, k)];
-    }
-    Some(b)
-}
-
 /// The series of the invariant curve along `direction`, order by order: (DF - k mu) W_k = -[F(W_0 + ... + W_(k-1))]_k.
 fn invariant_curve<P: PiecewiseSmooth<N>, const N: usize>(
     system: &P,
@@ -315,7 +292,7 @@ fn invariant_curve<P: PiecewiseSmooth<N>, const N: usize>(
         let (f, _) = desingularised(system, &w);
         let right = SVector::<f64, N>::from_fn(|i, _| -f[i].c[k]);
         let resonant = (k as f64 * mu - other_rate).abs() < 1e-9 * other_rate.abs();
-        match solve(matrix, right).filter(|x| !resonant && x.iter().all(|v| v.is_finite())) {
+        match solve(matrix, right, 0.0).filter(|x| !resonant && x.iter().all(|v| v.is_finite())) {
             Some(next) => (0..N).for_each(|i| w[i].c[k] = next[i]),
             None => {
                 terms = k;

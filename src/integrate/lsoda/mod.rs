@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 
 use super::linear::Lu;
 use super::step::{Failure, Statistics, Step, Stepper, Tolerance, finite};
-use crate::num::elementary::{pow, sqrt};
+use crate::num::elementary::{rough_pow, sqrt};
 use crate::system::{VectorField, jacobian};
 use coefficients::{ADAMS, ADAMS_ORDERS, ADAMS_STABILITY, BDF, BDF_ORDERS, Formula};
 use nordsieck::Nordsieck;
@@ -484,7 +484,7 @@ impl<const N: usize> Lsoda<N> {
                     return None;
                 }
                 // Would the error estimate drown in rounding at that step?
-                let predicted = pow(adams.max(1e-3), 1.0 / (q + 1) as f64) * adams_error;
+                let predicted = rough_pow(adams.max(1e-3), 1.0 / (q + 1) as f64) * adams_error;
                 (predicted > 1000.0 * EPSILON * size).then_some(Change {
                     family: Family::Adams,
                     order: q,

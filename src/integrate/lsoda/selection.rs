@@ -5,7 +5,7 @@
 //! discouraged, and take the order that allows the longest step.
 
 use super::coefficients::{ADAMS_ORDERS, BDF_ORDERS};
-use crate::num::elementary::pow;
+use crate::num::elementary::rough_pow;
 
 /// Bias against the present order, Hindmarsh (1983).
 pub(super) const BIAS_SAME: f64 = 1.2;
@@ -49,5 +49,5 @@ const _: () = assert!(SWITCH_ORDERS <= ADAMS_ORDERS);
 
 /// The factor by which the step may grow at `order` if its error was `error`. The 1e-6 keeps it finite at error 0.
 pub(super) fn growth(bias: f64, error: f64, order: usize) -> f64 {
-    1.0 / (bias * (pow(error, 1.0 / (order + 1) as f64) + 1e-6))
+    1.0 / (bias * (rough_pow(error, 1.0 / (order + 1) as f64) + 1e-6))
 }

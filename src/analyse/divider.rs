@@ -18,7 +18,7 @@ const STILL_LEAVING: usize = 4;
 
 /// A path walked with dividers.
 #[derive(Clone, Debug)]
-pub struct Tangle {
+pub struct DividerWalk {
     /// Ends of strides, in units of a stride.
     ends: Vec<[f64; 3]>,
     cells: BTreeMap<[i64; 3], Vec<usize>>,
@@ -35,7 +35,7 @@ pub fn common_box<'a>(paths: impl IntoIterator<Item = &'a [Sample]>) -> [(f64, f
     range
 }
 
-impl Tangle {
+impl DividerWalk {
     /// Walks `path`; lengths are measured in the box `range`, each coordinate relative to its extent, as a picture shows it.
     pub fn new(path: &[Sample], range: &[(f64, f64); 3]) -> Self {
         let scale = range.map(|(low, high)| STRIDES / (high - low).max(f64::MIN_POSITIVE));
@@ -79,8 +79,8 @@ impl Tangle {
     }
 
     /// Comparison with another path in the same box.
-    pub fn compare(&self, other: &Tangle) -> Shared {
-        let common = |a: &Tangle, b: &Tangle| a.ends.iter().filter(|e| b.visited(**e, usize::MAX)).count();
+    pub fn compare(&self, other: &DividerWalk) -> Shared {
+        let common = |a: &DividerWalk, b: &DividerWalk| a.ends.iter().filter(|e| b.visited(**e, usize::MAX)).count();
         let strides = [self.ends.len(), other.ends.len()];
         let both = [common(self, other), common(other, self)];
         Shared { strides, both, overlap: (both[0] + both[1]) as f64 / (strides[0] + strides[1]).max(1) as f64 }
@@ -121,7 +121,7 @@ mod tests {
     fn a_loop_is_organised_and_a_helix_is_not() {
         let (circle, helix) = (loops(10.0, 0.0, 0.0), loops(10.0, 0.1, 0.0));
         let range = common_box([&circle[..], &helix[..]]);
-        let (c, h) = (Tangle::new(&circle, &range), Tangle::new(&helix, &range));
+        let (c, h) = (DividerWalk::new(&circle, &range), DividerWalk::new(&helix, &range));
         assert!((c.freshness() - 0.1).abs() < 0.02, "{}", c.freshness());
         assert!(h.freshness() > 0.95, "{}", h.freshness());
         assert_eq!(c.compare(&c).overlap, 1.0);
@@ -132,7 +132,7 @@ mod tests {
     fn chatter_does_not_count() {
         let (quiet, chatter) = (loops(5.0, 0.1, 0.0), loops(5.0, 0.1, 0.02));
         let range = common_box([&quiet[..], &chatter[..]]);
-        let (q, c) = (Tangle::new(&quiet, &range), Tangle::new(&chatter, &range));
+        let (q, c) = (DividerWalk::new(&quiet, &range), DividerWalk::new(&chatter, &range));
         assert!((q.freshness() - c.freshness()).abs() < 0.05, "{} {}", q.freshness(), c.freshness());
     }
 }

@@ -1,0 +1,92 @@
+//! The units of work W1 and W2 (benches/README.md), by our methods: `cargo bench --bench units -- W1 A dopri5 5`.
+//!
+//! Prints one line, as the programs in benches/peers do: program, unit, set, the least seconds of the given number of
+//! runs, steps, crossings, final state of the last run.
+
+use std::process::exit;
+use std::time::Instant;
+
+use nalgebra::{SVector, vector};
+use twofold::analyse::SectionRecorder;
+use twofold::integrate::{
+    Course, Dopri5, Failure, Ignore, Lsoda, Radau5, Schedule, StepCap, Stepper, Taylor, Tolerance, drive,
+};
+use twofold::system::{Caricature, Smoothed, Transition};
+
+const TOLERANCE: Tolerance = Tolerance { rtol: 1.0536712e-8, atol: 1.0536712e-8 };
+
+type Field = Smoothed<Caricature>;
+
+/// Steps, crossings, final state.
+type Done = Result<(u64, usize, SVector<f64, 3>), Failure>;
+
+fn field(set: &str) -> Field {
+    let (alpha, beta) = if set == "A" { (1e-3, 1e-5) } else { (1e-1, 1e-4) };
+    let system = Caricature { beta, ..Caricature::with_reinjection(alpha, beta) };
+    Smoothed { system, transition: Transition::Tanh, eps: 1e-3 }
+}
+
+fn w1<M: Stepper<3>>(field: &Field, mut stepper: M) -> Done {
+    let mut section = SectionRecorder::new(1, 0.0);
+    let course = Course {
+        t_end: 2e5,
+        schedule: Schedule { restart_every: Some(100.0), kick: None },
+        step_cap: StepCap::FractionOfSegment(0.1),
+        max_steps: u64::MAX,
+    };
+    let end = drive(field, vector![0.2, 0.0, -1.0], &course, &mut stepper, &mut section, &())?;
+    Ok((end.statistics.steps, section.crossings().len(), end.x))
+}
+
+fn w2<M: Stepper<3>>(field: &Field, make: impl Fn() -> M) -> Done {
+    let mut done = (0, 0, vector![0.0, 0.0, 0.0]);
+    let course =
+        Course { t_end: 2000.0, schedule: Schedule::default(), step_cap: StepCap::Absolute(10.0), max_steps: u64::MAX };
+    for k in 0..1000 {
+        let x = 0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0;
+        let end = drive(field, vector![x, 0.0, -1.0], &course, &mut make(), &mut Ignore, &())?;
+        done = (done.0 + end.statistics.steps, 0, end.x);
+    }
+    Ok(done)
+}
+
+fn once(unit: &str, set: &str, method: &str) -> Option<Done> {
+    let field = field(set);
+    Some(match (unit, method) {
+        ("W1", "dopri5") => w1(&field, Dopri5::new(TOLERANCE)),
+        ("W1", "lsoda") => w1(&field, Lsoda::new(TOLERANCE)),
+        ("W1", "radau5") => w1(&field, Radau5::new(TOLERANCE)),
+        ("W1", "taylor") => w1(&field, Taylor::new(TOLERANCE)),
+        ("W2", "dopri5") => w2(&field, || Dopri5::new(TOLERANCE)),
+        ("W2", "lsoda") => w2(&field, || Lsoda::new(TOLERANCE)),
+        _ => return None,
+    })
+}
+
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    let [unit, set, method, repeats] = words.iter().map(String::as_str).collect::<Vec<_>>()[..] else {
+        println!("usage: cargo bench --bench units -- W1|W2 A|B METHOD REPEATS");
+        return;
+    };
+    let mut best = f64::INFINITY;
+    let mut last = None;
+    for _ in 0..repeats.parse().unwrap_or(1) {
+        let start = Instant::now();
+        last = once(unit, set, method);
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    match last {
+        Some(Ok((steps, crossings, x))) => {
+            println!("twofold-{method} {unit} {set} {best:.6} {steps} {crossings} {} {} {}", x[0], x[1], x[2]);
+        }
+        Some(Err(failure)) => {
+            eprintln!("{failure}");
+            exit(1);
+        }
+        None => {
+            eprintln!("no such unit or method: {unit} {method}");
+            exit(2);
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! Several numbers side by side, for many independent runs at once.
+//!
+//! Portable: an array and loops over it, which the compiler turns into whatever vector instructions the machine has. Every operation
+//! rounds each lane as it rounds a number by itself, so a lane's result does not depend on the width or on its neighbours.
+
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+use super::elementary::kernels::{self, Pointwise, TANH_IS_ONE};
+use super::scalar::{Arithmetic, Elementary};
+
+/// `W` numbers side by side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(transparent)]
+pub struct Lanes<const W: usize>(pub [f64; W]);
+
+impl<const W: usize> Pointwise for Lanes<W> {
+    #[inline(always)]
+    fn map(self, f: impl Fn(f64) -> f64) -> Self {
+        let mut lanes = self.0;
+        for lane in &mut lanes {
+            *lane = f(*lane);
+        }
+        Self(lanes)
+    }
+    #[inline(always)]
+    fn map2(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        let mut lanes = self.0;
+        for (lane, other) in lanes.iter_mut().zip(other.0) {
+            *lane = f(*lane, other);
+        }
+        Self(lanes)
+    }
+}
+
+macro_rules! lanewise {
+    ($($trait:ident, $function:ident, $operator:tt);*) => {$(
+        impl<const W: usize> $trait for Lanes<W> {
+            type Output = Self;
+            #[inline(always)]
+            fn $function(self, other: Self) -> Self {
+                self.map2(other, |a, b| a $operator b)
+            }
+        }
+    )*};
+}
+lanewise!(Add, add, +; Sub, sub, -; Mul, mul, *; Div, div, /);
+
+impl<const W: usize> Neg for Lanes<W> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        self.map(|a| -a)
+    }
+}
+
+impl<const W: usize> AddAssign for Lanes<W> {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl<const W: usize> SubAssign for Lanes<W> {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}
+
+impl<const W: usize> Arithmetic for Lanes<W> {
+    #[inline(always)]
+    fn from_f64(value: f64) -> Self {
+        Self([value; W])
+    }
+}
+
+impl<const W: usize> Elementary for Lanes<W> {
+    #[inline(always)]
+    fn tanh(self) -> Self {
+        // The kernel gives +-1 there as well; most steps have every lane outside its layer.
+        if self.0.iter().all(|lane| lane.abs() >= TANH_IS_ONE) {
+            self.map(|lane| 1.0_f64.copysign(lane))
+        } else {
+            kernels::tanh(self)
+        }
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        kernels::exp(self)
+    }
+    #[inline]
+    fn sin(self) -> Self {
+        self.map(Elementary::sin)
+    }
+    #[inline]
+    fn cos(self) -> Self {
+        self.map(Elementary::cos)
+    }
+    #[inline]
+    fn ln(self) -> Self {
+        self.map(Elementary::ln)
+    }
+    #[inline]
+    fn atan(self) -> Self {
+        self.map(Elementary::atan)
+    }
+    #[inline]
+    fn erf(self) -> Self {
+        self.map(Elementary::erf)
+    }
+    #[inline(always)]
+    fn pi() -> Self {
+        Self::from_f64(f64::pi())
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.map(Elementary::sqrt)
+    }
+    #[inline(always)]
+    fn sign(self) -> Self {
+        self.map(Elementary::sign)
+    }
+}
