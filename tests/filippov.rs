@@ -652,15 +652,15 @@ fn reference(name: &str, rows: usize) -> Vec<[f64; 3]> {
 fn the_smoothed_reference_lies_within_eps() {
     // Before the first visit the smoothed orbit with eps = 1e-3 is O(eps) from the Filippov orbit.
     use twofold::integrate::filippov::AllModes;
-    use twofold::integrate::roots::sign_changes;
+    use twofold::integrate::roots::Passages;
     use twofold::integrate::{Flow, Observer, Step};
     #[derive(Default)]
-    struct Section(Vec<[f64; 3]>);
+    struct Section(Vec<[f64; 3]>, Passages);
     impl Observer<3> for Section {
         fn step(&mut self, step: &Step<'_, 3>) -> Flow {
-            for theta in sign_changes(step, |x| x[1]) {
-                let x = step.at(theta);
-                self.0.push([step.time(theta), x[0], x[2]]);
+            for passage in self.1.through_plane(step, 1, 0.0) {
+                let x = step.at(passage.theta);
+                self.0.push([step.time(passage.theta), x[0], x[2]]);
             }
             Flow::Continue
         }

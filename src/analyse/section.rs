@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::path::first_three;
-use crate::integrate::{Flow, Observer, Step, roots};
+use crate::integrate::roots::Passages;
+use crate::integrate::{Flow, Observer, Step};
 
 /// The sense in which an orbit passes through the section plane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -16,6 +17,11 @@ pub enum Direction {
 }
 
 impl Direction {
+    /// The sense of a passage.
+    pub(super) fn of(upward: bool) -> Self {
+        if upward { Direction::Up } else { Direction::Down }
+    }
+
     /// The word used in data files.
     pub fn word(self) -> &'static str {
         match self {
@@ -37,6 +43,7 @@ pub struct Crossing {
 }
 
 /// Records every passage through the plane `state[coordinate] = value`, in both senses, located on the dense output.
+/// What a passage is, [`Passages`] says.
 ///
 /// A kick that throws the state across the plane is not a passage of the flow and is not recorded. In a kicked run two
 /// neighbouring rows can therefore have the same sense: in fig. 9 some 30 (printed) and 200 (reconstructed) of 20,000 and 120,000.
@@ -44,13 +51,14 @@ pub struct Crossing {
 pub struct SectionRecorder {
     coordinate: usize,
     value: f64,
+    passages: Passages,
     crossings: Vec<Crossing>,
 }
 
 impl SectionRecorder {
     /// A recorder for the plane `state[coordinate] = value`.
     pub fn new(coordinate: usize, value: f64) -> Self {
-        Self { coordinate, value, crossings: Vec::new() }
+        Self { coordinate, value, passages: Passages::default(), crossings: Vec::new() }
     }
 
     /// The passages so far, in time order.
@@ -66,14 +74,9 @@ impl SectionRecorder {
 
 impl<const N: usize> Observer<N> for SectionRecorder {
     fn step(&mut self, step: &Step<'_, N>) -> Flow {
-        let (c, v) = (self.coordinate, self.value);
-        let height = |x: &nalgebra::SVector<f64, N>| x[c] - v;
-        let mut before = height(&step.x0);
-        for theta in roots::sign_changes(step, height) {
-            // The sense follows from the side the orbit comes from; signs alternate between successive zeros.
-            let direction = if before < 0.0 { Direction::Up } else { Direction::Down };
-            before = if before < 0.0 { 1.0 } else { -1.0 };
-            self.crossings.push(Crossing { t: step.time(theta), x: first_three(&step.at(theta)), direction });
+        for passage in self.passages.through_plane(step, self.coordinate, self.value) {
+            let (t, x) = (step.time(passage.theta), first_three(&step.at(passage.theta)));
+            self.crossings.push(Crossing { t, x, direction: Direction::of(passage.upward) });
         }
         Flow::Continue
     }
