@@ -46,7 +46,7 @@ pub struct Crossing {
 /// What a passage is, [`Passages`] says.
 ///
 /// A kick that throws the state across the plane is not a passage of the flow and is not recorded. In a kicked run two
-/// neighbouring rows can therefore have the same sense: in fig. 9 some 30 (printed) and 200 (reconstructed) of 20,000 and 120,000.
+/// neighbouring rows can therefore have the same sense: up to some 0.2 % were seen to.
 #[derive(Clone, Debug)]
 pub struct SectionRecorder {
     coordinate: usize,

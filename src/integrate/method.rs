@@ -9,7 +9,7 @@ use super::{Dopri5, Lsoda, Radau5, Taylor};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// LSODA: Adams and BDF with automatic switching, the default NDSolve of the paper's day.
+    /// LSODA: Adams and BDF with automatic switching.
     Lsoda,
     /// Dormand-Prince 5(4).
     Dopri5,
