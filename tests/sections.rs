@@ -123,6 +123,7 @@ fn compare<M: Stepper<3>>(name: &str, mut stepper: M, t_end: f64) {
             schedule: Schedule { restart_every: Some(20.0), kick: None },
             step_cap: StepCap::FractionOfSegment(0.1),
             max_steps: u64::MAX,
+            kicked_states: 3,
         };
         let _ = drive(&field, vector![0.2, 0.0, -1.0], &course, &mut stepper, &mut compared, &()).unwrap();
         let Compared { steps, passages, several, decided, .. } = compared;

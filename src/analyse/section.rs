@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::path::first_three;
+use super::path::leading;
 use crate::integrate::roots::Passages;
 use crate::integrate::{Flow, Observer, Step};
 
@@ -33,11 +33,11 @@ impl Direction {
 
 /// A passage through the section plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Crossing {
+pub struct Crossing<const D: usize = 3> {
     /// Time.
     pub t: f64,
-    /// State (first three components).
-    pub x: [f64; 3],
+    /// State; the hysteretic phi is not part of it.
+    pub x: [f64; D],
     /// Sense.
     pub direction: Direction,
 }
@@ -48,34 +48,34 @@ pub struct Crossing {
 /// A kick that throws the state across the plane is not a passage of the flow and is not recorded. In a kicked run two
 /// neighbouring rows can therefore have the same sense: up to some 0.2 % were seen to.
 #[derive(Clone, Debug)]
-pub struct SectionRecorder {
+pub struct SectionRecorder<const D: usize = 3> {
     coordinate: usize,
     value: f64,
     passages: Passages,
-    crossings: Vec<Crossing>,
+    crossings: Vec<Crossing<D>>,
 }
 
-impl SectionRecorder {
+impl<const D: usize> SectionRecorder<D> {
     /// A recorder for the plane `state[coordinate] = value`.
     pub fn new(coordinate: usize, value: f64) -> Self {
         Self { coordinate, value, passages: Passages::default(), crossings: Vec::new() }
     }
 
     /// The passages so far, in time order.
-    pub fn crossings(&self) -> &[Crossing] {
+    pub fn crossings(&self) -> &[Crossing<D>] {
         &self.crossings
     }
 
     /// The passages, in time order.
-    pub fn into_crossings(self) -> Vec<Crossing> {
+    pub fn into_crossings(self) -> Vec<Crossing<D>> {
         self.crossings
     }
 }
 
-impl<const N: usize> Observer<N> for SectionRecorder {
+impl<const N: usize, const D: usize> Observer<N> for SectionRecorder<D> {
     fn step(&mut self, step: &Step<'_, N>) -> Flow {
         for passage in self.passages.through_plane(step, self.coordinate, self.value) {
-            let (t, x) = (step.time(passage.theta), first_three(&step.at(passage.theta)));
+            let (t, x) = (step.time(passage.theta), leading(&step.at(passage.theta)));
             self.crossings.push(Crossing { t, x, direction: Direction::of(passage.upward) });
         }
         Flow::Continue

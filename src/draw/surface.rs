@@ -2,11 +2,10 @@
 
 use nalgebra::{SVector, vector};
 
-use crate::job::spec::SystemSpec;
 use crate::render::sheet::{Colour, Patch};
 use crate::render::style;
 use crate::system::filippov::{Region, TwoFold, Visibility, lie_derivatives, normal_form_constants, region, two_fold};
-use crate::system::{Caricature, PiecewiseSmooth, Wheel};
+use crate::system::{Caricature, Compiled, PiecewiseSmooth, System, Wheel};
 
 /// The colour of a region.
 pub fn colour(region: Region) -> Colour {
@@ -18,18 +17,26 @@ pub fn colour(region: Region) -> Colour {
 }
 
 /// The patches of h = 0 inside the box `ranges` (one (low, high) per coordinate), in the state's order of coordinates.
-pub fn patches(system: &SystemSpec, ranges: &[(f64, f64); 3], cells: usize) -> Vec<Patch> {
-    match system {
-        SystemSpec::Caricature(c) => caricature(c, ranges, cells),
-        SystemSpec::Wheel(w) => wheel(w, ranges, cells),
+///
+/// None for a system whose surface is not known as a graph over two coordinates.
+pub fn patches(system: &System, ranges: &[(f64, f64); 3], cells: usize) -> Vec<Patch> {
+    match system.compiled() {
+        Some(Compiled::Caricature(c)) => caricature(&c, ranges, cells),
+        Some(Compiled::Wheel(w)) => wheel(&w, ranges, cells),
+        None => Vec::new(),
     }
 }
 
-/// The two-fold inside the box `ranges` where determinism breaks, if there is one.
-pub fn singularity(system: &SystemSpec, ranges: &[(f64, f64); 3]) -> Option<[f64; 3]> {
-    let point = match system {
-        SystemSpec::Caricature(c) => two_fold(c, &vector![0.0, 0.0, 0.0]).ok().map(|t| t.point),
-        SystemSpec::Wheel(w) => search(w, ranges, |r, omega| vector![r, w.sticking_speed(r, omega), omega]),
+/// The two-fold inside the box `ranges` where determinism breaks, if there is one; of a system whose surface is not known as a graph, the
+/// two-fold that Newton's method finds from its suggested start.
+pub fn singularity(system: &System, ranges: &[(f64, f64); 3]) -> Option<[f64; 3]> {
+    let point = match system.compiled() {
+        Some(Compiled::Caricature(c)) => two_fold(&c, &vector![0.0, 0.0, 0.0]).ok().map(|t| t.point),
+        Some(Compiled::Wheel(w)) => search(&w, ranges, |r, omega| vector![r, w.sticking_speed(r, omega), omega]),
+        None => {
+            let start: [f64; 3] = system.definition().start()?.try_into().ok()?;
+            two_fold(&system.bind::<3>().ok()?, &start.into()).ok().map(|t| t.point)
+        }
     };
     let inside = |p: &SVector<f64, 3>| p.iter().zip(ranges).all(|(x, (low, high))| (low..=high).contains(&x));
     point.filter(inside).map(Into::into)
@@ -149,13 +156,13 @@ mod tests {
         let ranges = [(0.0, 1.5), (-3.0, 1.5), (-3.0, 1.5)];
         for (gamma, k_w) in [(std::f64::consts::FRAC_PI_4, 2.0), (0.75, 2.0), (std::f64::consts::FRAC_PI_4, 2.2)] {
             let wheel = Wheel { gamma, k_w, ..Wheel::default() };
-            let at = SVector::from(singularity(&SystemSpec::Wheel(wheel), &ranges).unwrap());
+            let at = SVector::from(singularity(&wheel.into(), &ranges).unwrap());
             let (p, q) = lie_derivatives(&wheel, &at);
             assert!(wheel.switching(&at).abs() < 1e-12 && p.abs() < 1e-9 && q.abs() < 1e-9, "{at} {p} {q}");
         }
-        let default = singularity(&SystemSpec::Wheel(Wheel::default()), &ranges).unwrap();
+        let default = singularity(&Wheel::default().into(), &ranges).unwrap();
         assert!((default[0] - 0.692_669_889_7).abs() < 1e-9, "{default:?}");
         let elsewhere = [(0.0, 0.1), (-3.0, 1.5), (-3.0, 1.5)];
-        assert_eq!(singularity(&SystemSpec::Wheel(Wheel::default()), &elsewhere), None);
+        assert_eq!(singularity(&Wheel::default().into(), &elsewhere), None);
     }
 }

@@ -3,9 +3,9 @@
 use super::Reading;
 use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use crate::integrate::{Kick, StepCap};
-use crate::job::spec::{MethodSpec, RunSpec, SwitchSpec, SystemSpec};
+use crate::job::spec::{MethodSpec, RunSpec, SwitchSpec};
 pub use crate::render::number::number;
-use crate::system::{Relaxation, Transition};
+use crate::system::{Compiled, Relaxation, System, Transition};
 
 /// "reconstructed reading: *α* = 0.1, *β* = 10^{-5}".
 pub fn reading(reading: Reading) -> String {
@@ -14,16 +14,16 @@ pub fn reading(reading: Reading) -> String {
 }
 
 /// The system and its parameters.
-pub fn system(system: &SystemSpec) -> String {
-    match system {
-        SystemSpec::Caricature(c) => format!(
+pub fn system(system: &System) -> String {
+    match system.compiled() {
+        Some(Compiled::Caricature(c)) => format!(
             "*α* = {}, *β* = {}, *v*_{{+}} = {}, *v*_{{−}} = {}",
             number(c.alpha),
             number(c.beta),
             number(c.v_plus),
             number(c.v_minus)
         ),
-        SystemSpec::Wheel(w) => format!(
+        Some(Compiled::Wheel(w)) => format!(
             "wheel (reconstruction): *m* = {}, *J* = {}, *d* = {}, *γ* = {}, *k*_{{w}} = {}, *c*_{{w}} = {}, *c*_{{h}} = {}, \
              *ω*_{{0}} = {}, *F* = {}, *q* = {}, *V*_{{c}} = {}",
             number(w.m),
@@ -38,6 +38,11 @@ pub fn system(system: &SystemSpec) -> String {
             number(w.trail),
             number(w.v_c)
         ),
+        None => {
+            let parameters = system.parameters().map(|(name, value)| format!("*{name}* = {}", number(value.value())));
+            let name = (!system.definition().title().is_empty()).then(|| system.definition().title().to_owned());
+            name.into_iter().chain(parameters).collect::<Vec<_>>().join(", ")
+        }
     }
 }
 
@@ -176,6 +181,6 @@ mod tests {
         assert_eq!(angle(std::f64::consts::FRAC_PI_4), "π/4");
         assert_eq!(angle(0.7), "0.7");
         let wheel = crate::system::Wheel { gamma: 0.7, ..Default::default() };
-        assert!(system(&SystemSpec::Wheel(wheel)).contains("*γ* = 0.7,"));
+        assert!(system(&wheel.into()).contains("*γ* = 0.7,"));
     }
 }
