@@ -2,12 +2,13 @@
 #![allow(clippy::disallowed_methods)] // exact solutions are compared to tolerances, not hashed
 
 use nalgebra::{SVector, vector};
-use twofold::analyse::attractor::{Claim, Evidence, Question, SectionPoint, Thresholds, Verdict, classify};
+use twofold::analyse::attractor::{Evidence, Question, SectionPoint, Thresholds, Verdict, classify};
 use twofold::analyse::floquet::{self, Plane, closed_orbit};
 use twofold::analyse::lyapunov::{self, largest};
 use twofold::integrate::{Course, Dopri5, Flow, Ignore, Observer, Step, StepCap, Tolerance, drive, roots};
 use twofold::num::Elementary;
 use twofold::num::random::RandomStream;
+use twofold::paper::claim::Claim;
 use twofold::system::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
 
 /// Lorenz (1963) at sigma = 10, rho = 28, beta = 8/3.
@@ -59,11 +60,12 @@ struct Section {
     value: f64,
     shown: [usize; 2],
     points: Vec<SectionPoint>,
+    passages: roots::Passages,
 }
 
 impl<const N: usize> Observer<N> for Section {
     fn step(&mut self, step: &Step<'_, N>) -> Flow {
-        for theta in roots::sign_changes(step, |x| x[self.axis] - self.value) {
+        for roots::Passage { theta, .. } in self.passages.through_plane(step, self.axis, self.value) {
             let x = step.at(theta);
             let upward = step.x1[self.axis] > step.x0[self.axis];
             self.points.push(SectionPoint { t: step.time(theta), u: self.shown.map(|k| x[k]), upward });
@@ -93,7 +95,7 @@ fn section_to<const N: usize, F: VectorField<N>>(
     shown: [usize; 2],
 ) -> Vec<SectionPoint> {
     let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
-    let mut seen = Section { axis, value, shown, points: Vec::new() };
+    let mut seen = Section { axis, value, shown, points: Vec::new(), passages: roots::Passages::default() };
     let mut stepper = Dopri5::new(tolerance);
     let course = Course { step_cap: StepCap::Absolute(0.5), ..Course::to(t_end) };
     let end = drive(field, x0, &course, &mut stepper, &mut seen, &()).unwrap();

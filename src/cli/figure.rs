@@ -265,7 +265,7 @@ fn print_specs(figures: &[Figure]) -> Result<(), CliError> {
         .iter()
         .flat_map(|figure| &figure.pictures)
         .flat_map(|picture| {
-            picture.panels.iter().map(move |panel| (format!("{}-{}", picture.name, panel.label), panel.run))
+            picture.panels.iter().map(move |panel| (format!("{}-{}", picture.name, panel.label), &panel.run))
         })
         .collect();
     match specs.as_slice() {

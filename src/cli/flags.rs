@@ -4,7 +4,7 @@
 //! test tries every flag on every kind of run.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 
@@ -14,16 +14,23 @@ use crate::integrate;
 use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use crate::integrate::{Kick, Schedule, StepCap, Tolerance};
 use crate::job::spec::*;
+use crate::num::Decimal;
+use crate::num::decimal::DecimalError;
 use crate::paper;
 use crate::record::files::{read_text, read_text_from};
-use crate::system::{Transition, Wheel};
+use crate::system::diagnostic::nearest;
+use crate::system::{Definition, ParameterError, System, Transition, library};
 
 /// The flags that describe a run. What is not given has the default that its help names.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct RunFlags {
-    /// Piecewise-smooth system [default: caricature].
-    #[arg(long, value_enum, help_heading = "System")]
-    pub system: Option<System>,
+    /// Piecewise-smooth system: a built-in one (caricature, caricature-as-printed, two-fold, wheel, relay-linear, relay-parabolic,
+    /// stick-slip) or a file that defines one (.toml, .json) [default: caricature].
+    #[arg(long, value_name = "NAME|FILE", help_heading = "System")]
+    pub system: Option<String>,
+    /// Give a parameter of the system another value; may be repeated.
+    #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true, help_heading = "System")]
+    pub set: Vec<String>,
     /// What stands in for the discontinuity [default: smoothed].
     #[arg(long, value_enum, help_heading = "System")]
     pub switch: Option<Switch>,
@@ -54,8 +61,8 @@ pub struct RunFlags {
     /// Reading of eq. (10) [default: literal].
     #[arg(long, value_enum, help_heading = "System")]
     pub hysteresis: Option<Relaxation>,
-    /// Initial state [default: 0.2,0,-1 for the caricature; 0.69267,0,0 for the wheel].
-    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_hyphen_values = true, help_heading = "System")]
+    /// Initial state, one number for each of the system's [default: the one that the system suggests].
+    #[arg(long, value_name = "X,Y,...", value_delimiter = ',', allow_hyphen_values = true, help_heading = "System")]
     pub start: Option<Vec<f64>>,
     /// Final time [default: 150].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
@@ -123,16 +130,6 @@ pub struct RunFlags {
     pub spec: Option<PathBuf>,
 }
 
-/// A system by name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum System {
-    /// Eq. (5).
-    #[default]
-    Caricature,
-    /// Eqs (1)-(2), reconstructed.
-    Wheel,
-}
-
 /// A switch by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Switch {
@@ -167,8 +164,15 @@ struct Effect {
 }
 
 impl RunFlags {
+    fn system_name(&self) -> &str {
+        self.system.as_deref().unwrap_or("caricature")
+    }
     fn caricature(&self) -> bool {
-        self.system.unwrap_or_default() == System::Caricature
+        matches!(self.system_name(), "caricature" | "caricature-as-printed")
+    }
+    /// Whether --set gives a parameter its value.
+    fn sets(&self, parameter: &str) -> bool {
+        self.set.iter().any(|text| text.split('=').next().map(str::trim) == Some(parameter))
     }
     fn switch(&self) -> Switch {
         self.switch.unwrap_or_default()
@@ -187,7 +191,7 @@ impl RunFlags {
     }
 }
 
-const OF_THE_CARICATURE: &str = "it belongs to the caricature; leave it out with --system wheel";
+const OF_THE_CARICATURE: &str = "it belongs to the caricature, and --set NAME=VALUE comes after it; leave it out, and give parameters of other systems by --set";
 const OF_FUNNELS: &str =
     "it describes the futures that --switch filippov --exit all follows; leave it out, or follow them";
 const OF_RANDOM: &str = "nothing in this run is random; leave it out, or give --kick-every or a random --exit";
@@ -196,7 +200,7 @@ const NOT_FILIPPOV: &str =
 const OF_KICKS: &str = "there are no kicks; leave it out, or give --kick-every";
 
 /// The table. Every flag of [`RunFlags`] but --spec stands in it once.
-const EFFECTS: [Effect; 32] = {
+const EFFECTS: [Effect; 33] = {
     const fn always(flag: &'static str, given: fn(&RunFlags) -> bool) -> Effect {
         Effect { flag, given, works: |_, _| true, why: "" }
     }
@@ -210,17 +214,21 @@ const EFFECTS: [Effect; 32] = {
     }
     [
         always("--system", |f| f.system.is_some()),
+        always("--set", |f| !f.set.is_empty()),
         always("--switch", |f| f.switch.is_some()),
         when(
             "--reading",
             |f| f.reading.is_some(),
-            |f, _| f.caricature() && !(f.alpha.is_some() && f.beta.is_some()),
-            "a reading gives the caricature's alpha and beta; leave it out with --system wheel, or where both are given",
+            |f, _| {
+                let given = (f.alpha.is_some() || f.sets("alpha")) && (f.beta.is_some() || f.sets("beta"));
+                f.caricature() && !given
+            },
+            "a reading gives the caricature's alpha and beta; leave it out with other systems, or where both are given",
         ),
-        when("--alpha", |f| f.alpha.is_some(), |f, _| f.caricature(), OF_THE_CARICATURE),
-        when("--beta", |f| f.beta.is_some(), |f, _| f.caricature(), OF_THE_CARICATURE),
-        when("--v-plus", |f| f.v_plus.is_some(), |f, _| f.caricature(), OF_THE_CARICATURE),
-        when("--v-minus", |f| f.v_minus.is_some(), |f, _| f.caricature(), OF_THE_CARICATURE),
+        when("--alpha", |f| f.alpha.is_some(), |f, _| f.caricature() && !f.sets("alpha"), OF_THE_CARICATURE),
+        when("--beta", |f| f.beta.is_some(), |f, _| f.caricature() && !f.sets("beta"), OF_THE_CARICATURE),
+        when("--v-plus", |f| f.v_plus.is_some(), |f, _| f.caricature() && !f.sets("v_plus"), OF_THE_CARICATURE),
+        when("--v-minus", |f| f.v_minus.is_some(), |f, _| f.caricature() && !f.sets("v_minus"), OF_THE_CARICATURE),
         when(
             "--eps",
             |f| f.eps.is_some(),
@@ -295,10 +303,20 @@ enum Misuse {
         "--exit \"{0}\" is not a rule; give one such as at-once:plus, after-time:0.3:minus, after-arc:0.2:plus, random:exponential:0.5, random:uniform:1, or all"
     )]
     Exit(String),
-    #[error("--start has {found} numbers; give three, such as 0.2,0,-1")]
-    Start { found: usize },
+    #[error(
+        "--system {name}: there is no such built-in system{help}; built in are {known}; give a file's name for your own"
+    )]
+    NoSuchSystem { name: String, help: String, known: String },
+    #[error("--system {file}: {problem}")]
+    SystemFile { file: String, problem: String },
+    #[error("--set \"{text}\": {problem}")]
+    Set { text: String, problem: String },
+    #[error("{system} suggests no initial state; give one by --start, {states} numbers")]
+    NoStart { system: String, states: usize },
+    #[error("--start has {found} numbers; give {wanted}, one for each of {states}")]
+    Start { found: usize, wanted: usize, states: String },
     #[error("--section \"{text}\": {problem}; give one of {known} and a number, such as {example}=0")]
-    Section { text: String, problem: &'static str, known: String, example: &'static str },
+    Section { text: String, problem: &'static str, known: String, example: String },
     #[error("--exit all follows many futures and records their paths; a sweep needs passages: give another rule")]
     FunnelInSweep,
     #[error("{file} is not a spec of one run: {reason}; make one with `--only PANEL --reading READING --print-spec`")]
@@ -353,17 +371,7 @@ impl RunFlags {
     }
 
     fn unchecked(&self) -> Result<RunSpec, Misuse> {
-        let system = match self.system.unwrap_or_default() {
-            System::Caricature => {
-                let mut c = paper::Reading::from(self.reading.unwrap_or(Reading::Printed)).caricature();
-                c.alpha = self.alpha.unwrap_or(c.alpha);
-                c.beta = self.beta.unwrap_or(c.beta);
-                c.v_plus = self.v_plus.unwrap_or(c.v_plus);
-                c.v_minus = self.v_minus.unwrap_or(c.v_minus);
-                SystemSpec::Caricature(c)
-            }
-            System::Wheel => SystemSpec::Wheel(Wheel::default()),
-        };
+        let system = self.described_system()?;
         let eps = self.eps.unwrap_or(1e-3);
         let switch = match self.switch() {
             Switch::Smoothed => SwitchSpec::Smoothed {
@@ -389,9 +397,15 @@ impl RunFlags {
             }
         };
         let start = match &self.start {
-            None if !self.caricature() => [0.69267, 0.0, 0.0],
-            None => [0.2, 0.0, -1.0],
-            Some(numbers) => numbers.as_slice().try_into().map_err(|_| Misuse::Start { found: numbers.len() })?,
+            None => {
+                let none = || Misuse::NoStart { system: self.system_name().to_owned(), states: system.dimension() };
+                system.definition().start().ok_or_else(none)?.to_vec()
+            }
+            Some(numbers) if numbers.len() != system.dimension() => {
+                let states = system.coordinates().join(", ");
+                return Err(Misuse::Start { found: numbers.len(), wanted: system.dimension(), states });
+            }
+            Some(numbers) => numbers.clone(),
         };
         let method = self.method.unwrap_or(if self.filippov() { Method::Dopri5 } else { Method::Lsoda });
         let defaults = MethodSpec::ndsolve_defaults(integrate::Method::from(method));
@@ -426,6 +440,38 @@ impl RunFlags {
         })
     }
 
+    /// The system that --system, --reading, --set and the caricature's own flags describe.
+    fn described_system(&self) -> Result<System, Misuse> {
+        let name = self.system_name();
+        let mut system = match System::builtin(name) {
+            Some(system) => system,
+            None => from_file(name)?,
+        };
+        if self.caricature() {
+            let reading = paper::Reading::from(self.reading.unwrap_or(Reading::Printed)).caricature();
+            let values = [
+                ("alpha", self.alpha.unwrap_or(reading.alpha)),
+                ("beta", self.beta.unwrap_or(reading.beta)),
+                ("v_plus", self.v_plus.unwrap_or(reading.v_plus)),
+                ("v_minus", self.v_minus.unwrap_or(reading.v_minus)),
+            ];
+            for (parameter, value) in values {
+                let refused =
+                    |e: ParameterError| Misuse::Set { text: format!("{parameter}={value}"), problem: e.to_string() };
+                system = system.with(parameter, value).map_err(refused)?;
+            }
+        }
+        for text in &self.set {
+            let refused = |problem: String| Misuse::Set { text: text.clone(), problem };
+            let Some((parameter, value)) = text.split_once('=') else {
+                return Err(refused("there is no \"=\"; give it as NAME=VALUE, such as alpha=0.2".into()));
+            };
+            let value: Decimal = value.trim().parse().map_err(|e: DecimalError| refused(e.to_string()))?;
+            system = system.with(parameter.trim(), value).map_err(|e| refused(e.to_string()))?;
+        }
+        Ok(system)
+    }
+
     fn seed(&self) -> u64 {
         self.seed.unwrap_or(2013)
     }
@@ -458,11 +504,34 @@ impl RunFlags {
     }
 }
 
+/// A system from a file, TOML or JSON.
+fn from_file(name: &str) -> Result<System, Misuse> {
+    let path = Path::new(name);
+    let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    let is_file = json || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) || path.is_file();
+    if !is_file {
+        let known: Vec<&str> = library::names().collect();
+        let help = nearest(name, &known).map_or(String::new(), |near| format!(", did you mean {near}?"));
+        return Err(Misuse::NoSuchSystem { name: name.into(), help, known: known.join(", ") });
+    }
+    let problem = |problem: String| Misuse::SystemFile { file: name.into(), problem };
+    let text = read_text(path).map_err(|e| problem(e.to_string()))?;
+    if json {
+        serde_json::from_str(&text).map_err(|e| problem(e.to_string()))
+    } else {
+        Definition::from_toml(&text, name).map(System::new).map_err(|e| problem(e.to_string()))
+    }
+}
+
 /// Reads "y=0".
-fn section(text: &str, system: &SystemSpec) -> Result<Observation, Misuse> {
+fn section(text: &str, system: &System) -> Result<Observation, Misuse> {
     let names = system.coordinates();
-    let misuse =
-        |problem| Misuse::Section { text: text.to_owned(), problem, known: names.join(", "), example: names[1] };
+    let misuse = |problem| Misuse::Section {
+        text: text.to_owned(),
+        problem,
+        known: names.join(", "),
+        example: names[names.len() - 1].into(),
+    };
     let (name, value) = text.split_once('=').ok_or_else(|| misuse("there is no \"=\""))?;
     let coordinate =
         names.iter().position(|n| *n == name.trim()).ok_or_else(|| misuse("there is no such coordinate"))?;
@@ -482,8 +551,9 @@ mod tests {
 
     /// Every flag with a value that no default has and that every run allows on which the flag has an effect; several, if
     /// none differs from every default.
-    const SAMPLES: [(&str, &[&str]); 32] = [
-        ("--system", &["caricature", "wheel"]),
+    const SAMPLES: [(&str, &[&str]); 33] = [
+        ("--system", &["caricature", "wheel", "two-fold"]),
+        ("--set", &["alpha=0.3", "omega0=1.1"]),
         ("--switch", &["smoothed", "hysteretic", "filippov"]),
         ("--reading", &["reconstructed"]),
         ("--alpha", &["0.01"]),

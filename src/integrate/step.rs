@@ -11,6 +11,11 @@ pub trait Interpolant<const N: usize> {
     fn at(&self, theta: f64) -> SVector<f64, N>;
     /// The degree of the interpolant as a polynomial in `theta`.
     fn degree(&self) -> usize;
+    /// A bound, up to rounding, on how far the coordinate leaves the range between its values at the step's two ends. Infinite where
+    /// no cheap one is known.
+    fn reach(&self, _coordinate: usize) -> f64 {
+        f64::INFINITY
+    }
 }
 
 /// One accepted step from (t0, x0) to (t1, x1).
@@ -188,7 +193,7 @@ pub enum Failure {
     },
     /// The budget of steps is used up.
     #[error(
-        "{limit} steps were not enough: stopped at t = {t}, state {state:?}. If this is near (0, alpha/beta, alpha/beta), the run has landed on the stiff far attractor: use an implicit method; otherwise raise the step limit"
+        "{limit} steps were not enough: stopped at t = {t}, state {state:?}. If the last steps were tiny, the equation is stiff there: use an implicit method (lsoda, radau5); otherwise raise the step limit"
     )]
     TooManySteps {
         /// Time reached.

@@ -5,6 +5,7 @@
 //! -> [`drawing`] -> bytes -> files. The figures themselves stand in `figures/figN/main.rs`: every number of the
 //! paper's caption, and nothing else.
 
+pub mod claim;
 pub mod drawing;
 pub mod figures;
 pub mod pipeline;

@@ -8,6 +8,9 @@
 //! Everything here is a pure function of the sheet: no file, clock, locale or machine property enters, and no platform logarithm or
 //! trigonometric function decides where ink lies.
 
+pub mod colour;
+pub mod markup;
+pub mod number;
 pub mod sheet;
 pub mod style;
 
@@ -25,6 +28,7 @@ mod provenance;
 mod raster;
 mod rich_text;
 mod scene;
+mod seal;
 mod space;
 mod svg;
 mod ticks;
@@ -36,7 +40,7 @@ pub use raster::Pixels;
 pub use rich_text::RichTextError;
 pub use sheet::Sheet;
 
-use provenance::Sealed;
+use seal::Sealed;
 
 /// Why a sheet cannot be drawn.
 #[derive(Debug, thiserror::Error)]

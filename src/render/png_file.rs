@@ -7,9 +7,9 @@ use miniz_oxide::deflate::compress_to_vec_zlib;
 use png::{BitDepth, ColorType, Encoder, Info, PixelDimensions, Unit};
 
 use super::RenderError;
-use super::provenance::Sealed;
 use super::raster::Pixels;
 use super::scene::DPI;
+use super::seal::Sealed;
 
 /// Prefix of the keywords under which provenance is kept.
 pub const KEYWORD_PREFIX: &str = "twofold:";
@@ -29,11 +29,7 @@ pub fn write(pixels: &Pixels, title: &str, description: &str, sealed: &Sealed) -
         }
         None => {
             info.color_type = ColorType::Rgb;
-            let mut rgb = vec![0; pixels.rgba.len() / 4 * 3];
-            for (to, from) in rgb.chunks_exact_mut(3).zip(pixels.rgba.chunks_exact(4)) {
-                to.copy_from_slice(&from[..3]);
-            }
-            image_stream(&rgb, 3 * pixels.width as usize)
+            image_stream(&rgb(pixels), 3 * pixels.width as usize)
         }
     };
     let mut file = Vec::new();
@@ -49,11 +45,20 @@ pub fn write(pixels: &Pixels, title: &str, description: &str, sealed: &Sealed) -
     Ok(file)
 }
 
+/// The pixels without transparency, three bytes each.
+pub(super) fn rgb(pixels: &Pixels) -> Vec<u8> {
+    let mut rgb = vec![0; pixels.rgba.len() / 4 * 3];
+    for (to, from) in rgb.chunks_exact_mut(3).zip(pixels.rgba.chunks_exact(4)) {
+        to.copy_from_slice(&from[..3]);
+    }
+    rgb
+}
+
 /// The compressed image data of rows of so many bytes.
 ///
 /// Rows are not filtered: drawings repeat whole stretches of pixels, and filters made for photographs hide that. Compressed here rather
 /// than by the PNG crate, whose compressor is chosen by cargo features that any dependency can turn on.
-fn image_stream(data: &[u8], row: usize) -> Vec<u8> {
+pub(super) fn image_stream(data: &[u8], row: usize) -> Vec<u8> {
     let mut rows = Vec::with_capacity(data.len() + data.len() / row + 1);
     for line in data.chunks_exact(row) {
         rows.push(0);

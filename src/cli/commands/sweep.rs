@@ -130,7 +130,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 
 /// One run, or nothing if it was interrupted.
 fn one(spec: &RunSpec, shift: f64, progress: &Progress) -> Option<Box<Row>> {
-    let mut shifted = *spec;
+    let mut shifted = spec.clone();
     shifted.start[0] += shift;
     // A desk of its own: what it has computed is forgotten with it, however many runs there are.
     match Classification::of(shifted).ask(&Desk::new(None, progress)) {

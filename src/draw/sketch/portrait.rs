@@ -9,6 +9,7 @@ use crate::integrate::filippov::{ExitRule, Mode, Settings, Side, Trajectory, run
 use crate::job::JobError;
 use crate::job::table::Table;
 use crate::render::Sheet;
+use crate::render::number::number;
 use crate::render::sheet::{
     Axis, ColumnWidth, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle, SpacePanel,
 };
@@ -77,7 +78,7 @@ pub fn draw(tables: &[Table], v: f64, w: f64) -> Sheet {
     let axis = |name: &str, reach: f64| Axis::linear(name, -reach, reach);
     let mut chart = SpacePanel::new(axis("*y*", REACH), axis("*z*", REACH), axis("*x*", 0.3)).camera(-60.0, 26.0);
     let ranges = [(-0.3, 0.3), (-REACH, REACH), (-REACH, REACH)];
-    let spec = crate::job::spec::SystemSpec::Caricature(system(v, w));
+    let spec = system(v, w).into();
     let mut patches = surface::patches(&spec, &ranges, 20);
     for corner in patches.iter_mut().flat_map(|p| p.corners.iter_mut()) {
         *corner = turn(*corner);
@@ -113,9 +114,9 @@ pub fn draw(tables: &[Table], v: f64, w: f64) -> Sheet {
         .legend(LegendEntry::new(LegendKey::Marker(MarkerStyle::new(MarkerShape::Dot, style::MAGENTA)), "two-fold"))
         .footer(format!(
             "*v* = {}, *w* = {}, *vw* = {} > 1; every line is a computed orbit",
-            crate::paper::wording::number(v),
-            crate::paper::wording::number(w),
-            crate::paper::wording::number((v * w * 100.0).round() / 100.0)
+            number(v),
+            number(w),
+            number((v * w * 100.0).round() / 100.0)
         ))
 }
 

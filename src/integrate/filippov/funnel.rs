@@ -135,8 +135,8 @@ where
 }
 
 /// A trajectory from `a` to `b` through a two-fold: the future of `a` up to the singularity, then a past of `b` from there on. That
-/// two such points are joined by a trajectory in finite time is the paper's description of non-deterministic chaos
-/// (sec. 3, fig. 4). Events are those of the first part; the second part's pieces tell its modes.
+/// two such points are joined by a trajectory in finite time is what Jeffrey (2013, sec. 3) calls
+/// non-deterministic chaos. Events are those of the first part; the second part's pieces tell its modes.
 ///
 /// # Errors
 /// [`FilippovError::NoSuchExit`] if the future of `a` or the past of `b` comes to no two-fold within `longest`, or to different
