@@ -454,6 +454,6 @@ fn the_detector_detects() {
     assert!(library("use std::{fs, io};").names("std::fs"));
     // And the house itself is seen.
     assert!(sources().iter().any(|s| s.room == "job" && s.rooms().contains("integrate")));
-    assert!(sources().iter().any(|s| s.room == "bin" && s.rooms().contains("job")));
+    assert!(sources().iter().any(|s| s.room == "bin" && s.rooms().contains("cli")));
     assert!(sources().iter().any(|s| s.room == "figures" && s.rooms().contains("paper")));
 }
