@@ -52,7 +52,8 @@ fn run<F: VectorField<N>, M: Stepper<N>, const N: usize>(
 ) -> Result<(Statistics, u64), Failure> {
     let mut swings = Swings(0);
     let schedule = Schedule { restart_every: Some(100.0), kick: None };
-    let course = Course { t_end, schedule, step_cap: StepCap::FractionOfSegment(0.1), max_steps: 100_000_000 };
+    let course =
+        Course { t_end, schedule, step_cap: StepCap::FractionOfSegment(0.1), max_steps: 100_000_000, kicked_states: 3 };
     drive(field, start, &course, &mut stepper, &mut swings, &())
         .and_then(Summary::within_budget)
         .map(|s| (s.statistics, swings.0))

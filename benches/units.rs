@@ -27,12 +27,13 @@ fn field(set: &str) -> Field {
 }
 
 fn w1<M: Stepper<3>>(field: &Field, mut stepper: M) -> Done {
-    let mut section = SectionRecorder::new(1, 0.0);
+    let mut section = SectionRecorder::<3>::new(1, 0.0);
     let course = Course {
         t_end: 2e5,
         schedule: Schedule { restart_every: Some(100.0), kick: None },
         step_cap: StepCap::FractionOfSegment(0.1),
         max_steps: u64::MAX,
+        kicked_states: 3,
     };
     let end = drive(field, vector![0.2, 0.0, -1.0], &course, &mut stepper, &mut section, &())?;
     Ok((end.statistics.steps, section.crossings().len(), end.x))
@@ -40,8 +41,13 @@ fn w1<M: Stepper<3>>(field: &Field, mut stepper: M) -> Done {
 
 fn w2<M: Stepper<3>>(field: &Field, make: impl Fn() -> M) -> Done {
     let mut done = (0, 0, vector![0.0, 0.0, 0.0]);
-    let course =
-        Course { t_end: 2000.0, schedule: Schedule::default(), step_cap: StepCap::Absolute(10.0), max_steps: u64::MAX };
+    let course = Course {
+        t_end: 2000.0,
+        schedule: Schedule::default(),
+        step_cap: StepCap::Absolute(10.0),
+        max_steps: u64::MAX,
+        kicked_states: 3,
+    };
     for k in 0..1000 {
         let x = 0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0;
         let end = drive(field, vector![x, 0.0, -1.0], &course, &mut make(), &mut Ignore, &())?;

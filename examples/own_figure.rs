@@ -15,9 +15,9 @@ pub fn figure() -> Figure {
     // Everything that a panel depends on stands in its run.
     let panel = |label, eps: f64| {
         let run = RunSpec {
-            system: SystemSpec::Caricature(Reading::Reconstructed.caricature()),
+            system: Reading::Reconstructed.caricature().into(),
             switch: SwitchSpec::tanh(eps),
-            start: [0.2, 0.0, -1.0],
+            start: vec![0.2, 0.0, -1.0],
             t_end: 500.0,
             method: MethodSpec::ndsolve_defaults(Method::Dopri5),
             schedule: Schedule { restart_every: Some(100.0), kick: None },

@@ -105,7 +105,7 @@ impl VectorField<2> for Pendulum {
 
 /// When the pendulum passes its lowest point.
 fn passages<M: Stepper<2>>(mut method: M) -> Result<Vec<f64>, Failure> {
-    let mut section = SectionRecorder::new(0, 0.0);
+    let mut section = SectionRecorder::<2>::new(0, 0.0);
     let _ = drive(&Pendulum, vector![1.0, 0.0], &Course::to(30.0), &mut method, &mut section, &())?;
     Ok(section.into_crossings().iter().map(|c| c.t).collect())
 }

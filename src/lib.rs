@@ -41,9 +41,9 @@
 //! use twofold::job::{simulate::simulate, spec::*};
 //! use twofold::paper::Reading;
 //! let run = RunSpec {
-//!     system: SystemSpec::Caricature(Reading::Reconstructed.caricature()),
+//!     system: Reading::Reconstructed.caricature().into(),
 //!     switch: SwitchSpec::tanh(1e-3),
-//!     start: [0.2, 0.0, -1.0],
+//!     start: vec![0.2, 0.0, -1.0],
 //!     t_end: 20.0,
 //!     method: MethodSpec::ndsolve_defaults(Method::Dopri5),
 //!     schedule: Default::default(),

@@ -59,11 +59,12 @@ struct Section {
     value: f64,
     shown: [usize; 2],
     points: Vec<SectionPoint>,
+    passages: roots::Passages,
 }
 
 impl<const N: usize> Observer<N> for Section {
     fn step(&mut self, step: &Step<'_, N>) -> Flow {
-        for theta in roots::sign_changes(step, |x| x[self.axis] - self.value) {
+        for roots::Passage { theta, .. } in self.passages.through_plane(step, self.axis, self.value) {
             let x = step.at(theta);
             let upward = step.x1[self.axis] > step.x0[self.axis];
             self.points.push(SectionPoint { t: step.time(theta), u: self.shown.map(|k| x[k]), upward });
@@ -93,7 +94,7 @@ fn section_to<const N: usize, F: VectorField<N>>(
     shown: [usize; 2],
 ) -> Vec<SectionPoint> {
     let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
-    let mut seen = Section { axis, value, shown, points: Vec::new() };
+    let mut seen = Section { axis, value, shown, points: Vec::new(), passages: roots::Passages::default() };
     let mut stepper = Dopri5::new(tolerance);
     let course = Course { step_cap: StepCap::Absolute(0.5), ..Course::to(t_end) };
     let end = drive(field, x0, &course, &mut stepper, &mut seen, &()).unwrap();

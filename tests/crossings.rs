@@ -32,9 +32,9 @@ fn reference(text: &str) -> Vec<Reference> {
 
 fn run(alpha: f64, method: Method, tolerance: f64, t_end: f64) -> Vec<twofold::analyse::Crossing> {
     let spec = RunSpec {
-        system: SystemSpec::Caricature(Caricature::with_reinjection(alpha, 1e-5)),
+        system: Caricature::with_reinjection(alpha, 1e-5).into(),
         switch: SwitchSpec::tanh(1e-3),
-        start: [0.2, 0.0, -1.0],
+        start: vec![0.2, 0.0, -1.0],
         t_end,
         method: MethodSpec {
             name: method,

@@ -8,8 +8,18 @@ use twofold::integrate::filippov::{
     history, run, run_watched,
 };
 use twofold::integrate::{StopReason, Tolerance, Watch};
-use twofold::system::filippov::Visibility;
-use twofold::system::{Caricature, Feedback, PiecewiseSmooth, Relay, StickSlip, TwoFoldNormalForm, Wheel};
+use twofold::system::{Bound, Caricature, PiecewiseSmooth, System, Wheel};
+
+/// A built-in system with these parameters.
+fn builtin<const N: usize>(name: &str, parameters: &[(&str, f64)]) -> Bound<N> {
+    let values = parameters.iter().map(|(name, value)| (*name, (*value).into()));
+    System::builtin(name).unwrap().with_all(values).unwrap().bind().unwrap()
+}
+
+/// The two-fold normal form (4), invisible from both sides.
+fn invisible(v: f64, w: f64) -> Bound<3> {
+    builtin("two-fold", &[("v", v), ("w", w)])
+}
 
 const STAY: ExitRule = ExitRule::AfterTime { time: 1e9, side: Side::Plus };
 
@@ -42,7 +52,7 @@ fn wrong_side<P: PiecewiseSmooth<N>, const N: usize>(system: &P, run: &Trajector
 #[test]
 fn sliding_time_to_the_two_fold_of_the_normal_form() {
     // dt/ds = y + z, (y, z)' = A (y, z): T = -(1, 1) A^-1 (y, z) with A = [[w, 1], [1, v]].
-    let n = TwoFoldNormalForm::invisible(-1.2, -1.4);
+    let n = invisible(-1.2, -1.4);
     for (y, z) in [(0.3, 0.8), (1.0, 0.05), (0.02, 0.5), (3.0, 4.0)] {
         let det = 1.2 * 1.4 - 1.0;
         let exact = -((-1.2 * y - z) + (-y - 1.4 * z)) / det;
@@ -59,7 +69,7 @@ fn sliding_time_to_the_two_fold_of_the_normal_form() {
 fn crossing_return_map_of_the_normal_form() {
     // f+ from (0, y, z), y < 0: x = -y t - t²/2, back at t = 2|y| at (0, |y|, z + 2 v |y|); f- likewise with w.
     let (v, w) = (-1.2, -1.4);
-    let n = TwoFoldNormalForm::invisible(v, w);
+    let n = invisible(v, w);
     let mut out = Trajectory::new(1);
     let end = run(&n, vector![0.0, -1.0, 0.4], 20.0, &Settings::default(), STAY, &mut out).unwrap();
     assert!(end.events > 3);
@@ -75,9 +85,9 @@ fn crossing_return_map_of_the_normal_form() {
     }
 }
 
-fn visible_pair(plus: bool, minus: bool) -> TwoFoldNormalForm {
-    let of = |visible| if visible { Visibility::Visible } else { Visibility::Invisible };
-    TwoFoldNormalForm { plus: of(plus), minus: of(minus), v: 0.0, w: 0.0 }
+fn visible_pair(plus: bool, minus: bool) -> Bound<3> {
+    let sign = |visible| if visible { -1.0 } else { 1.0 };
+    builtin("two-fold", &[("plus_fold", sign(plus)), ("minus_fold", sign(minus)), ("v", 0.0), ("w", 0.0)])
 }
 
 fn close<const N: usize>(a: SVector<f64, N>, b: SVector<f64, N>, tolerance: f64) {
@@ -311,7 +321,7 @@ fn grazing_and_its_neighbours() {
 
 #[test]
 fn rules_do_what_they_say() {
-    let n = TwoFoldNormalForm::invisible(-1.2, -1.4);
+    let n = invisible(-1.2, -1.4);
     // The sliding speed on the weak eigenvector (1, w') of eq. (4): |(z + w y, y + v z)|/(y + z).
     let mu = -1.3 + 1.01_f64.sqrt();
     let (y, z) = (1.0, mu + 1.4);
@@ -352,7 +362,7 @@ fn rules_do_what_they_say() {
 
 #[test]
 fn bad_rules_are_named() {
-    let n = TwoFoldNormalForm::invisible(-1.2, -1.4);
+    let n = invisible(-1.2, -1.4);
     let mut out = Trajectory::new(1);
     let rule = ExitRule::AfterTime { time: -1.0, side: Side::Plus };
     let error = run(&n, vector![0.0, 0.3, 0.5], 1.0, &Settings::default(), rule, &mut out).unwrap_err();
@@ -365,15 +375,15 @@ fn bad_rules_are_named() {
 #[test]
 fn stick_slip_limit_cycle() {
     // Slip from (friction, belt): xi'' = weakening xi' - xi with xi = x - friction + weakening belt, until v = belt again.
-    let s = StickSlip { belt: 0.3, friction: 1.0, weakening: 0.2 };
-    let (k, b) = (s.weakening, s.belt);
+    let (b, friction, k) = (0.3, 1.0, 0.2);
+    let s = builtin::<2>("stick-slip", &[("belt", b), ("friction", friction), ("weakening", k)]);
     let omega = (1.0 - 0.25 * k * k).sqrt();
     let (a1, a2) = (k * b, (b - 0.5 * k * k * b) / omega);
     let slip = |t: f64| {
         let (sin, cos, grow) = ((omega * t).sin(), (omega * t).cos(), (0.5 * k * t).exp());
         let xi = grow * (a1 * cos + a2 * sin);
         let v = 0.5 * k * xi + grow * omega * (a2 * cos - a1 * sin);
-        (xi + s.friction - k * b, v)
+        (xi + friction - k * b, v)
     };
     // v - belt is negative during the slip and comes back through zero once before a full turn.
     let (mut low, mut high) = (3.0, 2.0 * std::f64::consts::PI / omega);
@@ -382,7 +392,7 @@ fn stick_slip_limit_cycle() {
         if slip(middle).1 < b { low = middle } else { high = middle }
     }
     let (x_land, _) = slip(low);
-    let period = low + (s.friction - x_land) / b;
+    let period = low + (friction - x_land) / b;
 
     let mut out = Trajectory::new(4);
     let _ = run(&s, vector![0.0, 0.0], 60.0, &Settings::default(), STAY, &mut out).unwrap();
@@ -391,7 +401,7 @@ fn stick_slip_limit_cycle() {
     assert!(slips.len() >= 4);
     for pair in slips.windows(2) {
         assert!((pair[1].t - pair[0].t - period).abs() < 1e-10, "{} {period}", pair[1].t - pair[0].t);
-        close(pair[1].state, vector![s.friction, b], 1e-11);
+        close(pair[1].state, vector![friction, b], 1e-11);
     }
     assert!((lands.last().unwrap().state[0] - x_land).abs() < 1e-10);
     assert!(drift(&s, &out) <= 1e-12 && wrong_side(&s, &out) <= 1e-12);
@@ -399,7 +409,7 @@ fn stick_slip_limit_cycle() {
 
 #[test]
 fn relay_with_linear_feedback_slides_exponentially() {
-    let r = Relay { feedback: Feedback::Linear { gain: 1.0 } };
+    let r = builtin::<2>("relay-linear", &[("gain", 1.0)]);
     let mut out = Trajectory::new(4);
     let end = run(&r, vector![0.5, 0.0], 8.0, &Settings::default(), STAY, &mut out).unwrap();
     // x = 1/2 - t²/2, v = -t: lands at t² + 2 t = 1; |v| < 1, so it slides with x' = -x.
@@ -415,7 +425,7 @@ fn relay_with_linear_feedback_slides_exponentially() {
 #[test]
 fn relay_with_parabolic_feedback() {
     // Gain 2: lands at t = (4/3)^1/2 with v = -t, slides with v' = 1/2.
-    let slow = Relay { feedback: Feedback::Parabolic { gain: 2.0 } };
+    let slow = builtin::<2>("relay-parabolic", &[("gain", 2.0)]);
     let t1 = (4.0_f64 / 3.0).sqrt();
     let mut out = Trajectory::new(4);
     let end = run(&slow, vector![2.0, 0.0], t1 + 1.5, &Settings::default(), STAY, &mut out).unwrap();
@@ -427,7 +437,7 @@ fn relay_with_parabolic_feedback() {
     assert!(matches!(error, FilippovError::NonTransversal { t, .. } if (t - 3.0 * t1).abs() < 1e-6), "{error}");
 
     // Gain 1/2: flights accumulate at t1 + t1 (1 + r)/(1 - r), r² = (1 - k)/(1 + k), t1² = 4/(1 + k).
-    let fast = Relay { feedback: Feedback::Parabolic { gain: 0.5 } };
+    let fast = builtin::<2>("relay-parabolic", &[("gain", 0.5)]);
     let (t1, r) = ((4.0_f64 / 1.5).sqrt(), (0.5_f64 / 1.5).sqrt());
     let exact = t1 * (1.0 + (1.0 + r) / (1.0 - r));
     let error = run(&fast, vector![2.0, 0.0], 100.0, &Settings::default(), STAY, &mut Trajectory::new(1)).unwrap_err();
@@ -435,7 +445,7 @@ fn relay_with_parabolic_feedback() {
     assert!((accumulates - exact).abs() < 1e-8, "{accumulates} {exact}");
 
     // Gain 1, time-optimal: the switching curve is an orbit of f-, a fold at every point.
-    let optimal = Relay { feedback: Feedback::Parabolic { gain: 1.0 } };
+    let optimal = builtin::<2>("relay-parabolic", &[("gain", 1.0)]);
     let error = run(&optimal, vector![2.0, 0.0], 9.0, &Settings::default(), STAY, &mut Trajectory::new(1)).unwrap_err();
     assert!(matches!(error, FilippovError::NonTransversal { t, .. } if (t - 2.0_f64.sqrt()).abs() < 1e-9), "{error}");
 }
@@ -475,7 +485,7 @@ fn a_step_cap_changes_no_event() {
         let _ = run(system, start, t_end, &settings, ExitRule::All, &mut out).unwrap();
         out.events.iter().map(|e| (format!("{:?}", e.kind).chars().take(12).collect(), e.t)).collect()
     }
-    let (w, n) = (Wheel::default(), TwoFoldNormalForm::invisible(-0.5, -0.5));
+    let (w, n) = (Wheel::default(), invisible(-0.5, -0.5));
     for (coarse, fine) in
         [(kinds(&w, f64::INFINITY, 3.0), kinds(&w, 1e-3, 3.0)), (kinds(&n, f64::INFINITY, 9.0), kinds(&n, 1e-3, 9.0))]
     {
@@ -590,7 +600,7 @@ fn tolerance_buys_accuracy() {
 #[test]
 fn every_point_of_the_repelling_region_has_a_past_at_the_two_fold() {
     // Normal form: int dt = (1, 1) A^-1 (y, z) is also the time since the two-fold in the repelling region.
-    let n = TwoFoldNormalForm::invisible(-1.2, -1.4);
+    let n = invisible(-1.2, -1.4);
     for (y, z) in [(-0.3, -0.8), (-1.0, -0.05), (-0.4, -0.4)] {
         let exact = -((1.2 * y + z) + (y + 1.4 * z)) / (1.2 * 1.4 - 1.0);
         let past = history(&n, vector![0.0, y, z], 100.0, &Settings::default(), 4).unwrap();
@@ -652,15 +662,15 @@ fn reference(name: &str, rows: usize) -> Vec<[f64; 3]> {
 fn the_smoothed_reference_lies_within_eps() {
     // Before the first visit the smoothed orbit with eps = 1e-3 is O(eps) from the Filippov orbit.
     use twofold::integrate::filippov::AllModes;
-    use twofold::integrate::roots::sign_changes;
+    use twofold::integrate::roots::Passages;
     use twofold::integrate::{Flow, Observer, Step};
     #[derive(Default)]
-    struct Section(Vec<[f64; 3]>);
+    struct Section(Vec<[f64; 3]>, Passages);
     impl Observer<3> for Section {
         fn step(&mut self, step: &Step<'_, 3>) -> Flow {
-            for theta in sign_changes(step, |x| x[1]) {
-                let x = step.at(theta);
-                self.0.push([step.time(theta), x[0], x[2]]);
+            for passage in self.1.through_plane(step, 1, 0.0) {
+                let x = step.at(passage.theta);
+                self.0.push([step.time(passage.theta), x[0], x[2]]);
             }
             Flow::Continue
         }
@@ -709,7 +719,7 @@ fn a_run_that_is_cut_short_says_why() {
             false
         }
     }
-    let n = TwoFoldNormalForm::invisible(-1.2, -1.4);
+    let n = invisible(-1.2, -1.4);
     let start = vector![0.0, 0.3, 0.8];
     let mut out = Trajectory::new(1);
     let few = Settings { max_steps: 3, ..Settings::default() };
@@ -733,7 +743,7 @@ fn a_run_that_is_cut_short_says_why() {
 #[test]
 fn a_funnel_counts_the_work_of_its_approach() {
     use twofold::job::simulate::simulate;
-    use twofold::job::spec::{FunnelSpec, Method, MethodSpec, Observation, RunSpec, SwitchSpec, SystemSpec};
+    use twofold::job::spec::{FunnelSpec, Method, MethodSpec, Observation, RunSpec, SwitchSpec};
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     let (start, settings) = (vector![0.2, 0.0, -1.0], Settings { max_step: 5.0, ..Settings::default() });
     let grid = FunnelGrid { shortest: 0.1, longest: 1.0, times: 2, horizon: 5.0, until_two_fold: true, per_step: 1 };
@@ -745,9 +755,9 @@ fn a_funnel_counts_the_work_of_its_approach() {
     let FunnelGrid { shortest, longest, times, horizon, until_two_fold, .. } = grid;
     let funnel = Some(FunnelSpec { shortest, longest, times, horizon, until_two_fold });
     let spec = RunSpec {
-        system: SystemSpec::Caricature(c),
+        system: c.into(),
         switch: SwitchSpec::Filippov { exit: ExitRule::All, funnel },
-        start: start.into(),
+        start: start.as_slice().to_vec(),
         t_end: 50.0,
         method: MethodSpec { tolerance: settings.tolerance, ..MethodSpec::ndsolve_defaults(Method::Dopri5) },
         schedule: Default::default(),

@@ -13,9 +13,9 @@ fn run(sign: MinusSign, t_end: f64) -> ([f64; 3], usize) {
     let mut system = Reading::Printed.caricature();
     system.first_component_of_minus = sign;
     let spec = RunSpec {
-        system: SystemSpec::Caricature(system),
+        system: system.into(),
         switch: SwitchSpec::tanh(1e-3),
-        start: [0.2, 0.0, -1.0],
+        start: vec![0.2, 0.0, -1.0],
         t_end,
         method: MethodSpec {
             name: Method::Lsoda,

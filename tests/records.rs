@@ -216,6 +216,7 @@ fn orbit<F: VectorField<N>, M: Stepper<N>, const N: usize>(
         schedule: Schedule { restart_every: Some(20.0), kick: None },
         step_cap: StepCap::FractionOfSegment(0.1),
         max_steps: 10_000_000,
+        kicked_states: 3,
     };
     let mut steps = Steps::default();
     let _ = drive(field, SVector::from(x0), &course, &mut stepper, &mut steps, &()).unwrap();
@@ -359,7 +360,13 @@ fn eight_states_and_more() {
     let field = Field::smoothed(&system, Transition::Tanh, 1e-2).bind::<8>().unwrap();
     let x0 = SVector::<f64, 8>::from_fn(|i, _| 0.1 * i as f64);
     let mut steps = Steps::default();
-    let course = Course { t_end: 20.0, schedule: Schedule::default(), step_cap: StepCap::None, max_steps: 1_000_000 };
+    let course = Course {
+        t_end: 20.0,
+        schedule: Schedule::default(),
+        step_cap: StepCap::None,
+        max_steps: 1_000_000,
+        kicked_states: 8,
+    };
     let end = drive(&field, x0, &course, &mut Dopri5::new(TIGHT), &mut steps, &()).unwrap();
     assert!(end.x.iter().all(|x| x.abs() < 10.0));
     // Sixteen states and a tangent vector, evaluated without a dimension at compile time.

@@ -13,9 +13,9 @@ fn returns_to_the_singularity_and_stays_bounded() {
     let wheel = Wheel::default();
     let fold = two_fold(&wheel, &nalgebra::vector![0.69, -0.57, -0.87]).unwrap().point;
     let spec = RunSpec {
-        system: SystemSpec::Wheel(wheel),
+        system: wheel.into(),
         switch: SwitchSpec::tanh(1e-3),
-        start: [0.69267, 0.0, 0.0],
+        start: vec![0.69267, 0.0, 0.0],
         t_end: 230.0,
         method: MethodSpec {
             name: Method::Dopri5,

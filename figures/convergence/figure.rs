@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use twofold::analyse::limit::{AfterVisitQuestion, ConvergenceQuestion, observed_rate};
 use twofold::integrate::filippov::{FunnelGrid, Settings};
-use twofold::job::spec::SystemSpec;
 use twofold::job::table::{Entry, Table};
 use twofold::job::{AfterVisit, AnyQuestion, SmoothingLimit};
 use twofold::paper::wording::number;
 use twofold::paper::{Figure, Reading, Study};
 use twofold::render::sheet::*;
 use twofold::render::style;
+use twofold::system::System;
 
 /// The start of the paper's runs.
 const START: [f64; 3] = [0.2, 0.0, -1.0];
@@ -70,9 +70,9 @@ fn after_question() -> AfterVisitQuestion {
 
 /// What the figure asks: before the visit, after it.
 fn questions(reading: Reading) -> Vec<AnyQuestion> {
-    let system = SystemSpec::Caricature(reading.caricature());
+    let system = System::from(reading.caricature());
     vec![
-        Arc::new(SmoothingLimit { system, compared: before_question(reading) }),
+        Arc::new(SmoothingLimit { system: system.clone(), compared: before_question(reading) }),
         Arc::new(AfterVisit { system, compared: after_question() }),
     ]
 }

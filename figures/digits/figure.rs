@@ -9,7 +9,7 @@ use twofold::analyse::digits::{Contender, DigitsQuestion};
 use twofold::analyse::growth::GrowthQuestion;
 use twofold::analyse::reference::Plane;
 use twofold::integrate::StepCap;
-use twofold::job::spec::{Method, SystemSpec};
+use twofold::job::spec::Method;
 use twofold::job::table::{Entry, Table};
 use twofold::job::{Answer, AnyQuestion, DisturbanceGrowth, MethodDigits};
 use twofold::num::elementary::{exp10, log10};
@@ -18,6 +18,7 @@ use twofold::paper::wording::number;
 use twofold::paper::{Figure, Reading, Study};
 use twofold::render::sheet::*;
 use twofold::render::style;
+use twofold::system::System;
 
 /// The start of the paper's runs.
 const START: [f64; 3] = [0.2, 0.0, -1.0];
@@ -94,10 +95,10 @@ fn growth_question() -> GrowthQuestion {
 
 /// What the figure asks: the digits first, then the growth for each eps.
 fn questions(reading: Reading) -> Vec<AnyQuestion> {
-    let system = SystemSpec::Caricature(reading.caricature());
-    let mut all: Vec<AnyQuestion> = vec![Arc::new(MethodDigits { system, eps: EPS, compared: digits_question() })];
+    let system = System::from(reading.caricature());
+    let mut all: Vec<AnyQuestion> = vec![Arc::new(MethodDigits { system: system.clone(), eps: EPS, compared: digits_question() })];
     for &eps in ladder(reading) {
-        all.push(Arc::new(DisturbanceGrowth { system, eps, disturbances: growth_question() }));
+        all.push(Arc::new(DisturbanceGrowth { system: system.clone(), eps, disturbances: growth_question() }));
     }
     all
 }

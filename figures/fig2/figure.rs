@@ -24,9 +24,9 @@ pub fn figure() -> Figure {
                 "i",
                 "",
                 RunSpec {
-                    system: SystemSpec::Wheel(Wheel::default()),
+                    system: Wheel::default().into(),
                     switch: SwitchSpec::tanh(1e-3),
-                    start: [0.69267, 0.0, 0.0],
+                    start: vec![0.69267, 0.0, 0.0],
                     t_end: 60.0,
                     method: MethodSpec {
                         name: Method::Dopri5,

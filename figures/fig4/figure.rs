@@ -27,12 +27,12 @@ pub fn figure() -> Figure {
                 "i",
                 "",
                 RunSpec {
-                    system: SystemSpec::Caricature(reading.caricature()),
+                    system: reading.caricature().into(),
                     switch: SwitchSpec::Filippov {
                         exit: ExitRule::All,
                         funnel: Some(FunnelSpec { shortest: 0.1, longest, times: 5, horizon, until_two_fold: true }),
                     },
-                    start: [0.2, 0.0, -1.0],
+                    start: vec![0.2, 0.0, -1.0],
                     t_end: 100.0,
                     method: MethodSpec {
                         name: Method::Dopri5,

@@ -27,7 +27,7 @@ pub fn figure() -> Figure {
                 "i",
                 "",
                 RunSpec {
-                    system: SystemSpec::Caricature(reading.caricature()),
+                    system: reading.caricature().into(),
                     switch: SwitchSpec::Filippov {
                         exit: ExitRule::Random {
                             law: SlidingLaw::Exponential { mean },
@@ -37,7 +37,7 @@ pub fn figure() -> Figure {
                         },
                         funnel: None,
                     },
-                    start: [0.2, 0.0, -1.0],
+                    start: vec![0.2, 0.0, -1.0],
                     t_end,
                     method: MethodSpec {
                         name: Method::Dopri5,

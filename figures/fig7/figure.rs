@@ -22,9 +22,9 @@ pub fn figure() -> Figure {
                     label,
                     format!("interval {interval}"),
                     RunSpec {
-                        system: SystemSpec::Caricature(reading.caricature()),
+                        system: reading.caricature().into(),
                         switch: SwitchSpec::tanh(1e-3),
-                        start: [0.2, 0.0, -1.0],
+                        start: vec![0.2, 0.0, -1.0],
                         t_end: 2e5,
                         method: MethodSpec::ndsolve_defaults(Method::Lsoda),
                         schedule: Schedule { restart_every: Some(interval), kick: None },

@@ -23,9 +23,9 @@ pub fn figure() -> Figure {
                     label,
                     format!("*σ* = {sigma}"),
                     RunSpec {
-                        system: SystemSpec::Caricature(reading.caricature()),
+                        system: reading.caricature().into(),
                         switch: SwitchSpec::Smoothed { eps: 1e-3, transition: Transition::PerturbedTanh { sigma } },
-                        start: [0.2, 0.0, -1.0],
+                        start: vec![0.2, 0.0, -1.0],
                         t_end: 2e5,
                         method: MethodSpec::ndsolve_defaults(Method::Lsoda),
                         schedule: Schedule { restart_every: Some(100.0), kick: None },

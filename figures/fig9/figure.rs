@@ -27,9 +27,9 @@ pub fn figure() -> Figure {
                     label,
                     title,
                     RunSpec {
-                        system: SystemSpec::Caricature(reading.caricature()),
+                        system: reading.caricature().into(),
                         switch,
-                        start: [0.2, 0.0, -1.0],
+                        start: vec![0.2, 0.0, -1.0],
                         t_end: 2e5,
                         method: MethodSpec::ndsolve_defaults(Method::Lsoda),
                         schedule: Schedule { restart_every: Some(100.0), kick },

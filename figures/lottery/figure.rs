@@ -27,9 +27,9 @@ pub fn figure() -> Figure {
                     ("iii", 100.0, SectionClaim::Chaos),
                 ] {
                     let run = RunSpec {
-                        system: SystemSpec::Caricature(reading.caricature()),
+                        system: reading.caricature().into(),
                         switch: SwitchSpec::tanh(1e-3),
-                        start: [0.2, 0.0, -1.0],
+                        start: vec![0.2, 0.0, -1.0],
                         t_end: 2e5,
                         method: MethodSpec::ndsolve_defaults(method),
                         schedule: Schedule { restart_every: Some(interval), kick: None },

@@ -9,7 +9,8 @@ use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 use super::tangent::Tangent;
-use crate::integrate::{Dopri5, Failure, Stepper, Tolerance, roots};
+use crate::integrate::roots::{self, Passages};
+use crate::integrate::{Dopri5, Failure, Stepper, Tolerance};
 use crate::num::elementary::{ln, sqrt};
 use crate::num::linear::solve;
 use crate::system::VectorField;
@@ -191,18 +192,17 @@ where
         SVector::<f64, M>::from_fn(|i, _| if i < N { u[i] } else { f64::from(u8::from((i - N) / N == (i - N) % N)) });
     let mut t = 0.0;
     let (mut same, mut opposite) = (Vec::new(), Vec::new());
+    let mut passages = Passages::default();
     stepper.restart(&tangent, t, state, settings.longest_return, settings.max_step)?;
     while t < settings.longest_return {
         let step = stepper.step(&tangent)?;
         let (t0, state0) = (step.t0, step.x0);
-        let crossings = roots::sign_changes(&step, |s| s[plane.axis] - plane.value);
-        let times: Vec<(f64, SVector<f64, M>)> =
-            crossings.iter().map(|theta| (step.time(*theta), step.at(*theta))).collect();
+        let found = passages.through_plane(&step, plane.axis, plane.value);
+        let found: Vec<_> = found.iter().map(|p| (step.time(p.theta), step.at(p.theta), p.upward)).collect();
         (t, state) = (step.t1, step.x1);
-        for (tc, at) in times {
-            let speed = tangent.eval(&at)[plane.axis];
+        for (tc, at, upward) in found {
             let x: Vec<f64> = at.iter().take(N).copied().collect();
-            if (speed > 0.0) != plane.upward {
+            if upward != plane.upward {
                 opposite.push(x);
                 continue;
             }

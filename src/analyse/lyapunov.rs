@@ -73,6 +73,9 @@ const FEWEST_BLOCKS: usize = 8;
 const RANGE: f64 = 100.0;
 
 /// The largest Lyapunov exponent of the orbit of `field` from `x0`, `M` being 2 `N`: `largest::<3, 6, _>(...)`.
+///
+/// # Errors
+/// If the orbit cannot be followed.
 pub fn largest<const N: usize, const M: usize, F>(
     field: &F,
     x0: SVector<f64, N>,
@@ -82,10 +85,23 @@ where
     F: VectorField<N>,
     for<'a> Tangent<'a, F, 1>: VectorField<M>,
 {
+    largest_along(&Tangent::<F, 1>(field), x0, N.min(3), settings)
+}
+
+/// The same for an equation that comes with its variational equation for one vector: `tangent` is (x, v)' in `M` = 2 `N` dimensions.
+/// Kicks perturb the first `kicked_states` components.
+///
+/// # Errors
+/// If the orbit cannot be followed.
+pub fn largest_along<const N: usize, const M: usize, T: VectorField<M>>(
+    tangent: &T,
+    x0: SVector<f64, N>,
+    kicked_states: usize,
+    settings: &Settings,
+) -> Result<Exponent, Failure> {
     const { assert!(M == 2 * N) };
-    let tangent = Tangent::<F, 1>(field);
     let mut stepper = Dopri5::<M>::new(settings.tolerance);
-    let mut kicker = settings.kick.map(Kicker::new);
+    let mut kicker = settings.kick.map(|kick| Kicker::new(kick, kicked_states));
     let mut kicks = 1_u64;
     // A start with no preferred direction; almost every vector turns into the fastest one.
     let mut state = SVector::<f64, M>::from_fn(|i, _| if i < N { x0[i] } else { 1.0 / sqrt(N as f64) });
@@ -99,10 +115,10 @@ where
             let kick_at = settings.kick.map_or(f64::INFINITY, |k| k.every * kicks as f64);
             let stop = end.min(kick_at);
             if stop > t {
-                stepper.restart(&tangent, t, state, stop, settings.max_step)?;
+                stepper.restart(tangent, t, state, stop, settings.max_step)?;
             }
             while t < stop {
-                let step = stepper.step(&tangent)?;
+                let step = stepper.step(tangent)?;
                 (t, state) = (step.t1, step.x1);
                 let size = length::<N, M>(&state);
                 if !(1.0 / RANGE..=RANGE).contains(&size) {
@@ -111,7 +127,7 @@ where
                         *v /= size;
                     }
                     if t < stop {
-                        stepper.restart(&tangent, t, state, stop, settings.max_step)?;
+                        stepper.restart(tangent, t, state, stop, settings.max_step)?;
                     }
                 }
                 if stepper.statistics().steps >= settings.max_steps {

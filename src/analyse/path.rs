@@ -4,27 +4,27 @@ use nalgebra::SVector;
 
 use crate::integrate::{Flow, Observer, Step};
 
-/// A point of a path: time and the first three components of the state.
+/// A point of a path: time and the state of a system with `D` states.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
+pub struct Sample<const D: usize = 3> {
     /// Time.
     pub t: f64,
-    /// State (first three components; the hysteretic phi is not part of the picture).
-    pub x: [f64; 3],
+    /// State; the hysteretic phi is not part of it.
+    pub x: [f64; D],
 }
 
 /// Records a path: every accepted step's ends, and between them as many points of the interpolant as it takes for the
-/// polyline to stay within `chord` of it.
+/// polyline to stay within `chord` of it. Of a state with more components, the first `D` are kept and looked at.
 #[derive(Clone, Debug)]
-pub struct PathRecorder {
+pub struct PathRecorder<const D: usize = 3> {
     chord: f64,
-    samples: Vec<Sample>,
+    samples: Vec<Sample<D>>,
 }
 
 /// Halvings of one step: a bound against wild interpolants, far above what a tolerance of 1e-4 asks for.
 const MOST_HALVINGS: u32 = 10;
 
-impl PathRecorder {
+impl<const D: usize> PathRecorder<D> {
     /// A recorder that starts at `x0`; `chord` is the largest distance between polyline and interpolant, in the
     /// state's units.
     pub fn new<const N: usize>(x0: &SVector<f64, N>, chord: f64) -> Self {
@@ -33,22 +33,22 @@ impl PathRecorder {
 
     /// A recorder that starts at time `t`.
     pub fn starting<const N: usize>(t: f64, x: &SVector<f64, N>, chord: f64) -> Self {
-        Self { chord, samples: vec![Sample { t, x: first_three(x) }] }
+        Self { chord, samples: vec![Sample { t, x: leading(x) }] }
     }
 
     /// The path.
-    pub fn into_samples(self) -> Vec<Sample> {
+    pub fn into_samples(self) -> Vec<Sample<D>> {
         self.samples
     }
 
     /// Adds interior points of `step` between the fractions `a` and `b` where the chord misses the curve.
-    fn refine<const N: usize>(&mut self, step: &Step<'_, N>, a: (f64, [f64; 3]), b: (f64, [f64; 3]), halvings: u32) {
+    fn refine<const N: usize>(&mut self, step: &Step<'_, N>, a: (f64, [f64; D]), b: (f64, [f64; D]), halvings: u32) {
         if halvings == 0 {
             return;
         }
         let middle = 0.5 * (a.0 + b.0);
-        let x = first_three(&step.at(middle));
-        let gap = (0..3).map(|i| (x[i] - 0.5 * (a.1[i] + b.1[i])).abs()).fold(0.0, f64::max);
+        let x = leading(&step.at(middle));
+        let gap = (0..D).map(|i| (x[i] - 0.5 * (a.1[i] + b.1[i])).abs()).fold(0.0, f64::max);
         if gap > self.chord {
             self.refine(step, a, (middle, x), halvings - 1);
             self.samples.push(Sample { t: step.time(middle), x });
@@ -57,14 +57,14 @@ impl PathRecorder {
     }
 }
 
-impl<const N: usize> Observer<N> for PathRecorder {
+impl<const N: usize, const D: usize> Observer<N> for PathRecorder<D> {
     fn step(&mut self, step: &Step<'_, N>) -> Flow {
         // Thirds first: one midpoint test would accept an S-shaped step whose middle lies on the chord.
-        let knots = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(|s| (s, first_three(&step.at(s))));
+        let knots = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(|s| (s, leading(&step.at(s))));
         let (start, end) = (knots[0].1, knots[3].1);
         let straight = knots[1..3]
             .iter()
-            .all(|(s, x)| (0..3).all(|i| (x[i] - (start[i] + s * (end[i] - start[i]))).abs() <= self.chord));
+            .all(|(s, x)| (0..D).all(|i| (x[i] - (start[i] + s * (end[i] - start[i]))).abs() <= self.chord));
         if !straight {
             for pair in knots.windows(2) {
                 self.refine(step, pair[0], pair[1], MOST_HALVINGS);
@@ -78,12 +78,12 @@ impl<const N: usize> Observer<N> for PathRecorder {
     }
 
     fn kick(&mut self, t: f64, _before: &SVector<f64, N>, after: &SVector<f64, N>) {
-        self.samples.push(Sample { t, x: first_three(after) });
+        self.samples.push(Sample { t, x: leading(after) });
     }
 }
 
-/// The first three components; missing ones (a planar system) are zero.
-pub(crate) fn first_three<const N: usize>(x: &SVector<f64, N>) -> [f64; 3] {
+/// The first `D` components; missing ones are zero.
+pub(crate) fn leading<const N: usize, const D: usize>(x: &SVector<f64, N>) -> [f64; D] {
     std::array::from_fn(|i| if i < N { x[i] } else { 0.0 })
 }
 
@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn polyline_stays_near_the_curve() {
         let step = Step { t0: 0.0, t1: 1.0, x0: HalfCircle.at(0.0), x1: HalfCircle.at(1.0), interpolant: &HalfCircle };
-        let mut r = PathRecorder::new(&step.x0, 1e-3);
+        let mut r = PathRecorder::<3>::new(&step.x0, 1e-3);
         r.step(&step);
         let samples = r.into_samples();
         assert!(samples.windows(2).all(|w| w[0].t < w[1].t));

@@ -4,7 +4,7 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use super::section::Direction;
-use crate::integrate::{Failure, Statistics, Stepper, StopReason, Taylor, Tolerance, roots::sign_changes};
+use crate::integrate::{Failure, Statistics, Stepper, StopReason, Taylor, Tolerance, roots::Passages};
 use crate::num::Arithmetic;
 use crate::num::{DoubleDouble, Elementary, Scalar};
 use crate::system::{PiecewiseSmooth, VectorField};
@@ -96,8 +96,9 @@ pub fn reference<F: VectorField<N>, const N: usize>(
     }
     stepper.restart_from(field, DoubleDouble::zero(), x0, t_end, f64::INFINITY)?;
     let mut found = Vec::new();
+    let mut passages = Passages::default();
     while found.len() < count && stepper.state().0.to_f64() < t_end {
-        next_crossings(&mut stepper, field, &surface, |crossing| found.push(crossing))?;
+        next_crossings(&mut stepper, field, &surface, &mut passages, |crossing| found.push(crossing))?;
     }
     let stop = if found.len() >= count { StopReason::Observer } else { StopReason::EndTime };
     found.truncate(count);
@@ -119,8 +120,9 @@ pub(super) fn first_crossing<F: VectorField<N>, const N: usize>(
     let mut stepper = Taylor::extended(REFERENCE_TOLERANCE);
     stepper.restart_from(field, t, x, t_end, f64::INFINITY)?;
     let mut found = None;
+    let mut passages = Passages::default();
     while found.is_none() && stepper.state().0.to_f64() < t_end {
-        next_crossings(&mut stepper, field, &surface, |c| {
+        next_crossings(&mut stepper, field, &surface, &mut passages, |c| {
             if found.is_none() && wanted(&c) {
                 found = Some(c);
             }
@@ -139,6 +141,7 @@ fn next_crossings<F: VectorField<N>, const N: usize>(
     stepper: &mut Taylor<N, DoubleDouble>,
     field: &F,
     surface: &impl Surface<N>,
+    passages: &mut Passages,
     mut found: impl FnMut(ExtendedCrossing<N>),
 ) -> Result<(), Failure> {
     if stepper.statistics().steps >= MOST_STEPS {
@@ -147,12 +150,9 @@ fn next_crossings<F: VectorField<N>, const N: usize>(
         return Err(Failure::TooManySteps { t: t.to_f64(), limit: MOST_STEPS, state });
     }
     let step = stepper.step(field)?;
-    let mut before = surface.height(&step.x0);
-    for theta in sign_changes(&step, |x| surface.height(x)) {
-        let direction = if before < 0.0 { Direction::Up } else { Direction::Down };
-        before = -before;
-        let (t, x) = refine(stepper, surface, theta);
-        found(ExtendedCrossing { t, x, direction });
+    for passage in passages.in_step(&step, |x| surface.height(x)) {
+        let (t, x) = refine(stepper, surface, passage.theta);
+        found(ExtendedCrossing { t, x, direction: Direction::of(passage.upward) });
     }
     Ok(())
 }

@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::path::first_three;
-use crate::integrate::{Flow, Observer, Step, roots};
+use super::path::leading;
+use crate::integrate::roots::Passages;
+use crate::integrate::{Flow, Observer, Step};
 
 /// The sense in which an orbit passes through the section plane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -16,6 +17,11 @@ pub enum Direction {
 }
 
 impl Direction {
+    /// The sense of a passage.
+    pub(super) fn of(upward: bool) -> Self {
+        if upward { Direction::Up } else { Direction::Down }
+    }
+
     /// The word used in data files.
     pub fn word(self) -> &'static str {
         match self {
@@ -27,53 +33,50 @@ impl Direction {
 
 /// A passage through the section plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Crossing {
+pub struct Crossing<const D: usize = 3> {
     /// Time.
     pub t: f64,
-    /// State (first three components).
-    pub x: [f64; 3],
+    /// State; the hysteretic phi is not part of it.
+    pub x: [f64; D],
     /// Sense.
     pub direction: Direction,
 }
 
 /// Records every passage through the plane `state[coordinate] = value`, in both senses, located on the dense output.
+/// What a passage is, [`Passages`] says.
 ///
 /// A kick that throws the state across the plane is not a passage of the flow and is not recorded. In a kicked run two
 /// neighbouring rows can therefore have the same sense: in fig. 9 some 30 (printed) and 200 (reconstructed) of 20,000 and 120,000.
 #[derive(Clone, Debug)]
-pub struct SectionRecorder {
+pub struct SectionRecorder<const D: usize = 3> {
     coordinate: usize,
     value: f64,
-    crossings: Vec<Crossing>,
+    passages: Passages,
+    crossings: Vec<Crossing<D>>,
 }
 
-impl SectionRecorder {
+impl<const D: usize> SectionRecorder<D> {
     /// A recorder for the plane `state[coordinate] = value`.
     pub fn new(coordinate: usize, value: f64) -> Self {
-        Self { coordinate, value, crossings: Vec::new() }
+        Self { coordinate, value, passages: Passages::default(), crossings: Vec::new() }
     }
 
     /// The passages so far, in time order.
-    pub fn crossings(&self) -> &[Crossing] {
+    pub fn crossings(&self) -> &[Crossing<D>] {
         &self.crossings
     }
 
     /// The passages, in time order.
-    pub fn into_crossings(self) -> Vec<Crossing> {
+    pub fn into_crossings(self) -> Vec<Crossing<D>> {
         self.crossings
     }
 }
 
-impl<const N: usize> Observer<N> for SectionRecorder {
+impl<const N: usize, const D: usize> Observer<N> for SectionRecorder<D> {
     fn step(&mut self, step: &Step<'_, N>) -> Flow {
-        let (c, v) = (self.coordinate, self.value);
-        let height = |x: &nalgebra::SVector<f64, N>| x[c] - v;
-        let mut before = height(&step.x0);
-        for theta in roots::sign_changes(step, height) {
-            // The sense follows from the side the orbit comes from; signs alternate between successive zeros.
-            let direction = if before < 0.0 { Direction::Up } else { Direction::Down };
-            before = if before < 0.0 { 1.0 } else { -1.0 };
-            self.crossings.push(Crossing { t: step.time(theta), x: first_three(&step.at(theta)), direction });
+        for passage in self.passages.through_plane(step, self.coordinate, self.value) {
+            let (t, x) = (step.time(passage.theta), leading(&step.at(passage.theta)));
+            self.crossings.push(Crossing { t, x, direction: Direction::of(passage.upward) });
         }
         Flow::Continue
     }

@@ -232,7 +232,7 @@ fn print_specs(figures: &[Figure]) -> Result<(), CliError> {
         .iter()
         .flat_map(|figure| &figure.pictures)
         .flat_map(|picture| {
-            picture.panels.iter().map(move |panel| (format!("{}-{}", picture.name, panel.label), panel.run))
+            picture.panels.iter().map(move |panel| (format!("{}-{}", picture.name, panel.label), &panel.run))
         })
         .collect();
     let text = match specs.as_slice() {

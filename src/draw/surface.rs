@@ -2,11 +2,10 @@
 
 use nalgebra::{SVector, vector};
 
-use crate::job::spec::SystemSpec;
 use crate::render::sheet::{Colour, Patch};
 use crate::render::style;
 use crate::system::filippov::{Region, region, two_fold};
-use crate::system::{Caricature, PiecewiseSmooth, Wheel};
+use crate::system::{Caricature, Compiled, PiecewiseSmooth, System, Wheel};
 
 /// The colour of a region.
 pub fn colour(region: Region) -> Colour {
@@ -18,18 +17,26 @@ pub fn colour(region: Region) -> Colour {
 }
 
 /// The patches of h = 0 inside the box `ranges` (one (low, high) per coordinate), in the state's order of coordinates.
-pub fn patches(system: &SystemSpec, ranges: &[(f64, f64); 3], cells: usize) -> Vec<Patch> {
-    match system {
-        SystemSpec::Caricature(c) => caricature(c, ranges, cells),
-        SystemSpec::Wheel(w) => wheel(w, ranges, cells),
+///
+/// None for a system whose surface is not known as a graph over two coordinates.
+pub fn patches(system: &System, ranges: &[(f64, f64); 3], cells: usize) -> Vec<Patch> {
+    match system.compiled() {
+        Some(Compiled::Caricature(c)) => caricature(&c, ranges, cells),
+        Some(Compiled::Wheel(w)) => wheel(&w, ranges, cells),
+        None => Vec::new(),
     }
 }
 
-/// The two-fold of the paper's singularity.
-pub fn singularity(system: &SystemSpec) -> Option<[f64; 3]> {
-    let point = match system {
-        SystemSpec::Caricature(c) => two_fold(c, &vector![0.0, 0.0, 0.0]),
-        SystemSpec::Wheel(w) => two_fold(w, &vector![0.69, -0.57, -0.87]),
+/// A two-fold of the system, if one is found: of the paper's systems the singularity, of others the one that Newton's method finds from
+/// the suggested start.
+pub fn singularity(system: &System) -> Option<[f64; 3]> {
+    let point = match system.compiled() {
+        Some(Compiled::Caricature(c)) => two_fold(&c, &vector![0.0, 0.0, 0.0]),
+        Some(Compiled::Wheel(w)) => two_fold(&w, &vector![0.69, -0.57, -0.87]),
+        None => {
+            let start: [f64; 3] = system.definition().start()?.try_into().ok()?;
+            two_fold(&system.bind::<3>().ok()?, &start.into())
+        }
     };
     point.ok().map(|t| t.point.into())
 }

@@ -82,20 +82,38 @@ pub struct Dopri5<const N: usize> {
     dense: Dense<N>,
 }
 
-/// The interpolant of one step, Hairer et al. (1993), sec. II.6.
+/// The interpolant of one step, Hairer et al. (1993), sec. II.6: what it is made of. Most steps are never looked into, so its
+/// coefficients are computed when asked for.
 #[derive(Clone, Debug)]
 struct Dense<const N: usize> {
-    r: [SVector<f64, N>; 5],
+    h: f64,
+    x0: SVector<f64, N>,
+    x1: SVector<f64, N>,
+    /// The derivatives of stages 1, 3, 4, 5, 6, 7.
+    k: [SVector<f64, N>; 6],
 }
 
 impl<const N: usize> Interpolant<N> for Dense<N> {
     fn at(&self, theta: f64) -> SVector<f64, N> {
+        let Self { h, x0, x1, k: [k1, k3, k4, k5, k6, k7] } = self;
         let one_minus = 1.0 - theta;
-        let [r1, r2, r3, r4, r5] = &self.r;
-        r1 + (r2 + (r3 + (r4 + r5 * one_minus) * theta) * one_minus) * theta
+        let r2 = x1 - x0;
+        let r3 = k1 * *h - r2;
+        let r4 = r2 - k7 * *h - r3;
+        let r5 = (k1 * D1 + k3 * D3 + k4 * D4 + k5 * D5 + k6 * D6 + k7 * D7) * *h;
+        x0 + (r2 + (r3 + (r4 + r5 * one_minus) * theta) * one_minus) * theta
     }
     fn degree(&self) -> usize {
         4
+    }
+    /// The distance from the chord: theta (1 - theta) [r3 + theta r4 + theta (1 - theta) r5].
+    fn reach(&self, coordinate: usize) -> f64 {
+        let [k1, k3, k4, k5, k6, k7] = self.k.each_ref().map(|k| k[coordinate]);
+        let r2 = self.x1[coordinate] - self.x0[coordinate];
+        let r3 = k1 * self.h - r2;
+        let r3_and_r4 = r2 - k7 * self.h;
+        let r5 = (k1 * D1 + k3 * D3 + k4 * D4 + k5 * D5 + k6 * D6 + k7 * D7) * self.h;
+        0.25 * (r3.abs().max(r3_and_r4.abs()) + 0.25 * r5.abs())
     }
 }
 
@@ -113,7 +131,7 @@ impl<const N: usize> Dopri5<N> {
             max_step: f64::INFINITY,
             h: 0.0,
             last_log: control::LEAST_LOG,
-            dense: Dense { r: [zero; 5] },
+            dense: Dense { h: 0.0, x0: zero, x1: zero, k: [zero; 6] },
         }
     }
 
@@ -214,15 +232,7 @@ impl<const N: usize> Stepper<N> for Dopri5<N> {
                 // A step shortened only to reach the end says nothing about the size to go on with.
                 self.h = next.min(self.max_step);
                 self.last_log = log.max(control::LEAST_LOG);
-                let difference = x1 - x0;
-                let bspl = k1 * h - difference;
-                self.dense.r = [
-                    x0,
-                    difference,
-                    bspl,
-                    difference - k7 * h - bspl,
-                    (k1 * D1 + k3 * D3 + k4 * D4 + k5 * D5 + k6 * D6 + k7 * D7) * h,
-                ];
+                self.dense = Dense { h, x0, x1, k: [k1, k3, k4, k5, k6, k7] };
                 self.t = if last { self.t_end } else { t0 + h };
                 self.x = x1;
                 self.fsal = k7;

@@ -49,12 +49,14 @@ pub struct Course {
     pub step_cap: StepCap,
     /// Most steps of the whole run; with them it ends as [`StopReason::StepBudget`].
     pub max_steps: u64,
+    /// How many leading components of the state a kick perturbs: the states of the system, but not a hysteretic phi.
+    pub kicked_states: usize,
 }
 
 impl Course {
     /// Straight to `t_end`: no restarts, no kicks, steps as long and as many as the method wants.
     pub fn to(t_end: f64) -> Self {
-        Self { t_end, schedule: Schedule::default(), step_cap: StepCap::None, max_steps: u64::MAX }
+        Self { t_end, schedule: Schedule::default(), step_cap: StepCap::None, max_steps: u64::MAX, kicked_states: 3 }
     }
 }
 
@@ -106,8 +108,8 @@ where
     M: Stepper<N>,
     O: Observer<N>,
 {
-    let Course { t_end, ref schedule, step_cap, max_steps } = *course;
-    let mut kicker = schedule.kick.map(Kicker::new);
+    let Course { t_end, ref schedule, step_cap, max_steps, kicked_states } = *course;
+    let mut kicker = schedule.kick.map(|kick| Kicker::new(kick, kicked_states));
     let (mut t, mut x) = (0.0, x0);
     let mut most_steps_in_segment = 0;
     let mut stop = StopReason::EndTime;

@@ -137,6 +137,10 @@ impl<const N: usize> Interpolant<N> for Collocation<N> {
     fn degree(&self) -> usize {
         3
     }
+    /// The polynomial's distance from its start, term by term.
+    fn reach(&self, coordinate: usize) -> f64 {
+        self.p.iter().map(|p| p[coordinate].abs()).sum()
+    }
 }
 
 /// The Radau IIA stepper.

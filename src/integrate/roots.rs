@@ -59,46 +59,104 @@ pub fn brent(mut f: impl FnMut(f64) -> f64, a: f64, b: f64, fa: f64, fb: f64) ->
     b
 }
 
-/// The fractions of `step`, increasing, at which `g` changes sign. A zero exactly at the start is not reported (it
-/// belongs to the step before); one exactly at the end is.
+/// A passage from one side of a surface to the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Passage {
+    /// The fraction of the step at which the surface is met.
+    pub theta: f64,
+    /// Whether the orbit comes from the negative side.
+    pub upward: bool,
+}
+
+/// Finds an orbit's passages through a surface g = 0, step by step. The one rule of this program for what a passage and
+/// its sense are:
 ///
-/// `g` is sampled at two points more than the interpolant's degree; between samples that keep their sign, a smallest |g| in the middle
-/// is followed to its minimum, so that two zeros between neighbouring samples are found as well.
-pub fn sign_changes<const N: usize>(step: &Step<'_, N>, g: impl Fn(&SVector<f64, N>) -> f64) -> Vec<f64> {
-    let n = step.interpolant.degree() + 2;
-    let value = |theta: f64| g(&step.at(theta));
-    let mut found = Vec::new();
-    let samples: Vec<(f64, f64)> = (0..=n).map(|i| i as f64 / n as f64).map(|s| (s, value(s))).collect();
-    let mut refined: Vec<(f64, f64)> = Vec::with_capacity(samples.len() + 2);
-    refined.push(samples[0]);
-    for w in 1..samples.len() {
-        let (s1, g1) = samples[w];
-        if w + 1 < samples.len() {
-            let ((s0, g0), (s2, g2)) = (samples[w - 1], samples[w + 1]);
+/// - A passage is where g, having last been of one sign, is of the other. Its sense is that of the signs.
+/// - So a zero is no side: an orbit that starts on the surface has not passed it, and one that touches it and turns back
+///   neither. A zero exactly at a step's end is decided by what follows, and if it is a passage it is reported once, at fraction 0 of
+///   the next step.
+/// - A jump between two steps (a kick) to the other side is no passage; the new side counts from there.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Passages {
+    /// The sign last seen, or zero before any.
+    side: f64,
+}
+
+impl Passages {
+    /// The passages in `step`, in order. Nothing is allocated unless there is one.
+    ///
+    /// `g` is sampled at two points more than the interpolant's degree; between samples that keep their sign, a smallest |g| in the
+    /// middle is followed to its minimum, so that two zeros between neighbouring samples are found as well.
+    pub fn in_step<const N: usize>(&mut self, step: &Step<'_, N>, g: impl Fn(&SVector<f64, N>) -> f64) -> Vec<Passage> {
+        let n = step.interpolant.degree() + 2;
+        let value = |theta: f64| g(&step.at(theta));
+        let sample = |i: usize| {
+            let s = i as f64 / n as f64;
+            (s, value(s))
+        };
+        let mut found = Vec::new();
+        let mut before = sample(0);
+        if before.1 != 0.0 {
+            self.side = before.1.signum();
+        }
+        let mut last = before;
+        let mut next = |point: (f64, f64)| {
+            if point.1 != 0.0 {
+                let side = point.1.signum();
+                if side != self.side && self.side != 0.0 {
+                    let theta = if last.1 == 0.0 { last.0 } else { brent(value, last.0, point.0, last.1, point.1) };
+                    found.push(Passage { theta, upward: side > 0.0 });
+                }
+                self.side = side;
+            }
+            last = point;
+        };
+        let mut here = sample(1);
+        for i in 1..=n {
+            if i == n {
+                next(here);
+                break;
+            }
+            let after = sample(i + 1);
+            let ((s0, g0), (s1, g1), (s2, g2)) = (before, here, after);
             let same = (g0 > 0.0) == (g1 > 0.0) && (g1 > 0.0) == (g2 > 0.0);
+            let mut between = None;
             if same && g1.abs() <= g0.abs() && g1.abs() <= g2.abs() {
                 let (s, v) = smallest(&value, s0, s2, g1.signum());
-                if (v > 0.0) != (g1 > 0.0) {
-                    if s < s1 {
-                        refined.extend([(s, v), (s1, g1)]);
-                    } else {
-                        refined.extend([(s1, g1), (s, v)]);
-                    }
-                    continue;
+                between = ((v > 0.0) != (g1 > 0.0)).then_some((s, v));
+            }
+            match between {
+                Some(point) if point.0 < s1 => {
+                    next(point);
+                    next(here);
                 }
+                Some(point) => {
+                    next(here);
+                    next(point);
+                }
+                None => next(here),
+            }
+            (before, here) = (here, after);
+        }
+        found
+    }
+
+    /// The passages through the plane x\[coordinate\] = value, as [`Passages::in_step`] finds them, after one cheap test: most steps
+    /// stay so far from the plane that [`Interpolant::reach`](super::Interpolant::reach) proves that they do not meet it.
+    pub fn through_plane<const N: usize>(&mut self, step: &Step<'_, N>, coordinate: usize, value: f64) -> Vec<Passage> {
+        let (h0, h1) = (step.x0[coordinate] - value, step.x1[coordinate] - value);
+        // Nothing can be proved of a zero or a NaN: both comparisons are false then.
+        if h0 > 0.0 && h1 > 0.0 || h0 < 0.0 && h1 < 0.0 {
+            let reach = step.interpolant.reach(coordinate);
+            // The margin is for the rounding of the interpolant and of the bound.
+            let margin = 1e-12 * (h0.abs() + h1.abs() + value.abs() + reach);
+            if h0.abs().min(h1.abs()) > reach + margin {
+                self.side = h0.signum();
+                return Vec::new();
             }
         }
-        refined.push((s1, g1));
+        self.in_step(step, |x| x[coordinate] - value)
     }
-    for pair in refined.windows(2) {
-        let ((a, fa), (b, fb)) = (pair[0], pair[1]);
-        if fb == 0.0 && fa != 0.0 {
-            found.push(b);
-        } else if fa != 0.0 && (fa > 0.0) != (fb > 0.0) {
-            found.push(brent(value, a, b, fa, fb));
-        }
-    }
-    found
 }
 
 /// Golden-section search for the smallest `sign * f` on [a, b]; stops early once it is negative.
@@ -305,10 +363,71 @@ mod tests {
         }
     }
 
-    fn zeros(c: [f64; 4]) -> Vec<f64> {
+    fn passages(c: [f64; 4]) -> Vec<Passage> {
         let p = Cubic(c);
         let step = Step { t0: 0.0, t1: 1.0, x0: p.at(0.0), x1: p.at(1.0), interpolant: &p };
-        sign_changes(&step, |x| x[0])
+        Passages::default().in_step(&step, |x| x[0])
+    }
+
+    fn zeros(c: [f64; 4]) -> Vec<f64> {
+        passages(c).iter().map(|p| p.theta).collect()
+    }
+
+    /// The senses of the passages through the plane x = `value` in steps given by their cubics, one after the other.
+    fn senses(value: f64, steps: &[[f64; 4]]) -> Vec<(usize, f64, bool)> {
+        let (mut by_plane, mut by_surface) = (Passages::default(), Passages::default());
+        let mut found = Vec::new();
+        for (i, c) in steps.iter().enumerate() {
+            let p = Cubic(*c);
+            let step = Step { t0: 0.0, t1: 1.0, x0: p.at(0.0), x1: p.at(1.0), interpolant: &p };
+            let passages = by_plane.through_plane(&step, 0, value);
+            assert_eq!(passages, by_surface.in_step(&step, |x| x[0] - value));
+            found.extend(passages.iter().map(|p| (i, p.theta, p.upward)));
+        }
+        found
+    }
+
+    #[test]
+    fn the_sense_is_that_of_the_signs() {
+        // Two passages in one step, down and up, through a plane that is not 0: (s - 1/4)(s - 3/4) + 7.
+        let found = senses(7.0, &[[7.1875, -1.0, 1.0, 0.0]]);
+        assert_eq!(found.iter().map(|f| f.2).collect::<Vec<_>>(), [false, true], "{found:?}");
+        assert!((found[0].1 - 0.25).abs() < 1e-14 && (found[1].1 - 0.75).abs() < 1e-14, "{found:?}");
+        // The plane 0 is not met.
+        assert_eq!(senses(0.0, &[[7.1875, -1.0, 1.0, 0.0]]), []);
+        // Upwards and downwards through a plane below zero.
+        assert_eq!(senses(-2.0, &[[-2.5, 1.0, 0.0, 0.0], [-1.5, -1.0, 0.0, 0.0]]), [(0, 0.5, true), (1, 0.5, false)]);
+    }
+
+    #[test]
+    fn a_start_on_the_surface_is_no_passage_and_the_return_has_its_sense() {
+        // From 0 down and up again through the plane: s (s - 1/2). The return is upwards.
+        let found = senses(0.0, &[[0.0, -0.5, 1.0, 0.0]]);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].2 && (found[0].1 - 0.5).abs() < 1e-14, "{found:?}");
+        let found = senses(3.0, &[[3.0, 0.5, -1.0, 0.0]]);
+        assert!(found.len() == 1 && !found[0].2, "{found:?}");
+        assert_eq!(senses(0.0, &[[0.0, 1.0, 0.0, 0.0]]), []);
+    }
+
+    #[test]
+    fn an_end_on_the_surface_is_decided_by_what_follows() {
+        // Through: reported once, at the start of the step that leaves to the other side.
+        assert_eq!(senses(0.0, &[[-1.0, 1.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]]), [(1, 0.0, true)]);
+        assert_eq!(senses(0.5, &[[1.5, -1.0, 0.0, 0.0], [0.5, -1.0, 0.0, 0.0]]), [(1, 0.0, false)]);
+        // Back to where it came from: a touch; the next passage still alternates.
+        let touch = [[1.0, -1.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [1.0, -2.0, 0.0, 0.0]];
+        assert_eq!(senses(0.0, &touch), [(2, 0.5, false)]);
+        // A touch at a sample inside a step: (s - 2/5)^2, sampled at fifths.
+        assert_eq!(senses(0.0, &[[0.16, -0.8, 1.0, 0.0]]), []);
+    }
+
+    #[test]
+    fn a_jump_to_the_other_side_is_no_passage() {
+        assert_eq!(
+            senses(0.0, &[[1.0, 0.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [-1.0, 2.0, 0.0, 0.0]]),
+            [(2, 0.5, true)]
+        );
     }
 
     #[test]
@@ -328,12 +447,6 @@ mod tests {
         let found = zeros([0.0906, -0.602, 1.0, 0.0]);
         assert_eq!(found.len(), 2, "{found:?}");
         assert!((found[0] - 0.3).abs() < 1e-12 && (found[1] - 0.302).abs() < 1e-12, "{found:?}");
-    }
-
-    #[test]
-    fn an_end_is_reported_once() {
-        assert_eq!(zeros([-1.0, 1.0, 0.0, 0.0]), [1.0]);
-        assert!(zeros([0.0, 1.0, 0.0, 0.0]).is_empty());
     }
 
     #[test]

@@ -6,6 +6,7 @@
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
+use crate::num::elementary::sqrt;
 use crate::num::random::RandomStream;
 
 /// The longest step a method may take.
@@ -113,26 +114,39 @@ impl Schedule {
 #[derive(Clone, Debug)]
 pub struct Kicker {
     kick: Kick,
+    /// How many leading components are kicked.
+    states: usize,
     stream: RandomStream,
 }
 
 impl Kicker {
-    /// The kicks that `kick` describes, from the first on.
-    pub fn new(kick: Kick) -> Self {
-        Self { kick, stream: RandomStream::new(kick.seed, kick.stream) }
+    /// The kicks that `kick` describes, from the first on, to the first `states` components of the state.
+    pub fn new(kick: Kick, states: usize) -> Self {
+        Self { kick, states, stream: RandomStream::new(kick.seed, kick.stream) }
     }
 
     /// The next perturbation.
-    pub fn draw(&mut self) -> [f64; 3] {
-        let size = self.kick.size;
+    pub fn draw(&mut self) -> Vec<f64> {
+        let (size, n) = (self.kick.size, self.states);
+        let stream = &mut self.stream;
         match self.kick.law {
-            KickLaw::Sphere => self.stream.direction().map(|c| c * size),
-            KickLaw::Cube => std::array::from_fn(|_| self.stream.uniform_in(-size, size)),
-            KickLaw::Normal => std::array::from_fn(|_| size * self.stream.normal()),
+            KickLaw::Sphere if n == 3 => stream.direction().map(|c| c * size).to_vec(),
+            KickLaw::Sphere => {
+                // Independent normals have no preferred direction.
+                let mut direction = vec![0.0; n];
+                let mut length = 0.0_f64;
+                while length == 0.0 && n > 0 {
+                    direction.iter_mut().for_each(|c| *c = stream.normal());
+                    length = sqrt(direction.iter().map(|c| c * c).sum());
+                }
+                direction.iter().map(|c| size * (c / length)).collect()
+            }
+            KickLaw::Cube => (0..n).map(|_| stream.uniform_in(-size, size)).collect(),
+            KickLaw::Normal => (0..n).map(|_| size * stream.normal()).collect(),
         }
     }
 
-    /// `x` perturbed in its first three components.
+    /// `x` perturbed in its leading components.
     pub fn apply<const N: usize>(&mut self, mut x: SVector<f64, N>) -> SVector<f64, N> {
         for (c, d) in x.iter_mut().zip(self.draw()) {
             *c += d;
@@ -175,10 +189,21 @@ mod tests {
 
     #[test]
     fn sphere_kicks_have_the_size() {
-        let mut k = Kicker::new(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 5, stream: 1 });
+        let mut k = Kicker::new(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 5, stream: 1 }, 3);
         for _ in 0..100 {
             let d = k.draw();
             assert!((d.iter().map(|c| c * c).sum::<f64>().sqrt() - 1e-3).abs() < 1e-17);
+        }
+        for states in [1, 2, 8] {
+            let mut k = Kicker::new(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 5, stream: 1 }, states);
+            let mut mean = vec![0.0; states];
+            for _ in 0..2000 {
+                let d = k.draw();
+                assert!((d.iter().map(|c| c * c).sum::<f64>().sqrt() - 1e-3).abs() < 1e-17);
+                mean.iter_mut().zip(&d).for_each(|(m, d)| *m += d / 2000.0);
+            }
+            // No preferred direction: four standard errors of a component's mean.
+            assert!(mean.iter().all(|m| m.abs() < 4.0 * 1e-3 / (2000.0_f64 * states as f64).sqrt()), "{mean:?}");
         }
     }
 }

@@ -11,6 +11,11 @@ pub trait Interpolant<const N: usize> {
     fn at(&self, theta: f64) -> SVector<f64, N>;
     /// The degree of the interpolant as a polynomial in `theta`.
     fn degree(&self) -> usize;
+    /// A bound, up to rounding, on how far the coordinate leaves the range between its values at the step's two ends. Infinite where
+    /// no cheap one is known.
+    fn reach(&self, _coordinate: usize) -> f64 {
+        f64::INFINITY
+    }
 }
 
 /// One accepted step from (t0, x0) to (t1, x1).

@@ -84,6 +84,10 @@ impl<const N: usize> Interpolant<N> for Polynomial<N> {
     fn degree(&self) -> usize {
         self.coefficients.len() - 1
     }
+    /// The polynomial's distance from its start, term by term.
+    fn reach(&self, coordinate: usize) -> f64 {
+        self.coefficients[1..].iter().map(|c| c[coordinate].abs()).sum()
+    }
 }
 
 impl<const N: usize> Taylor<N, f64> {

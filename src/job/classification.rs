@@ -16,7 +16,7 @@ use crate::integrate::{Schedule, Watch};
 
 /// What a run settles on, judged from its section: with the largest exponent where motion is not captured by a cycle, and beside its noise-free
 /// twin where there is noise. Fact: `evidence` ([`Evidence`]).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Classification {
     /// The run; it records a section.
     pub run: RunSpec,
@@ -50,11 +50,11 @@ impl Question for Classification {
     }
 
     fn label(&self) -> String {
-        format!("what becomes of {}", Run(self.run).label())
+        format!("what becomes of {}", Run(self.run.clone()).label())
     }
 
     fn cost(&self) -> f64 {
-        Run(self.run).cost()
+        Run(self.run.clone()).cost()
     }
 
     fn compute(&self, desk: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
@@ -108,7 +108,12 @@ impl Classification {
             }
             _ => lyapunov::Settings::default(),
         };
-        let question = LargestExponent { system: self.run.system, switch: self.run.switch, start, settings };
+        let question = LargestExponent {
+            system: self.run.system.clone(),
+            switch: self.run.switch,
+            start: start.to_vec(),
+            settings,
+        };
         Ok(desk.ask(&question)?.fact("exponent").ok())
     }
 
@@ -116,7 +121,7 @@ impl Classification {
     /// If it was captured at once, what is left is the closed orbit's dots.
     fn noise_free_structure(&self, desk: &Desk<'_>) -> Result<Vec<SectionPoint>, JobError> {
         let run = &self.run;
-        let twin = RunSpec { schedule: Schedule { kick: None, ..run.schedule }, ..*run };
+        let twin = RunSpec { schedule: Schedule { kick: None, ..run.schedule }, ..run.clone() };
         let (_, section) = section(desk, &twin)?;
         let question = attractor::Question {
             t_end: Some(run.t_end),
@@ -140,7 +145,12 @@ impl Classification {
 
 /// The run's recording and its section as the classifier takes it.
 fn section(desk: &Desk<'_>, run: &RunSpec) -> Result<(Recording, Vec<SectionPoint>), JobError> {
-    let recording = Recording::of_answer(run, &*desk.ask(&Run(*run))?)?.whole()?;
+    if run.system.dimension() != 3 {
+        return Err(JobError::Other(
+            "a run is classified from the plane of a section, so its system must have three states".into(),
+        ));
+    }
+    let recording = Recording::of_answer(run, &*desk.ask(&Run(run.clone()))?)?.whole()?;
     let Data::Section(crossings) = &recording.data else {
         return Err(JobError::Other("a run is classified from its section; record one with --section".into()));
     };

@@ -14,7 +14,7 @@ use crate::integrate::Watch;
 
 /// How organised two runs' paths are, and what they share. Facts: `freshness` (share of each path's strides into new places) and
 /// `shared` ([`Shared`](crate::analyse::divider::Shared)).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PathComparison(pub RunSpec, pub RunSpec);
 
 impl Question for PathComparison {
@@ -23,7 +23,7 @@ impl Question for PathComparison {
     }
 
     fn json(&self) -> Value {
-        json!({ "runs": [self.0, self.1], "strides": STRIDES })
+        json!({ "runs": [&self.0, &self.1], "strides": STRIDES })
     }
 
     fn label(&self) -> String {
@@ -31,7 +31,7 @@ impl Question for PathComparison {
     }
 
     fn cost(&self) -> f64 {
-        Run(self.0).cost() + Run(self.1).cost()
+        Run(self.0.clone()).cost() + Run(self.1.clone()).cost()
     }
 
     fn compute(&self, desk: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
@@ -45,7 +45,7 @@ impl Question for PathComparison {
 }
 
 fn path(desk: &Desk<'_>, run: &RunSpec) -> Result<Vec<Sample>, JobError> {
-    let recording = Recording::of_answer(run, &*desk.ask(&Run(*run))?)?.whole()?;
+    let recording = Recording::of_answer(run, &*desk.ask(&Run(run.clone()))?)?.whole()?;
     match recording.data {
         Data::Path(samples) => Ok(samples),
         _ => Err(JobError::Other("only paths can be compared as paths; leave out --section".into())),

@@ -6,18 +6,17 @@ use serde_json::Value;
 use super::answer::{Answer, Stop};
 use super::desk::Desk;
 use super::question::{JobError, Question};
-use super::spec::SystemSpec;
 use super::table::{Column, Entry, Table};
 use crate::analyse::digits::{DigitsQuestion, digits};
 use crate::integrate::Watch;
-use crate::system::{Smoothed, Transition};
+use crate::system::{Compiled, Field, Smoothed, System, Transition};
 
 /// How many digits of each passage through a plane methods get right, beside an orbit in double-double arithmetic, with tanh smoothing. Tables:
 /// `agreement`, a row per method and passage, and `visits`, the reference orbit's passages near the origin.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MethodDigits {
     /// The system.
-    pub system: SystemSpec,
+    pub system: System,
     /// The stiffness parameter of the smoothing.
     pub eps: f64,
     /// Which digits of which orbit.
@@ -43,9 +42,9 @@ impl Question for MethodDigits {
 
     fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
         let (transition, eps) = (Transition::Tanh, self.eps);
-        let found = match self.system {
-            SystemSpec::Caricature(system) => digits(&Smoothed { system, transition, eps }, &self.compared),
-            SystemSpec::Wheel(system) => digits(&Smoothed { system, transition, eps }, &self.compared),
+        let found = match self.system.compiled() {
+            Some(Compiled::Caricature(system)) => digits(&Smoothed { system, transition, eps }, &self.compared),
+            _ => digits(&Field::smoothed(&self.system, transition, eps).bind::<3>()?, &self.compared),
         }?;
         let columns = [Column::words("method"), Column::numbers("tolerance"), Column::integers("crossing")];
         let mut rows =

@@ -1,48 +1,83 @@
 //! The question of the largest Lyapunov exponent.
 
-use nalgebra::{SVector, vector};
+use nalgebra::SVector;
 use serde::Serialize;
 use serde_json::Value;
 
 use super::answer::Answer;
 use super::desk::Desk;
 use super::question::{JobError, Question};
-use super::spec::{SwitchSpec, SystemSpec};
+use super::spec::SwitchSpec;
 use crate::analyse::lyapunov::{self, Exponent};
 use crate::integrate::Watch;
-use crate::system::{Hysteretic, PiecewiseSmooth, Smoothed};
+use crate::num::tape::Program;
+use crate::system::{Compiled, Field, Hysteretic, Smoothed, System};
 
 /// The largest Lyapunov exponent of the orbit from `start`. Fact: `exponent` ([`Exponent`]), or `failure` with the reason if the orbit
 /// could not be followed (it leaves, or its motion is set-valued and has no tangent flow).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LargestExponent {
     /// The system.
-    pub system: SystemSpec,
+    pub system: System,
     /// The switch; kicks are part of the settings.
     pub switch: SwitchSpec,
     /// Where the orbit starts.
-    pub start: [f64; 3],
+    pub start: Vec<f64>,
     /// How the exponent is computed.
     pub settings: lyapunov::Settings,
 }
 
 impl LargestExponent {
-    fn exponent_of<P: PiecewiseSmooth<3> + Copy>(&self, system: P) -> Result<Exponent, String> {
-        let x = self.start;
-        match self.switch {
-            SwitchSpec::Smoothed { eps, transition } => {
-                let field = Smoothed { system, transition, eps };
-                lyapunov::largest::<3, 6, _>(&field, SVector::from(x), &self.settings).map_err(|e| e.to_string())
-            }
-            SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. } => {
-                let field = Hysteretic { system, eps, eps_prime, relaxation };
-                // phi is within its relaxation time of the side that h says.
-                let phi = if system.switching(&SVector::from(x)) > 0.0 { 1.0 } else { 0.0 };
-                lyapunov::largest::<4, 8, _>(&field, vector![x[0], x[1], x[2], phi], &self.settings)
-                    .map_err(|e| e.to_string())
-            }
-            SwitchSpec::Filippov { .. } => Err("a set-valued motion has no tangent flow".into()),
+    fn exponent(&self) -> Result<Exponent, String> {
+        let start = |i: usize| self.start.get(i).copied().unwrap_or(f64::NAN);
+        let dimension = self.system.dimension();
+        if self.start.len() != dimension {
+            return Err(format!("the start has {} numbers, the system {dimension} states", self.start.len()));
         }
+        let field = match (self.switch, self.system.compiled()) {
+            (SwitchSpec::Smoothed { eps, transition }, Some(Compiled::Caricature(system))) => {
+                let field = Smoothed { system, transition, eps };
+                let x = SVector::from_fn(|i, _| start(i));
+                return lyapunov::largest::<3, 6, _>(&field, x, &self.settings).map_err(|e| e.to_string());
+            }
+            (SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. }, Some(Compiled::Caricature(system))) => {
+                let field = Hysteretic { system, eps, eps_prime, relaxation };
+                let x = SVector::from_fn(|i, _| if i < 3 { start(i) } else { self.phi() });
+                return lyapunov::largest::<4, 8, _>(&field, x, &self.settings).map_err(|e| e.to_string());
+            }
+            (SwitchSpec::Smoothed { eps, transition }, _) => Field::smoothed(&self.system, transition, eps),
+            (SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. }, _) => {
+                Field::hysteretic(&self.system, eps, eps_prime, relaxation)
+            }
+            (SwitchSpec::Filippov { .. }, _) => return Err("a set-valued motion has no tangent flow".into()),
+        };
+        let tangent = field.variational(1);
+        match field.dimension() {
+            1 => self.along::<1, 2>(&tangent),
+            2 => self.along::<2, 4>(&tangent),
+            3 => self.along::<3, 6>(&tangent),
+            4 => self.along::<4, 8>(&tangent),
+            5 => self.along::<5, 10>(&tangent),
+            6 => self.along::<6, 12>(&tangent),
+            7 => self.along::<7, 14>(&tangent),
+            8 => self.along::<8, 16>(&tangent),
+            9 => self.along::<9, 18>(&tangent),
+            n => Err(format!("exponents are computed for up to nine states, not for {n}")),
+        }
+    }
+
+    /// By the recorded equation and its variational equation.
+    fn along<const N: usize, const M: usize>(&self, tangent: &Field) -> Result<Exponent, String> {
+        let tangent = tangent.bind::<M>().map_err(|e| e.to_string())?;
+        let x = SVector::<f64, N>::from_fn(|i, _| self.start.get(i).copied().unwrap_or_else(|| self.phi()));
+        lyapunov::largest_along::<N, M, _>(&tangent, x, self.start.len(), &self.settings).map_err(|e| e.to_string())
+    }
+
+    /// phi at the start: within its relaxation time of the side that h says.
+    fn phi(&self) -> f64 {
+        let mut h = [f64::NAN];
+        Program::new(&self.system.tape().select([0])).evaluate(&self.start, &mut h);
+        if h[0] > 0.0 { 1.0 } else { 0.0 }
     }
 }
 
@@ -65,10 +100,7 @@ impl Question for LargestExponent {
     }
 
     fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
-        let found = match self.system {
-            SystemSpec::Caricature(system) => self.exponent_of(system),
-            SystemSpec::Wheel(system) => self.exponent_of(system),
-        };
+        let found = self.exponent();
         let answer = Answer::of_tables(Vec::new());
         Ok(match found {
             Ok(exponent) => answer.with_fact("exponent", &exponent),

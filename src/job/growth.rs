@@ -6,18 +6,17 @@ use serde_json::Value;
 use super::answer::{Answer, Stop};
 use super::desk::Desk;
 use super::question::{JobError, Question};
-use super::spec::SystemSpec;
 use super::table::{Column, Entry, Table};
 use crate::analyse::growth::{Growth, GrowthQuestion, growth};
 use crate::integrate::Watch;
-use crate::system::{Smoothed, Transition};
+use crate::system::{Compiled, Field, Smoothed, System, Transition};
 
 /// How much larger a small disturbance is after the first visit to the two-fold at the origin, with tanh smoothing. Table `growth`: a row per moment
 /// at which disturbances are made (`made`: `near` the visit, or at the `start`), with the growth in each direction.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DisturbanceGrowth {
     /// The system.
-    pub system: SystemSpec,
+    pub system: System,
     /// The stiffness parameter of the smoothing.
     pub eps: f64,
     /// Which disturbances of which orbit.
@@ -44,9 +43,9 @@ impl Question for DisturbanceGrowth {
 
     fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
         let (transition, eps, asked) = (Transition::Tanh, self.eps, &self.disturbances);
-        let found = match self.system {
-            SystemSpec::Caricature(system) => growth(&Smoothed { system, transition, eps }, asked),
-            SystemSpec::Wheel(system) => growth(&Smoothed { system, transition, eps }, asked),
+        let found = match self.system.compiled() {
+            Some(Compiled::Caricature(system)) => growth(&Smoothed { system, transition, eps }, asked),
+            _ => growth(&Field::smoothed(&self.system, transition, eps).bind::<3>()?, asked),
         }?;
         Ok(Answer {
             statistics: Some(found.statistics.clone()),

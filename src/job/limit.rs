@@ -7,17 +7,17 @@ use super::answer::{Answer, Stop};
 use super::desk::Desk;
 use super::question::{JobError, Question};
 use super::recording::side_word;
-use super::spec::SystemSpec;
 use super::table::{Column, Entry, Table};
 use crate::analyse::limit::{AfterVisitQuestion, ConvergenceQuestion, after_visit, convergence};
 use crate::integrate::Watch;
 use crate::integrate::filippov::Mode;
+use crate::system::{Compiled, System};
 
 /// Distance of smoothed orbits from the Filippov orbit before its first visit to a two-fold. Table `before`: a row per eps and time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SmoothingLimit {
     /// The system.
-    pub system: SystemSpec,
+    pub system: System,
     /// Which orbits, when.
     pub compared: ConvergenceQuestion,
 }
@@ -40,9 +40,9 @@ impl Question for SmoothingLimit {
     }
 
     fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
-        let found = match self.system {
-            SystemSpec::Caricature(system) => convergence(&system, &self.compared),
-            SystemSpec::Wheel(system) => convergence(&system, &self.compared),
+        let found = match self.system.compiled() {
+            Some(Compiled::Caricature(system)) => convergence(&system, &self.compared),
+            _ => convergence(&self.system.bind::<3>()?, &self.compared),
         }?;
         let columns =
             [Column::numbers("eps"), Column::numbers("t"), Column::words("mode"), Column::numbers("distance")];
@@ -60,7 +60,7 @@ impl Question for SmoothingLimit {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AfterVisit {
     /// The system.
-    pub system: SystemSpec,
+    pub system: System,
     /// Which orbits, which futures.
     pub compared: AfterVisitQuestion,
 }
@@ -83,12 +83,13 @@ impl Question for AfterVisit {
     }
 
     fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
-        let found = match self.system {
-            SystemSpec::Caricature(system) => after_visit(&system, &self.compared),
-            SystemSpec::Wheel(system) => after_visit(&system, &self.compared),
+        let found = match self.system.compiled() {
+            Some(Compiled::Caricature(system)) => after_visit(&system, &self.compared),
+            _ => after_visit(&self.system.bind::<3>()?, &self.compared),
         }?;
         let kinds = |name: &str| if name.ends_with("side") { Column::words(name) } else { Column::numbers(name) };
-        let [_, b, c] = self.system.coordinates();
+        let names = self.system.coordinates();
+        let (b, c) = (names[1], names[2]);
         let mut members = Table::new("funnel", ["exit_time", "side", b, c].map(kinds));
         for m in &found.members {
             members.push([m.exit_time.into(), side_word(m.side).into(), m.crossing[1].into(), m.crossing[2].into()]);

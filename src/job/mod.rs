@@ -20,9 +20,9 @@
 //! use twofold::job::{Desk, Run, Recording, spec::*};
 //! use twofold::system::Caricature;
 //! let run = RunSpec {
-//!     system: SystemSpec::Caricature(Caricature::with_reinjection(1e-1, 1e-5)),
+//!     system: Caricature::with_reinjection(1e-1, 1e-5).into(),
 //!     switch: SwitchSpec::tanh(1e-3),
-//!     start: [0.2, 0.0, -1.0],
+//!     start: vec![0.2, 0.0, -1.0],
 //!     t_end: 20.0,
 //!     method: MethodSpec::ndsolve_defaults(Method::Dopri5),
 //!     schedule: Default::default(),

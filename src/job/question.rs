@@ -11,6 +11,7 @@ use super::spec::SpecError;
 use crate::integrate::filippov::FilippovError;
 use crate::integrate::{Failure, Watch};
 use crate::record::Hash;
+use crate::system::DimensionError;
 
 /// Version of the numerics: a digest of the sources that numbers depend on, made when the program is built. Answers of another version
 /// are never taken for this one's.
@@ -75,6 +76,9 @@ pub enum JobError {
     /// The Filippov motion could not go on.
     #[error(transparent)]
     Filippov(#[from] FilippovError),
+    /// The question is for systems with another number of states.
+    #[error(transparent)]
+    Dimension(#[from] DimensionError),
     /// Another answer, on which this one rests, is not what it should be.
     #[error(transparent)]
     Fact(#[from] NoSuchFact),
@@ -89,6 +93,6 @@ pub enum JobError {
 impl JobError {
     /// Whether the question itself is at fault, not the computation.
     pub fn is_bad_question(&self) -> bool {
-        matches!(self, JobError::Spec(_))
+        matches!(self, JobError::Spec(_) | JobError::Dimension(_))
     }
 }

@@ -20,13 +20,13 @@ use crate::record::hash::canonical_json;
 
 /// What a run left behind.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Recording {
+pub struct Recording<const D: usize = 3> {
     /// The recorded points.
-    pub data: Data,
+    pub data: Data<D>,
     /// Final time.
     pub t: f64,
-    /// Final state (first three components).
-    pub x: [f64; 3],
+    /// Final state; the hysteretic phi is not part of it.
+    pub x: [f64; D],
     /// Work done.
     pub statistics: Statistics,
     /// The largest number of steps between restarts; NDSolve's default limit is 10,000.
@@ -37,34 +37,34 @@ pub struct Recording {
 
 /// Recorded points.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Data {
+pub enum Data<const D: usize = 3> {
     /// A path.
-    Path(Vec<Sample>),
+    Path(Vec<Sample<D>>),
     /// A Poincare section.
-    Section(Vec<Crossing>),
+    Section(Vec<Crossing<D>>),
     /// A Filippov motion: pieces by mode, and events.
-    Motion(Motion),
+    Motion(Motion<D>),
     /// The approach to a set-valued point and its futures.
     Funnel {
         /// The motion up to there.
-        approach: Motion,
+        approach: Motion<D>,
         /// The futures, by exit time, plus before minus.
-        futures: Vec<Future>,
+        futures: Vec<Future<D>>,
     },
 }
 
 /// One future of a set-valued point.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Future {
+pub struct Future<const D: usize = 3> {
     /// Time of repelling sliding asked for.
     pub exit_time: f64,
     /// The side left to.
     pub side: Side,
     /// The motion from the set-valued point on.
-    pub motion: Motion,
+    pub motion: Motion<D>,
 }
 
-impl Data {
+impl<const D: usize> Data<D> {
     /// Number of recorded points.
     pub fn len(&self) -> usize {
         match self {
@@ -86,7 +86,7 @@ impl Data {
 /// Unit of every column of a state or a time: the systems here are dimensionless.
 const PURE: &str = "1";
 
-impl Recording {
+impl<const D: usize> Recording<D> {
     /// The recording, unless it was interrupted.
     ///
     /// # Errors
@@ -112,7 +112,7 @@ impl Recording {
         };
         Answer { statistics: Some(self.statistics.clone()), stop: self.stop.into(), ..Answer::of_tables(tables) }
             .with_fact("t", &self.t)
-            .with_fact("state", &self.x)
+            .with_fact("state", &self.x.as_slice())
             .with_fact("most_steps_in_segment", &self.most_steps_in_segment)
     }
 
@@ -153,7 +153,10 @@ impl Recording {
         Ok(Self {
             data,
             t: answer.fact("t")?,
-            x: answer.fact("state")?,
+            x: answer.fact::<Vec<f64>>("state")?.try_into().map_err(|x: Vec<f64>| NoSuchFact {
+                name: "state".into(),
+                why: format!("it has {} components instead of {D}", x.len()),
+            })?,
             statistics: answer.statistics.clone().unwrap_or_default(),
             most_steps_in_segment: answer.fact("most_steps_in_segment")?,
             stop: match answer.stop {
@@ -167,21 +170,21 @@ impl Recording {
     }
 }
 
-fn point_columns(names: &[&str; 3]) -> Vec<Column> {
+fn point_columns(names: &[&str]) -> Vec<Column> {
     std::iter::once(&"t").chain(names).map(|name| Column::new(name, PURE, super::table::Kind::Number)).collect()
 }
 
-fn point(t: f64, x: [f64; 3]) -> Vec<Entry> {
+fn point<const D: usize>(t: f64, x: [f64; D]) -> Vec<Entry> {
     std::iter::once(t).chain(x).map(Entry::from).collect()
 }
 
-fn path_table(names: &[&str; 3], samples: &[Sample]) -> Table {
+fn path_table<const D: usize>(names: &[&str], samples: &[Sample<D>]) -> Table {
     let mut table = Table::new("path", point_columns(names));
     samples.iter().for_each(|s| table.push(point(s.t, s.x)));
     table
 }
 
-fn section_table(names: &[&str; 3], crossings: &[Crossing]) -> Table {
+fn section_table<const D: usize>(names: &[&str], crossings: &[Crossing<D>]) -> Table {
     let mut table = Table::new("section", point_columns(names).into_iter().chain([Column::words("direction")]));
     for c in crossings {
         let mut row = point(c.t, c.x);
@@ -191,14 +194,16 @@ fn section_table(names: &[&str; 3], crossings: &[Crossing]) -> Table {
     table
 }
 
-fn samples(names: &[&str; 3], table: &Table) -> Vec<Sample> {
-    let [t, x, y, z] = ["t", names[0], names[1], names[2]].map(|name| table.numbers(name));
-    t.iter().zip(x).zip(y).zip(z).map(|(((t, x), y), z)| Sample { t: *t, x: [*x, *y, *z] }).collect()
+fn samples<const D: usize>(names: &[&str], table: &Table) -> Vec<Sample<D>> {
+    let columns: [&[f64]; D] = std::array::from_fn(|i| names.get(i).map_or(&[][..], |name| table.numbers(name)));
+    let rows = columns.iter().map(|c| c.len()).min().unwrap_or(0);
+    let times = table.numbers("t").iter().take(rows).enumerate();
+    times.map(|(row, t)| Sample { t: *t, x: columns.map(|c| c[row]) }).collect()
 }
 
 /// A motion, and which future it is if it is one.
-struct Member<'a> {
-    motion: &'a Motion,
+struct Member<'a, const D: usize> {
+    motion: &'a Motion<D>,
     future: Option<(f64, Side)>,
 }
 
@@ -228,7 +233,7 @@ fn mode_of(word: &str) -> Option<Mode> {
     MODES.iter().find(|(_, w)| *w == word).map(|(m, _)| *m)
 }
 
-fn motion_tables(names: &[&str; 3], members: &[Member<'_>]) -> Vec<Table> {
+fn motion_tables<const D: usize>(names: &[&str], members: &[Member<'_, D>]) -> Vec<Table> {
     let future = || {
         [
             Column::integers("future"),
@@ -273,7 +278,7 @@ fn motion_tables(names: &[&str; 3], members: &[Member<'_>]) -> Vec<Table> {
 }
 
 /// event, from, to, side, leg, error, time, arc, rule.
-fn event_cells(event: &ModeEvent<3>) -> [Entry; 9] {
+fn event_cells<const D: usize>(event: &ModeEvent<D>) -> [Entry; 9] {
     let none = f64::NAN;
     let (word, side, [leg, error, time, arc], rule) = match event.kind {
         EventKind::Crossing { to } => ("crossing", Some(to), [none; 4], None),
@@ -303,11 +308,11 @@ fn event_cells(event: &ModeEvent<3>) -> [Entry; 9] {
 }
 
 /// Each motion of the tables with its future, in order; at least the approach, which may be empty.
-type Members = Vec<(Option<(f64, Side)>, Motion)>;
+type Members<const D: usize> = Vec<(Option<(f64, Side)>, Motion<D>)>;
 
-fn members_of(names: &[&str; 3], points: &Table, events: &Table) -> Result<Members, NoSuchFact> {
+fn members_of<const D: usize>(names: &[&str], points: &Table, events: &Table) -> Result<Members<D>, NoSuchFact> {
     let wrong = |why: &str| NoSuchFact { name: "motion".into(), why: why.into() };
-    let mut members: Members = vec![(None, Motion::default())];
+    let mut members: Members<D> = vec![(None, Motion::default())];
     let mut last_piece = None;
     let futures = points.integers("future").iter().zip(points.numbers("exit_time")).zip(points.words("exit_side"));
     let modes = points.words("mode").zip(points.integers("piece"));
@@ -334,7 +339,12 @@ fn members_of(names: &[&str; 3], points: &Table, events: &Table) -> Result<Membe
 }
 
 /// The motion of a future, made if it is the next one.
-fn member<'a>(members: &'a mut Members, future: i64, exit_time: f64, side: &str) -> Option<&'a mut Motion> {
+fn member<'a, const D: usize>(
+    members: &'a mut Members<D>,
+    future: i64,
+    exit_time: f64,
+    side: &str,
+) -> Option<&'a mut Motion<D>> {
     let index = usize::try_from(future).ok()?;
     if index == members.len() {
         members.push((Some((exit_time, side_of(side)?)), Motion::default()));
@@ -342,7 +352,7 @@ fn member<'a>(members: &'a mut Members, future: i64, exit_time: f64, side: &str)
     members.get_mut(index).map(|(_, motion)| motion)
 }
 
-fn event_of(events: &Table, row: usize, at: &Sample) -> Option<ModeEvent<3>> {
+fn event_of<const D: usize>(events: &Table, row: usize, at: &Sample<D>) -> Option<ModeEvent<D>> {
     let cell = |name: &str| events.column(name).map(|c| c.get(row));
     let word = |name: &str| cell(name).map_or_else(String::new, |c| c.word().to_owned());
     let number = |name: &str| cell(name).map_or(f64::NAN, |c| c.value());
@@ -382,9 +392,9 @@ mod tests {
 
     fn run(switch: SwitchSpec, observe: Observation) -> RunSpec {
         RunSpec {
-            system: SystemSpec::Caricature(Caricature::with_reinjection(1e-1, 1e-5)),
+            system: Caricature::with_reinjection(1e-1, 1e-5).into(),
             switch,
-            start: [0.2, 0.0, -1.0],
+            start: vec![0.2, 0.0, -1.0],
             t_end: 40.0,
             method: MethodSpec {
                 name: Method::Dopri5,
@@ -424,7 +434,7 @@ mod tests {
     #[test]
     fn an_answer_of_another_kind_is_no_recording() {
         let run = run(SwitchSpec::tanh(1e-2), Observation::Path { chord: 1e-2 });
-        let error = Recording::of_answer(&run, &Answer::of_tables(Vec::new())).unwrap_err();
+        let error = <Recording>::of_answer(&run, &Answer::of_tables(Vec::new())).unwrap_err();
         assert!(error.to_string().contains("path"), "{error}");
     }
 }

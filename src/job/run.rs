@@ -5,13 +5,13 @@ use serde_json::Value;
 use super::answer::Answer;
 use super::desk::Desk;
 use super::question::{JobError, Question};
-use super::simulate::simulate;
+use super::simulate;
 use super::spec::{Method, RunSpec, SwitchSpec};
 use crate::integrate::Watch;
 
 /// A run, and what is recorded of it: see [`Recording`](super::Recording) for the answer's tables. Facts: `t` and `state` at the end,
 /// `most_steps_in_segment`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Run(pub RunSpec);
 
 impl Question for Run {
@@ -20,7 +20,7 @@ impl Question for Run {
     }
 
     fn json(&self) -> Value {
-        serde_json::to_value(self.0).expect("specs are plain data")
+        serde_json::to_value(&self.0).expect("specs are plain data")
     }
 
     fn label(&self) -> String {
@@ -49,6 +49,6 @@ impl Question for Run {
     }
 
     fn compute(&self, _: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
-        Ok(simulate(&self.0, watch)?.to_answer(&self.0))
+        simulate::answer(&self.0, watch)
     }
 }

@@ -9,18 +9,18 @@ pub use crate::integrate::Method;
 use crate::integrate::filippov::ExitRule;
 use crate::integrate::{Schedule, StepCap, Tolerance};
 use crate::num::elementary::exp10;
-use crate::system::{Caricature, Relaxation, Transition, Wheel};
+use crate::system::{Relaxation, System, Transition};
 
 /// One run: system, switch, start, method, schedule, and what is recorded.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunSpec {
     /// The piecewise-smooth system.
-    pub system: SystemSpec,
+    pub system: System,
     /// How the switch at h = 0 is modelled.
     pub switch: SwitchSpec,
-    /// Initial state.
-    pub start: [f64; 3],
+    /// Initial state, one number for each of the system's.
+    pub start: Vec<f64>,
     /// Final time; the run starts at 0.
     pub t_end: f64,
     /// Integration method and its settings.
@@ -29,26 +29,6 @@ pub struct RunSpec {
     pub schedule: Schedule,
     /// What is recorded.
     pub observe: Observation,
-}
-
-/// A piecewise-smooth system of the paper.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum SystemSpec {
-    /// Eq. (5).
-    Caricature(Caricature),
-    /// Eqs (1)-(2), reconstructed.
-    Wheel(Wheel),
-}
-
-impl SystemSpec {
-    /// Names of the state's components.
-    pub fn coordinates(&self) -> [&'static str; 3] {
-        match self {
-            SystemSpec::Caricature(_) => ["x", "y", "z"],
-            SystemSpec::Wheel(_) => ["r", "v", "omega"],
-        }
-    }
 }
 
 /// What stands in for the discontinuity.
@@ -160,6 +140,25 @@ pub enum Observation {
     },
 }
 
+/// Columns of recorded data beside the states'.
+const COLUMNS: [&str; 15] = [
+    "t",
+    "direction",
+    "mode",
+    "piece",
+    "future",
+    "exit_time",
+    "exit_side",
+    "event",
+    "from",
+    "to",
+    "side",
+    "leg",
+    "error",
+    "time",
+    "arc",
+];
+
 /// A wrong number in a spec: which, and what is allowed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{field} is {value}: {rule}")]
@@ -187,24 +186,30 @@ impl RunSpec {
             if value.is_finite() { Ok(()) } else { error(field, value, "give a finite number") }
         };
         positive("t-end", self.t_end)?;
-        for value in self.start {
-            finite("start", value)?;
+        let states = self.system.coordinates();
+        if self.start.len() != states.len() {
+            return Err(SpecError {
+                field: "start",
+                value: format!("{:?}", self.start),
+                rule: "give one number for each of the system's states",
+            });
         }
-        match self.system {
-            SystemSpec::Caricature(c) => {
-                finite("alpha", c.alpha)?;
-                finite("beta", c.beta)?;
-                finite("v-plus", c.v_plus)?;
-                finite("v-minus", c.v_minus)?;
+        for value in &self.start {
+            finite("start", *value)?;
+        }
+        for (name, value) in self.system.parameters() {
+            if !value.value().is_finite() {
+                let value = format!("with {name} = {}", value.value());
+                return Err(SpecError { field: "system", value, rule: "parameters are finite numbers" });
             }
-            SystemSpec::Wheel(w) => {
-                positive("m", w.m)?;
-                positive("j", w.j)?;
-                positive("v_c", w.v_c)?;
-                for value in [w.d, w.gamma, w.k_w, w.r0, w.c_w, w.c_h, w.omega0, w.side_force, w.trail] {
-                    finite("a parameter of the wheel", value)?;
-                }
-            }
+        }
+        if let Some(name) = states.iter().find(|s| COLUMNS.contains(s)) {
+            let value = format!("one with a state called {name}");
+            return Err(SpecError {
+                field: "system",
+                value,
+                rule: "recorded data have a column of this name; rename the state",
+            });
         }
         match self.switch {
             SwitchSpec::Smoothed { eps, transition } => {
@@ -289,8 +294,8 @@ impl RunSpec {
         match self.observe {
             Observation::Path { chord } => positive("chord", chord),
             Observation::Section { coordinate, value } => {
-                if coordinate > 2 {
-                    return error("section", coordinate as f64, "the state has three components, 0, 1 and 2");
+                if coordinate >= states.len() {
+                    return error("section", coordinate as f64, "that is not the number of a state; they count from 0");
                 }
                 finite("section", value)
             }

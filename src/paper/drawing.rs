@@ -5,19 +5,19 @@ use crate::analyse::{Crossing, Motion, Sample};
 use crate::draw::surface;
 use crate::integrate::filippov::{EventKind, Mode, Side};
 use crate::job::recording::{Data, Future, Recording};
-use crate::job::spec::SystemSpec;
 use crate::record::Hash;
 use crate::render::sheet::{
     Axis, ColumnWidth, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle, PlanePanel, Sheet,
     SpacePanel, range_of,
 };
 use crate::render::style;
+use crate::system::Compiled;
 
 /// The drawing of a picture of runs.
 pub fn sheet(picture: &Picture, recordings: &[Recording], spec: &Hash, data: &Hash) -> Sheet {
     let runs: Vec<_> = picture.panels.iter().map(|p| &p.run).collect();
     let mut sheet = dress(Sheet::new(ColumnWidth::Double, columns(picture), ""), picture, spec, data);
-    if picture.panels.iter().any(|p| matches!(p.run.system, SystemSpec::Wheel(_))) {
+    if picture.panels.iter().any(|p| matches!(p.run.system.compiled(), Some(Compiled::Wheel(_)))) {
         sheet = sheet.subtitle("reconstruction: the paper gives the form of the equations, not their coefficients");
     }
     for line in wording::small_print(picture.reading, &runs) {

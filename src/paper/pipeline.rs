@@ -122,7 +122,7 @@ pub fn pixel_hash(pixels: &Pixels) -> Hash {
 fn parts(picture: &Picture) -> Vec<(String, AnyQuestion)> {
     match &picture.view {
         View::Study(study) => (study.questions)().into_iter().map(|q| (q.kind().to_owned(), q)).collect(),
-        _ => picture.panels.iter().map(|p| (p.label.clone(), Arc::new(Run(p.run)) as AnyQuestion)).collect(),
+        _ => picture.panels.iter().map(|p| (p.label.clone(), Arc::new(Run(p.run.clone())) as AnyQuestion)).collect(),
     }
 }
 
@@ -182,11 +182,12 @@ pub fn compute(picture: &Picture, desk: &Desk<'_>) -> Result<Computed, PipelineE
         _ => {
             let mut recordings = Vec::new();
             for (panel, answer) in picture.panels.iter().zip(&answers) {
-                let recording = Recording::of_answer(&panel.run, answer).map_err(|e| failed(&panel.label)(e.into()))?;
+                let recording =
+                    <Recording>::of_answer(&panel.run, answer).map_err(|e| failed(&panel.label)(e.into()))?;
                 panels.push(PanelRecord {
                     label: panel.label.clone(),
                     title: panel.title.clone(),
-                    run: panel.run,
+                    run: panel.run.clone(),
                     points: recording.data.len(),
                     t: recording.t,
                     state: recording.x,

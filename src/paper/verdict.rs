@@ -83,9 +83,9 @@ impl Claim {
 pub fn question(picture: &Picture, index: usize) -> Option<AnyQuestion> {
     let panel = picture.panels.get(index)?;
     Some(match panel.claim? {
-        Claim::Section(_) => Arc::new(Classification::of(panel.run)),
+        Claim::Section(_) => Arc::new(Classification::of(panel.run.clone())),
         Claim::LessOrganisedThanNext | Claim::DiffersFromNext => {
-            Arc::new(PathComparison(panel.run, picture.panels.get(index + 1)?.run))
+            Arc::new(PathComparison(panel.run.clone(), picture.panels.get(index + 1)?.run.clone()))
         }
     })
 }

@@ -3,8 +3,8 @@
 use super::Reading;
 use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use crate::integrate::{Kick, StepCap};
-use crate::job::spec::{MethodSpec, RunSpec, SwitchSpec, SystemSpec};
-use crate::system::{Relaxation, Transition};
+use crate::job::spec::{MethodSpec, RunSpec, SwitchSpec};
+use crate::system::{Compiled, Relaxation, System, Transition};
 
 /// A number as a printer would set it: 0.13, 10^{-5}, 1.05×10^{-8}, 200 000.
 pub fn number(value: f64) -> String {
@@ -44,21 +44,22 @@ pub fn reading(reading: Reading) -> String {
 }
 
 /// The system and its parameters.
-pub fn system(system: &SystemSpec) -> String {
-    match system {
-        SystemSpec::Caricature(c) => format!(
+pub fn system(system: &System) -> String {
+    match system.compiled() {
+        Some(Compiled::Caricature(c)) => format!(
             "*α* = {}, *β* = {}, *v*_{{+}} = {}, *v*_{{−}} = {}",
             number(c.alpha),
             number(c.beta),
             number(c.v_plus),
             number(c.v_minus)
         ),
-        SystemSpec::Wheel(w) => format!(
-            "wheel (reconstruction): *m* = {}, *J* = {}, *d* = {}, *γ* = π/4, *k*_{{w}} = {}, *c*_{{w}} = {}, *c*_{{h}} = {}, \
+        Some(Compiled::Wheel(w)) => format!(
+            "wheel (reconstruction): *m* = {}, *J* = {}, *d* = {}, *γ* = {}, *k*_{{w}} = {}, *c*_{{w}} = {}, *c*_{{h}} = {}, \
              *ω*_{{0}} = {}, *F* = {}, *q* = {}, *V*_{{c}} = {}",
             number(w.m),
             number(w.j),
             number(w.d),
+            if w.gamma == std::f64::consts::FRAC_PI_4 { "π/4".into() } else { number(w.gamma) },
             number(w.k_w),
             number(w.c_w),
             number(w.c_h),
@@ -67,6 +68,11 @@ pub fn system(system: &SystemSpec) -> String {
             number(w.trail),
             number(w.v_c)
         ),
+        None => {
+            let parameters = system.parameters().map(|(name, value)| format!("*{name}* = {}", number(value.value())));
+            let name = (!system.definition().title().is_empty()).then(|| system.definition().title().to_owned());
+            name.into_iter().chain(parameters).collect::<Vec<_>>().join(", ")
+        }
     }
 }
 

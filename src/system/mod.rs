@@ -1,11 +1,17 @@
-//! The paper's equations, one file each, and no time stepping.
+//! The equations, and no time stepping.
 //!
 //! Two nouns carry everything. A [`VectorField`] is an ordinary autonomous differential equation x' = f(x). A
 //! [`PiecewiseSmooth`] system is two of them and a switching function h: f+ where h > 0, f- where h < 0. It is not a
 //! vector field: on h = 0 its motion is defined by Filippov's convention ([`filippov`]) and at a two-fold it is
-//! set-valued. Smoothing ([`Smoothed`]) and hysteresis ([`Hysteretic`]) turn the second into the first.
+//! set-valued.
 //!
-//! Equations are generic over [`Scalar`], so that each is written once.
+//! Both exist as data of any dimension: a [`Definition`] is read from a file, a [`System`] is a definition with values for its
+//! parameters, and a [`Field`] is what becomes of a system by smoothing, hysteresis, reversing time, sliding, or carrying tangent
+//! vectors along. [`library`] holds the built-in ones. Bound to a dimension ([`System::bind`], [`Field::bind`]) they are evaluated over
+//! any number type.
+//!
+//! The paper's own two, [`Caricature`] and [`Wheel`], exist as Rust too, with [`Smoothed`] and [`Hysteretic`] on top: fast paths, tested to
+//! give the bits of the files. Equations in Rust are generic over [`Elementary`], so that each is written once.
 
 pub mod caricature;
 pub mod definition;
@@ -17,11 +23,8 @@ pub mod filippov;
 pub mod hysteretic;
 pub mod instance;
 pub mod library;
-pub mod normal_form;
-pub mod relay;
 pub mod reversed;
 pub mod smoothed;
-pub mod stick_slip;
 pub mod transition;
 pub mod wheel;
 
@@ -40,11 +43,8 @@ pub use expression::Expression;
 pub use field::{BoundField, Field};
 pub use hysteretic::{Hysteretic, Relaxation};
 pub use instance::{Bound, Compiled, DimensionError, ParameterError, System};
-pub use normal_form::TwoFoldNormalForm;
-pub use relay::{Feedback, Relay};
 pub use reversed::Reversed;
 pub use smoothed::Smoothed;
-pub use stick_slip::StickSlip;
 pub use transition::Transition;
 pub use wheel::Wheel;
 

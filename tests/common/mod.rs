@@ -26,9 +26,9 @@ pub fn small_figure(t_end: f64) -> Figure {
         |reading| {
             let panel = |label, every: f64, claim| {
                 let run = RunSpec {
-                    system: SystemSpec::Caricature(reading.caricature()),
+                    system: reading.caricature().into(),
                     switch: SwitchSpec::tanh(1e-3),
-                    start: [0.2, 0.0, -1.0],
+                    start: vec![0.2, 0.0, -1.0],
                     t_end,
                     method: MethodSpec::ndsolve_defaults(Method::Lsoda),
                     schedule: Schedule { restart_every: Some(every), kick: None },

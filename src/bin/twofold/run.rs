@@ -1,6 +1,6 @@
 //! `twofold run`: any run, not only the paper's.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use twofold::cli::print_bytes;
@@ -9,9 +9,12 @@ use twofold::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use twofold::integrate::{Kick, KickLaw, Schedule, StepCap, Tolerance};
 use twofold::job::spec::*;
 use twofold::job::{Desk, Question, Run, encode};
+use twofold::num::Decimal;
+use twofold::num::decimal::DecimalError;
 use twofold::paper::Reading;
 use twofold::record;
-use twofold::system::{Relaxation, Transition, Wheel};
+use twofold::system::diagnostic::nearest;
+use twofold::system::{Definition, ParameterError, Relaxation, System, Transition, library};
 
 use super::{Outcome, Problem};
 
@@ -37,9 +40,13 @@ pub struct Arguments {
 /// The flags that describe a run.
 #[derive(Debug, clap::Args)]
 pub struct RunFlags {
-    /// Piecewise-smooth system.
-    #[arg(long, value_enum, default_value = "caricature")]
-    system: System,
+    /// Piecewise-smooth system: a built-in one (caricature, caricature-as-printed, two-fold, wheel, relay-linear, relay-parabolic,
+    /// stick-slip) or a file that defines one (.toml, .json).
+    #[arg(long, value_name = "NAME|FILE", default_value = "caricature")]
+    system: String,
+    /// Give a parameter of the system another value; may be repeated.
+    #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
+    set: Vec<String>,
     /// What stands in for the discontinuity.
     #[arg(long, value_enum, default_value = "smoothed")]
     switch: Switch,
@@ -70,8 +77,8 @@ pub struct RunFlags {
     /// Reading of eq. (10).
     #[arg(long, value_enum, default_value = "literal")]
     hysteresis: Hysteresis,
-    /// Initial state [default: 0.2,0,-1 for the caricature; 0.69267,0,0 for the wheel].
-    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_hyphen_values = true)]
+    /// Initial state, one number for each of the system's [default: the one that the system suggests].
+    #[arg(long, value_name = "X,Y,...", value_delimiter = ',', allow_hyphen_values = true)]
     start: Option<Vec<f64>>,
     /// Final time.
     #[arg(long, default_value_t = 150.0, allow_hyphen_values = true)]
@@ -136,19 +143,11 @@ pub struct RunFlags {
     chord: f64,
     /// Take the whole run from a file made with --print-spec; other flags of the run are then refused.
     #[arg(long, value_name = "FILE", conflicts_with_all = [
-        "system", "switch", "reading", "alpha", "beta", "v_plus", "v_minus", "eps", "sigma", "eps_prime", "hysteresis", "start",
+        "system", "set", "switch", "reading", "alpha", "beta", "v_plus", "v_minus", "eps", "sigma", "eps_prime", "hysteresis", "start",
         "t_end", "method", "rtol", "atol", "max_step", "max_steps", "restart", "kick_every", "kick_size", "kick_law", "seed",
         "stream", "section", "chord", "exit", "plus_probability", "funnel_times", "funnel_shortest", "funnel_longest", "funnel_horizon",
     ])]
     spec: Option<PathBuf>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum)]
-enum System {
-    /// Eq. (5).
-    Caricature,
-    /// Eqs (1)-(2), reconstructed.
-    Wheel,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -190,8 +189,20 @@ enum Format {
 /// A flag that does not fit.
 #[derive(Debug, thiserror::Error)]
 enum Misuse {
-    #[error("{flag} belongs to the caricature; leave it out with --system wheel")]
-    NotOfTheWheel { flag: &'static str },
+    #[error(
+        "{flag} belongs to the caricature; leave it out with --system {system}, and give parameters by --set NAME=VALUE"
+    )]
+    NotOfTheCaricature { flag: &'static str, system: String },
+    #[error(
+        "--system {name}: there is no such built-in system{help}; built in are {known}; give a file's name for your own"
+    )]
+    NoSuchSystem { name: String, help: String, known: String },
+    #[error("--system {file}: {problem}")]
+    SystemFile { file: String, problem: String },
+    #[error("--set \"{text}\": {problem}")]
+    Set { text: String, problem: String },
+    #[error("{system} suggests no initial state; give one by --start, {states} numbers")]
+    NoStart { system: String, states: usize },
     #[error("--sigma perturbs the smoothed switch; leave it out, or use --switch smoothed")]
     SigmaWithoutSmoothing,
     #[error(
@@ -202,10 +213,10 @@ enum Misuse {
         "--exit \"{0}\" is not a rule; give one such as at-once:plus, after-time:0.3:minus, after-arc:0.2:plus, random:exponential:0.5, random:uniform:1, or all"
     )]
     Exit(String),
-    #[error("--start has {found} numbers; give three, such as 0.2,0,-1")]
-    Start { found: usize },
+    #[error("--start has {found} numbers; give {wanted}, one for each of {states}")]
+    Start { found: usize, wanted: usize, states: String },
     #[error("--section \"{text}\": {problem}; give one of {known} and a number, such as {example}=0")]
-    Section { text: String, problem: &'static str, known: String, example: &'static str },
+    Section { text: String, problem: &'static str, known: String, example: String },
     #[error("{file} is not a spec of one run: {reason}; make one with `--only PANEL --reading READING --print-spec`")]
     Spec { file: String, reason: String },
 }
@@ -251,23 +262,7 @@ impl RunFlags {
 
 /// The spec that the flags describe, unchecked.
 fn spec(a: &RunFlags) -> Result<RunSpec, Misuse> {
-    let system = match a.system {
-        System::Caricature => {
-            let mut c = a.reading.caricature();
-            c.alpha = a.alpha.unwrap_or(c.alpha);
-            c.beta = a.beta.unwrap_or(c.beta);
-            c.v_plus = a.v_plus.unwrap_or(c.v_plus);
-            c.v_minus = a.v_minus.unwrap_or(c.v_minus);
-            SystemSpec::Caricature(c)
-        }
-        System::Wheel => {
-            let given = [("--alpha", a.alpha), ("--beta", a.beta), ("--v-plus", a.v_plus), ("--v-minus", a.v_minus)];
-            if let Some((flag, _)) = given.into_iter().find(|(_, value)| value.is_some()) {
-                return Err(Misuse::NotOfTheWheel { flag });
-            }
-            SystemSpec::Wheel(Wheel::default())
-        }
-    };
+    let system = system(a)?;
     let switch = match a.switch {
         Switch::Smoothed => SwitchSpec::Smoothed {
             eps: a.eps,
@@ -296,9 +291,15 @@ fn spec(a: &RunFlags) -> Result<RunSpec, Misuse> {
         }
     };
     let start = match &a.start {
-        None if a.system == System::Wheel => [0.69267, 0.0, 0.0],
-        None => [0.2, 0.0, -1.0],
-        Some(numbers) => numbers.as_slice().try_into().map_err(|_| Misuse::Start { found: numbers.len() })?,
+        None => {
+            let none = || Misuse::NoStart { system: a.system.clone(), states: system.dimension() };
+            system.definition().start().ok_or_else(none)?.to_vec()
+        }
+        Some(numbers) if numbers.len() != system.dimension() => {
+            let states = system.coordinates().join(", ");
+            return Err(Misuse::Start { found: numbers.len(), wanted: system.dimension(), states });
+        }
+        Some(numbers) => numbers.clone(),
     };
     let discontinuous = matches!(switch, SwitchSpec::Filippov { .. });
     let name = a.method.unwrap_or(if discontinuous { Method::Dopri5 } else { Method::Lsoda });
@@ -334,6 +335,60 @@ fn spec(a: &RunFlags) -> Result<RunSpec, Misuse> {
     })
 }
 
+/// The system that --system, --reading, --set and the caricature's own flags describe.
+fn system(a: &RunFlags) -> Result<System, Misuse> {
+    let name = a.system.as_str();
+    let own = [("--alpha", a.alpha), ("--beta", a.beta), ("--v-plus", a.v_plus), ("--v-minus", a.v_minus)];
+    let mut system = match System::builtin(name) {
+        Some(system) => system,
+        None => from_file(name)?,
+    };
+    if matches!(name, "caricature" | "caricature-as-printed") {
+        let reading = a.reading.caricature();
+        let values = [
+            ("alpha", a.alpha.unwrap_or(reading.alpha)),
+            ("beta", a.beta.unwrap_or(reading.beta)),
+            ("v_plus", a.v_plus.unwrap_or(reading.v_plus)),
+            ("v_minus", a.v_minus.unwrap_or(reading.v_minus)),
+        ];
+        for (parameter, value) in values {
+            let refused =
+                |e: ParameterError| Misuse::Set { text: format!("{parameter}={value}"), problem: e.to_string() };
+            system = system.with(parameter, value).map_err(refused)?;
+        }
+    } else if let Some((flag, _)) = own.into_iter().find(|(_, value)| value.is_some()) {
+        return Err(Misuse::NotOfTheCaricature { flag, system: name.to_owned() });
+    }
+    for text in &a.set {
+        let refused = |problem: String| Misuse::Set { text: text.clone(), problem };
+        let Some((parameter, value)) = text.split_once('=') else {
+            return Err(refused("there is no \"=\"; give it as NAME=VALUE, such as alpha=0.2".into()));
+        };
+        let value: Decimal = value.trim().parse().map_err(|e: DecimalError| refused(e.to_string()))?;
+        system = system.with(parameter.trim(), value).map_err(|e| refused(e.to_string()))?;
+    }
+    Ok(system)
+}
+
+/// A system from a file, TOML or JSON.
+fn from_file(name: &str) -> Result<System, Misuse> {
+    let path = Path::new(name);
+    let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    let is_file = json || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) || path.is_file();
+    if !is_file {
+        let known: Vec<&str> = library::names().collect();
+        let help = nearest(name, &known).map_or(String::new(), |near| format!(", did you mean {near}?"));
+        return Err(Misuse::NoSuchSystem { name: name.into(), help, known: known.join(", ") });
+    }
+    let problem = |problem: String| Misuse::SystemFile { file: name.into(), problem };
+    let text = record::files::read_text(path).map_err(|e| problem(e.to_string()))?;
+    if json {
+        serde_json::from_str(&text).map_err(|e| problem(e.to_string()))
+    } else {
+        Definition::from_toml(&text, name).map(System::new).map_err(|e| problem(e.to_string()))
+    }
+}
+
 /// Reads "after-time:0.3:minus".
 fn exit_rule(a: &RunFlags) -> Result<ExitRule, Misuse> {
     let text = a.exit.as_deref().ok_or(Misuse::NoExitRule)?;
@@ -357,10 +412,14 @@ fn exit_rule(a: &RunFlags) -> Result<ExitRule, Misuse> {
 }
 
 /// Reads "y=0".
-fn section(text: &str, system: &SystemSpec) -> Result<Observation, Misuse> {
+fn section(text: &str, system: &System) -> Result<Observation, Misuse> {
     let names = system.coordinates();
-    let misuse =
-        |problem| Misuse::Section { text: text.to_owned(), problem, known: names.join(", "), example: names[1] };
+    let misuse = |problem| Misuse::Section {
+        text: text.to_owned(),
+        problem,
+        known: names.join(", "),
+        example: names[names.len() - 1].into(),
+    };
     let (name, value) = text.split_once('=').ok_or_else(|| misuse("there is no \"=\""))?;
     let coordinate =
         names.iter().position(|n| *n == name.trim()).ok_or_else(|| misuse("there is no such coordinate"))?;

@@ -88,7 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
 type ThreadProblem = Box<dyn std::error::Error + Send + Sync>;
 
 fn one(spec: &RunSpec, shift: f64, desk: &Desk<'_>) -> Result<(f64, Evidence), ThreadProblem> {
-    let mut shifted = *spec;
+    let mut shifted = spec.clone();
     shifted.start[0] += shift;
     Ok((shift, Classification::of(shifted).ask(desk)?))
 }

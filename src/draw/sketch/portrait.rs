@@ -77,7 +77,7 @@ pub fn draw(tables: &[Table], v: f64, w: f64) -> Sheet {
     let axis = |name: &str, reach: f64| Axis::linear(name, -reach, reach);
     let mut chart = SpacePanel::new(axis("*y*", REACH), axis("*z*", REACH), axis("*x*", 0.3)).camera(-60.0, 26.0);
     let ranges = [(-0.3, 0.3), (-REACH, REACH), (-REACH, REACH)];
-    let spec = crate::job::spec::SystemSpec::Caricature(system(v, w));
+    let spec = system(v, w).into();
     let mut patches = surface::patches(&spec, &ranges, 20);
     for corner in patches.iter_mut().flat_map(|p| p.corners.iter_mut()) {
         *corner = turn(*corner);

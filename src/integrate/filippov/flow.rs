@@ -58,11 +58,14 @@ macro_rules! sliding_in_dimension {
     };
 }
 
+sliding_in_dimension!(1, 2);
 sliding_in_dimension!(2, 3);
 sliding_in_dimension!(3, 4);
 sliding_in_dimension!(4, 5);
 sliding_in_dimension!(5, 6);
 sliding_in_dimension!(6, 7);
+sliding_in_dimension!(7, 8);
+sliding_in_dimension!(8, 9);
 
 /// The point of h = 0 that Newton's method along grad h finds from `x`. For h linear in one coordinate it is exact.
 pub(super) fn project<P: PiecewiseSmooth<N>, const N: usize>(system: &P, x: &SVector<f64, N>) -> SVector<f64, N> {

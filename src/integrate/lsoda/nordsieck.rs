@@ -87,6 +87,10 @@ impl<const N: usize> Interpolant<N> for Nordsieck<N> {
     fn degree(&self) -> usize {
         self.degree
     }
+    /// The polynomial's distance from its end, term by term.
+    fn reach(&self, coordinate: usize) -> f64 {
+        self.y[1..=self.degree].iter().map(|y| y[coordinate].abs()).sum()
+    }
 }
 
 #[cfg(test)]
