@@ -5,7 +5,7 @@ FIGURES := fig1 fig2 fig3 fig4 fig5 fig6 fig7 fig8 fig9 lottery workprecision di
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help figures report check bless test elementary rigor-test browser-test lint bench ci clean
+.PHONY: help figures report check bless test elementary rigor-test browser-test lint bench torture ci clean
 
 help: ## this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -41,6 +41,10 @@ lint: ## formatting, clippy and documentation, warnings denied
 	@$(CARGO) fmt --check
 	@$(CARGO) clippy --locked --all-targets -- -D warnings
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --quiet
+
+torture: ## kill the program at random moments and look for losses: make torture KILLS=100
+	@$(CARGO) build --release --locked --bin twofold
+	@scripts/torture.sh $(or $(KILLS),100)
 
 bench: ## benchmarks
 	@$(CARGO) bench --locked

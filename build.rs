@@ -1,7 +1,10 @@
-//! Digests the sources that numbers depend on, so that an answer kept by one version of the numerics is never taken for another's.
+//! Digests the sources that numbers depend on, so that an answer kept by one version of the numerics is never taken for another's. And what
+//! `--version` says of a build: commit, compiler, target. Nothing here needs git or a clock; the same sources built by the same
+//! compiler get the same words.
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use sha2::{Digest, Sha256};
 
@@ -10,6 +13,24 @@ const NUMERICS: [&str; 7] =
     ["src/num", "src/system", "src/integrate", "src/analyse", "src/job", "systems", "Cargo.lock"];
 
 fn main() {
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rustc-env=TWOFOLD_NUMERICS={}", numerics());
+    let variable = |name: &str| std::env::var(name).unwrap_or_else(|_| "unknown".into());
+    let rustc = said(Command::new(variable("RUSTC")).arg("--version")).unwrap_or_else(|| "unknown".into());
+    // Only releases carry their commit: a debug build would be made anew after every one.
+    let commit = if variable("PROFILE") == "release" { commit() } else { "not recorded in debug builds".into() };
+    for (name, value) in [
+        ("TWOFOLD_COMMIT", commit),
+        ("TWOFOLD_RUSTC", rustc),
+        ("TWOFOLD_TARGET", variable("TARGET")),
+        ("TWOFOLD_PROFILE", variable("PROFILE")),
+    ] {
+        println!("cargo::rustc-env={name}={value}");
+    }
+}
+
+/// The digest of the numerics' sources.
+fn numerics() -> String {
     let mut files = Vec::new();
     for place in NUMERICS {
         println!("cargo::rerun-if-changed={place}");
@@ -24,8 +45,7 @@ fn main() {
         digest.update(name.join("/"));
         digest.update(text.into_iter().filter(|b| *b != b'\r').collect::<Vec<u8>>());
     }
-    let hex: String = digest.finalize().iter().take(16).map(|b| format!("{b:02x}")).collect();
-    println!("cargo::rustc-env=TWOFOLD_NUMERICS={hex}");
+    digest.finalize().iter().take(16).map(|b| format!("{b:02x}")).collect()
 }
 
 fn collect(place: &Path, files: &mut Vec<PathBuf>) {
@@ -35,4 +55,40 @@ fn collect(place: &Path, files: &mut Vec<PathBuf>) {
         // A room that is not there yet.
         Err(_) => {}
     }
+}
+
+/// The commit that stands in the working tree of this package, or that the package was made from.
+fn commit() -> String {
+    let here = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
+    // Cargo writes this into every package that it makes.
+    if let Ok(packaged) = fs::read_to_string(here.join(".cargo_vcs_info.json")) {
+        let hash = packaged.split("\"sha1\": \"").nth(1).and_then(|rest| rest.split('"').next());
+        return hash.unwrap_or("unknown").to_owned();
+    }
+    let git = |arguments: &[&str]| said(Command::new("git").arg("-C").arg(&here).args(arguments));
+    // Sources inside some other repository are not of its commit.
+    let ours = git(&["rev-parse", "--show-toplevel"])
+        .is_some_and(|top| matches!((Path::new(&top).canonicalize(), here.canonicalize()), (Ok(a), Ok(b)) if a == b));
+    let Some(hash) = git(&["rev-parse", "HEAD"]).filter(|_| ours) else {
+        return "unknown (not built from a git checkout)".into();
+    };
+    // Every commit and checkout is logged; a change of the sources is one of these.
+    for path in ["logs/HEAD", "HEAD"] {
+        let watched = git(&["rev-parse", "--git-path", path]).map(|p| here.join(p));
+        if let Some(file) = watched.filter(|p| p.exists()) {
+            println!("cargo::rerun-if-changed={}", file.display());
+        }
+    }
+    let watched = ["src", "figures", "Cargo.toml", "Cargo.lock"];
+    for path in watched {
+        println!("cargo::rerun-if-changed={path}");
+    }
+    let changed = git(&[&["status", "--porcelain", "--"], &watched[..]].concat()).is_none_or(|list| !list.is_empty());
+    if changed { format!("{hash}, with changes") } else { hash }
+}
+
+/// What a command prints, if it can be run and succeeds.
+fn said(command: &mut Command) -> Option<String> {
+    let output = command.output().ok().filter(|o| o.status.success())?;
+    Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }

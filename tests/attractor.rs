@@ -2,12 +2,13 @@
 #![allow(clippy::disallowed_methods)] // exact solutions are compared to tolerances, not hashed
 
 use nalgebra::{SVector, vector};
-use twofold::analyse::attractor::{Claim, Evidence, Question, SectionPoint, Thresholds, Verdict, classify};
+use twofold::analyse::attractor::{Evidence, Question, SectionPoint, Thresholds, Verdict, classify};
 use twofold::analyse::floquet::{self, Plane, closed_orbit};
 use twofold::analyse::lyapunov::{self, largest};
 use twofold::integrate::{Course, Dopri5, Flow, Ignore, Observer, Step, StepCap, Tolerance, drive, roots};
 use twofold::num::Elementary;
 use twofold::num::random::RandomStream;
+use twofold::paper::claim::Claim;
 use twofold::system::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
 
 /// Lorenz (1963) at sigma = 10, rho = 28, beta = 8/3.

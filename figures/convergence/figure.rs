@@ -98,74 +98,8 @@ fn draw(tables: &[Table]) -> Sheet {
     let [before, members, after] = tables else { unreachable!("the two questions have three tables") };
     let (before, members, after) = (before.rows(), members.rows(), after.rows());
     let expected = LineStyle::new(style::SOFT_INK, style::CURVE_PT).dashed();
-
-    let mut moments: Vec<f64> = Vec::new();
-    for row in &before {
-        if !moments.contains(&value(&row[1])) {
-            moments.push(value(&row[1]));
-        }
-    }
-    let mut approach = PlanePanel::new(
-        Axis::log_covering("*ε*", before.iter().map(|r| value(&r[0]))),
-        with_room(12.0, before.iter().map(|r| value(&r[3]))),
-    );
-    let mut rates = Vec::new();
-    for (&t, (colour, shape)) in moments.iter().zip(LOOKS) {
-        let rows: Vec<_> = before.iter().filter(|r| value(&r[1]) == t).collect();
-        let points: Vec<[f64; 2]> = rows.iter().map(|r| [value(&r[0]), value(&r[3])]).collect();
-        let marker = MarkerStyle { shape, colour, size: 4.0 };
-        approach = approach.line(proportional(&points), expected).markers(points.clone(), marker);
-        let mode = if rows.iter().all(|r| r[2] == Entry::from("sliding")) { "sliding" } else { "free" };
-        approach = approach.legend(LegendKey::Marker(marker), format!("*t* = {} ({mode})", number(t)));
-        rates.push(format!("{:.3} at *t* = {}", observed_rate(points), number(t)));
-    }
-    let approach = approach.legend_at(Corner::LowerRight);
-
-    let crossings = |name: &'static str| -> Vec<[f64; 2]> {
-        let rows = members.iter().filter(|r| r[1] == Entry::from(name));
-        rows.map(|r| [value(&r[2]), value(&r[3])]).collect()
-    };
-    let exits: Vec<[f64; 2]> = after.iter().map(|r| [value(&r[1]), value(&r[2])]).collect();
-    let all = || members.iter().map(|r| [value(&r[2]), value(&r[3])]).chain(exits.iter().copied());
-    let (mut y, mut z) = (Axis::covering("*y*", all().map(|p| p[0])), Axis::covering("*z*", all().map(|p| p[1])));
-    let (wide, high) = (y.upper - y.lower, z.upper - z.lower);
-    let left = y.lower;
-    (y.upper, z.lower) = (y.upper + 0.3 * wide, z.lower - 0.12 * high);
-    let mut inside = PlanePanel::new(y, z);
-    for (name, words, colour) in
-        [("plus", "left to *x* > 0", style::BLUE), ("minus", "left to *x* < 0", style::VERMILLION)]
-    {
-        let marker = MarkerStyle { shape: MarkerShape::Dot, colour, size: 2.6 };
-        inside = inside.markers(crossings(name), marker).legend(LegendKey::Marker(marker), words);
-    }
-    let ring = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::INK, size: 5.0 };
-    inside = inside.markers(exits.clone(), ring).legend(LegendKey::Marker(ring), "smoothed");
-    for (row, &[y, z]) in after.iter().zip(&exits) {
-        // To the right above the lowest branch, below on it, but not across the frame.
-        let mut places = members.iter().map(|r| [value(&r[2]), value(&r[3])]);
-        let lowest = !places.any(|m| (m[0] - y).abs() < 0.08 * wide && m[1] < z - 0.06 * high);
-        let text = number(value(&row[0]));
-        inside = if lowest && y > left + 0.2 * wide {
-            inside.note([y, z - 0.03 * high], text, Anchor::Below)
-        } else {
-            inside.note([y + 0.07 * wide, z + 0.02 * high], text, Anchor::Left)
-        };
-    }
-
+    let (approach, rates) = approach(&before, expected);
     let distances: Vec<[f64; 2]> = after.iter().map(|r| [value(&r[0]), value(&r[5])]).collect();
-    let widths: Vec<[f64; 2]> = after.iter().map(|r| [value(&r[0]), value(&r[6])]).collect();
-    let near = MarkerStyle { shape: MarkerShape::Dot, colour: style::INK, size: 4.0 };
-    let whole = LineStyle::new(style::GREEN, style::CURVE_PT);
-    let last = PlanePanel::new(
-        Axis::log_covering("*ε*", distances.iter().map(|p| p[0])),
-        with_room(10.0, distances.iter().chain(&widths).map(|p| p[1])),
-    )
-    .line(widths, whole)
-    .markers(distances.clone(), near)
-    .legend(LegendKey::Line(whole), "width of the funnel")
-    .legend(LegendKey::Marker(near), "to its nearest member")
-    .legend_at(Corner::LowerRight);
-
     let visit = after.first().map_or(f64::NAN, |r| value(&r[7]));
     let nearest: Vec<String> = after
         .iter()
@@ -174,8 +108,8 @@ fn draw(tables: &[Table]) -> Sheet {
     Sheet::new(ColumnWidth::Double, 3, "")
         .panel_aspect(1.1)
         .panel("(a)", "before the visit", approach)
-        .panel("(b)", "crossings of *x* = 0 after it", inside)
-        .panel("(c)", "nearest member", last)
+        .panel("(b)", "crossings of *x* = 0 after it", crossings(&members, &after))
+        .panel("(c)", "nearest member", nearest_member(&after, &distances))
         .legend(LegendEntry::new(LegendKey::Line(expected), "(a) distance proportional to *ε*, through the point of the smallest *ε*"))
         .footer(format!(
             "(a) Distance of the smoothed orbit from the Filippov orbit, whose first visit to the singularity is at *t* = {visit:.3}. \
@@ -196,6 +130,82 @@ fn draw(tables: &[Table]) -> Sheet {
         ))
 }
 
+/// Distances before the visit, and their measured powers of eps in words.
+fn approach(before: &[Vec<Entry>], expected: LineStyle) -> (PlanePanel, Vec<String>) {
+    let mut moments: Vec<f64> = Vec::new();
+    for row in before {
+        if !moments.contains(&value(&row[1])) {
+            moments.push(value(&row[1]));
+        }
+    }
+    let mut panel = PlanePanel::new(
+        Axis::log_covering("*ε*", before.iter().map(|r| value(&r[0]))),
+        with_room(12.0, before.iter().map(|r| value(&r[3]))),
+    );
+    let mut rates = Vec::new();
+    for (&t, (colour, shape)) in moments.iter().zip(LOOKS) {
+        let rows: Vec<_> = before.iter().filter(|r| value(&r[1]) == t).collect();
+        let points: Vec<[f64; 2]> = rows.iter().map(|r| [value(&r[0]), value(&r[3])]).collect();
+        let marker = MarkerStyle { shape, colour, size: 4.0 };
+        panel = panel.line(proportional(&points), expected).markers(points.clone(), marker);
+        let mode = if rows.iter().all(|r| r[2] == Entry::from("sliding")) { "sliding" } else { "free" };
+        panel = panel.legend(LegendKey::Marker(marker), format!("*t* = {} ({mode})", number(t)));
+        rates.push(format!("{:.3} at *t* = {}", observed_rate(points), number(t)));
+    }
+    (panel.legend_at(Corner::LowerRight), rates)
+}
+
+/// Where members of the funnel and smoothed orbits cross after the visit.
+fn crossings(members: &[Vec<Entry>], after: &[Vec<Entry>]) -> PlanePanel {
+    let of = |name: &'static str| -> Vec<[f64; 2]> {
+        let rows = members.iter().filter(|r| r[1] == Entry::from(name));
+        rows.map(|r| [value(&r[2]), value(&r[3])]).collect()
+    };
+    let exits: Vec<[f64; 2]> = after.iter().map(|r| [value(&r[1]), value(&r[2])]).collect();
+    let all = || members.iter().map(|r| [value(&r[2]), value(&r[3])]).chain(exits.iter().copied());
+    let (mut y, mut z) = (Axis::covering("*y*", all().map(|p| p[0])), Axis::covering("*z*", all().map(|p| p[1])));
+    let (wide, high) = (y.upper - y.lower, z.upper - z.lower);
+    let left = y.lower;
+    (y.upper, z.lower) = (y.upper + 0.3 * wide, z.lower - 0.12 * high);
+    let mut panel = PlanePanel::new(y, z);
+    for (name, words, colour) in
+        [("plus", "left to *x* > 0", style::BLUE), ("minus", "left to *x* < 0", style::VERMILLION)]
+    {
+        let marker = MarkerStyle { shape: MarkerShape::Dot, colour, size: 2.6 };
+        panel = panel.markers(of(name), marker).legend(LegendKey::Marker(marker), words);
+    }
+    let ring = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::INK, size: 5.0 };
+    panel = panel.markers(exits.clone(), ring).legend(LegendKey::Marker(ring), "smoothed");
+    for (row, &[y, z]) in after.iter().zip(&exits) {
+        // To the right above the lowest branch, below on it, but not across the frame.
+        let mut places = members.iter().map(|r| [value(&r[2]), value(&r[3])]);
+        let lowest = !places.any(|m| (m[0] - y).abs() < 0.08 * wide && m[1] < z - 0.06 * high);
+        let text = number(value(&row[0]));
+        panel = if lowest && y > left + 0.2 * wide {
+            panel.note([y, z - 0.03 * high], text, Anchor::Below)
+        } else {
+            panel.note([y + 0.07 * wide, z + 0.02 * high], text, Anchor::Left)
+        };
+    }
+    panel
+}
+
+/// Distances to the nearest member, beside the funnel's width.
+fn nearest_member(after: &[Vec<Entry>], distances: &[[f64; 2]]) -> PlanePanel {
+    let widths: Vec<[f64; 2]> = after.iter().map(|r| [value(&r[0]), value(&r[6])]).collect();
+    let near = MarkerStyle { shape: MarkerShape::Dot, colour: style::INK, size: 4.0 };
+    let whole = LineStyle::new(style::GREEN, style::CURVE_PT);
+    PlanePanel::new(
+        Axis::log_covering("*ε*", distances.iter().map(|p| p[0])),
+        with_room(10.0, distances.iter().chain(&widths).map(|p| p[1])),
+    )
+    .line(widths, whole)
+    .markers(distances.to_vec(), near)
+    .legend(LegendKey::Line(whole), "width of the funnel")
+    .legend(LegendKey::Marker(near), "to its nearest member")
+    .legend_at(Corner::LowerRight)
+}
+
 /// The figure's specification.
 pub fn figure() -> Figure {
     Figure::studied_in_both_readings(
@@ -206,14 +216,8 @@ pub fn figure() -> Figure {
                   the surface x = 0 far from the singularity, and where smoothed orbits cross it, in the plane of y and z. (c) Distance of \
                   each smoothed crossing to the nearest member, beside the width of the set.",
         [
-            Study {
-                questions: || questions(Reading::Printed),
-                draw: |answers| draw(&Study::tables(answers)),
-            },
-            Study {
-                questions: || questions(Reading::Reconstructed),
-                draw: |answers| draw(&Study::tables(answers)),
-            },
+            Study { questions: || questions(Reading::Printed), draw: |answers| draw(&Study::tables(answers)) },
+            Study { questions: || questions(Reading::Reconstructed), draw: |answers| draw(&Study::tables(answers)) },
         ],
     )
 }

@@ -1,6 +1,6 @@
 //! How organised a path is: whether it goes again where it has been, and how much of it two paths share.
 //!
-//! Figure 6 compares trajectories by eye ("less organisation", "changes in structure"). Here numbers are put to that. A path is walked with
+//! Trajectories are often compared by eye ("less organised", "another structure"). Here numbers are put to that. A path is walked with
 //! dividers (Richardson 1961): a stride ends where the path first is one stride's width from where the stride began, so
 //! that chatter finer than a stride (a hysteretic switch makes much of it) counts for nothing. A stride is fresh if it ends farther than a
 //! width from every place visited before.

@@ -3,6 +3,7 @@
 use crate::integrate::filippov::{FilippovObserver, Mode, ModeEvent};
 use crate::integrate::{Flow, Observer, Step};
 
+use super::path::MOST_POINTS;
 use super::{PathRecorder, Sample};
 
 /// A recorded Filippov motion of a system with `D` states.
@@ -44,12 +45,14 @@ pub struct MotionRecorder<const D: usize = 3> {
     pieces: Vec<(Mode, PathRecorder<D>)>,
     events: Vec<ModeEvent<D>>,
     new_piece: bool,
+    /// Points in the pieces before the last.
+    points: usize,
 }
 
 impl<const D: usize> MotionRecorder<D> {
     /// An empty recording; `chord` is the largest distance between polyline and dense output.
     pub fn new(chord: f64) -> Self {
-        Self { chord, pieces: Vec::new(), events: Vec::new(), new_piece: true }
+        Self { chord, pieces: Vec::new(), events: Vec::new(), new_piece: true, points: 0 }
     }
 
     /// What was recorded.
@@ -62,7 +65,9 @@ impl<const D: usize> MotionRecorder<D> {
 impl<const D: usize> FilippovObserver<D> for MotionRecorder<D> {
     fn step(&mut self, mode: Mode, step: &Step<'_, D>) -> Flow {
         if self.new_piece || self.pieces.last().is_none_or(|(m, _)| *m != mode) {
-            self.pieces.push((mode, PathRecorder::starting(step.t0, &step.x0, self.chord)));
+            self.points += self.pieces.last().map_or(0, |(_, path)| path.len());
+            let path = PathRecorder::starting(step.t0, &step.x0, self.chord);
+            self.pieces.push((mode, path.at_most(MOST_POINTS.saturating_sub(self.points))));
             self.new_piece = false;
         }
         match self.pieces.last_mut() {

@@ -18,8 +18,13 @@ pub struct Sample<const D: usize = 3> {
 #[derive(Clone, Debug)]
 pub struct PathRecorder<const D: usize = 3> {
     chord: f64,
+    most: usize,
     samples: Vec<Sample<D>>,
 }
+
+/// The most points that a recorder takes in: 0.6 GB in memory, and some 1.5 GB more while they are written as text. A full recorder
+/// stops the run.
+pub const MOST_POINTS: usize = 20_000_000;
 
 /// Halvings of one step: a bound against wild interpolants, far above what a tolerance of 1e-4 asks for.
 const MOST_HALVINGS: u32 = 10;
@@ -33,7 +38,18 @@ impl<const D: usize> PathRecorder<D> {
 
     /// A recorder that starts at time `t`.
     pub fn starting<const N: usize>(t: f64, x: &SVector<f64, N>, chord: f64) -> Self {
-        Self { chord, samples: vec![Sample { t, x: leading(x) }] }
+        Self { chord, most: MOST_POINTS, samples: vec![Sample { t, x: leading(x) }] }
+    }
+
+    /// Stops the run when it has so many points, instead of [`MOST_POINTS`]; the step that brings it there is recorded whole.
+    pub fn at_most(mut self, points: usize) -> Self {
+        self.most = points;
+        self
+    }
+
+    /// Number of points so far.
+    pub(super) fn len(&self) -> usize {
+        self.samples.len()
     }
 
     /// The path.
@@ -74,7 +90,7 @@ impl<const N: usize, const D: usize> Observer<N> for PathRecorder<D> {
             }
         }
         self.samples.push(Sample { t: step.t1, x: end });
-        Flow::Continue
+        if self.samples.len() < self.most { Flow::Continue } else { Flow::Stop }
     }
 
     fn kick(&mut self, t: f64, _before: &SVector<f64, N>, after: &SVector<f64, N>) {
@@ -117,5 +133,15 @@ mod tests {
             assert!(1.0 - (m[0] * m[0] + m[1] * m[1]).sqrt() < 2e-3, "{w:?}");
         }
         assert!(samples.len() < 200);
+    }
+
+    #[test]
+    fn a_full_recorder_stops_the_run() {
+        let step = Step { t0: 0.0, t1: 1.0, x0: HalfCircle.at(0.0), x1: HalfCircle.at(1.0), interpolant: &HalfCircle };
+        let mut r: PathRecorder = PathRecorder::new(&step.x0, 1e-300).at_most(10_000);
+        let steps = (1..100).find(|_| r.step(&step) == Flow::Stop).unwrap();
+        // No chord is small enough for a step to make more than 3 * 2^10 points of it.
+        let per_step = 3 * (1 << MOST_HALVINGS);
+        assert!(steps >= 3 && (10_000..10_000 + per_step).contains(&r.len()), "{steps} steps, {} points", r.len());
     }
 }

@@ -132,8 +132,8 @@ pub(super) fn first_crossing<F: VectorField<N>, const N: usize>(
     Ok(found)
 }
 
-/// Steps of one reference orbit. The orbits of the paper's first 200 units of time take some 1e4; the stiff far attractor
-/// takes as many per unit of time and would never end.
+/// Steps of one reference orbit: a hundred times what orbits of some hundred units of time take; on a stiff attractor, which takes as
+/// many per unit of time, they would never end.
 const MOST_STEPS: u64 = 2_000_000;
 
 /// One step; its crossings go to `found`.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::path::leading;
+use super::path::{MOST_POINTS, leading};
 use crate::integrate::roots::Passages;
 use crate::integrate::{Flow, Observer, Step};
 
@@ -46,7 +46,7 @@ pub struct Crossing<const D: usize = 3> {
 /// What a passage is, [`Passages`] says.
 ///
 /// A kick that throws the state across the plane is not a passage of the flow and is not recorded. In a kicked run two
-/// neighbouring rows can therefore have the same sense: in fig. 9 some 30 (printed) and 200 (reconstructed) of 20,000 and 120,000.
+/// neighbouring rows can therefore have the same sense: up to some 0.2 % were seen to.
 #[derive(Clone, Debug)]
 pub struct SectionRecorder<const D: usize = 3> {
     coordinate: usize,
@@ -78,6 +78,6 @@ impl<const N: usize, const D: usize> Observer<N> for SectionRecorder<D> {
             let (t, x) = (step.time(passage.theta), leading(&step.at(passage.theta)));
             self.crossings.push(Crossing { t, x, direction: Direction::of(passage.upward) });
         }
-        Flow::Continue
+        if self.crossings.len() < MOST_POINTS { Flow::Continue } else { Flow::Stop }
     }
 }

@@ -1,16 +1,32 @@
 //! Progress on standard error: bars on a terminal, plain lines elsewhere, nothing with `--quiet`.
 
 use std::io::{self, IsTerminal};
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use super::Exit;
+use super::interrupt::Grace;
+use super::speak::{complain, harmless};
 use crate::integrate::Watch;
 use crate::job;
+
+/// The bars on the screen, if there are any: a signal clears them away.
+static BARS: OnceLock<MultiProgress> = OnceLock::new();
+
+/// Takes bars off the screen.
+pub(super) fn clear() {
+    if let Some(bars) = BARS.get() {
+        // A terminal that went away shows none.
+        let _ = bars.clear();
+    }
+}
 
 /// Shows how far runs have come.
 pub struct Progress {
     style: Style,
+    grace: Option<Grace>,
 }
 
 enum Style {
@@ -25,11 +41,22 @@ impl Progress {
         let style = if quiet {
             Style::Quiet
         } else if io::stderr().is_terminal() {
-            Style::Bars(MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(8)))
+            let bars = BARS.get_or_init(|| MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(8)));
+            Style::Bars(bars.clone())
         } else {
             Style::Lines
         };
-        Self { style }
+        Self { style, grace: None }
+    }
+
+    /// Runs shown here stop when a signal comes, so that what they have can be kept.
+    pub fn with_grace(quiet: bool) -> Self {
+        Self { grace: Some(Grace::new()), ..Self::new(quiet) }
+    }
+
+    /// The exit code of the signal for which runs shown here stop, if it came.
+    pub fn asked_to_stop(&self) -> Option<Exit> {
+        self.grace.as_ref().and_then(Grace::asked_to_stop)
     }
 
     fn run(&self, name: &str, t_end: f64) -> RunProgress<'_> {
@@ -53,9 +80,9 @@ impl Progress {
         match &self.style {
             Style::Bars(bars) => {
                 // A terminal that went away is no reason to stop computing.
-                let _ = bars.println(text);
+                let _ = bars.println(harmless(text));
             }
-            Style::Lines => eprintln!("{text}"),
+            Style::Lines => complain(text),
             Style::Quiet => {}
         }
     }
@@ -97,11 +124,37 @@ impl Watch for RunProgress<'_> {
         if let Some(bar) = &self.bar {
             bar.set_position((t / self.t_end * RESOLUTION as f64) as u64);
         }
-        true
+        self.progress.asked_to_stop().is_none()
     }
 }
 
+/// A time as people say it, rounded once.
 fn human(time: Duration) -> String {
-    let s = time.as_secs_f64();
-    if s < 60.0 { format!("{s:.1} s") } else { format!("{} min {:.0} s", (s / 60.0) as u64, s % 60.0) }
+    let tenths = (time.as_secs_f64() * 10.0).round() as u64;
+    if tenths < 600 {
+        return format!("{}.{} s", tenths / 10, tenths % 10);
+    }
+    let seconds = time.as_secs_f64().round() as u64;
+    format!("{} min {} s", seconds / 60, seconds % 60)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_minute_has_sixty_seconds() {
+        let said = |seconds: f64| human(Duration::from_secs_f64(seconds));
+        for (seconds, words) in [
+            (0.0, "0.0 s"),
+            (12.34, "12.3 s"),
+            (59.94, "59.9 s"),
+            (59.96, "1 min 0 s"),
+            (119.4, "1 min 59 s"),
+            (119.96, "2 min 0 s"),
+            (3600.0, "60 min 0 s"),
+        ] {
+            assert_eq!(said(seconds), words);
+        }
+    }
 }

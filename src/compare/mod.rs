@@ -237,7 +237,7 @@ pub enum Rung {
 
 /// The limits of the ladder's inexact rungs. Each bounds the whole picture and its worst place.
 ///
-/// Measured on both pictures of fig. 7: a palette of 64 colours, jitter of up to 6 levels on all edges and JPEG of quality 95 hold by changed
+/// Measured on two pictures of dense sections: a palette of 64 colours, jitter of up to 6 levels on all edges and JPEG of quality 95 hold by changed
 /// pixels or RMS; JPEG of quality 85 and scaling to nine tenths and back by SSIM at the least; JPEG of quality 75, half size and back, a shift
 /// by one pixel, and a black dot of three by three pixels on white (RMS 0.5, SSIM 0.99995 over the whole picture) hold nowhere. What the ladder
 /// cannot see is a dot of that size in the middle of a grey cloud of dots: only the hashes do.

@@ -4,7 +4,7 @@ use nalgebra::{SVector, vector};
 
 use crate::render::sheet::{Colour, Patch};
 use crate::render::style;
-use crate::system::filippov::{Region, region, two_fold};
+use crate::system::filippov::{Region, TwoFold, Visibility, lie_derivatives, normal_form_constants, region, two_fold};
 use crate::system::{Caricature, Compiled, PiecewiseSmooth, System, Wheel};
 
 /// The colour of a region.
@@ -27,18 +27,52 @@ pub fn patches(system: &System, ranges: &[(f64, f64); 3], cells: usize) -> Vec<P
     }
 }
 
-/// A two-fold of the system, if one is found: of the paper's systems the singularity, of others the one that Newton's method finds from
-/// the suggested start.
-pub fn singularity(system: &System) -> Option<[f64; 3]> {
+/// The two-fold inside the box `ranges` where determinism breaks, if there is one; of a system whose surface is not known as a graph, the
+/// two-fold that Newton's method finds from its suggested start.
+pub fn singularity(system: &System, ranges: &[(f64, f64); 3]) -> Option<[f64; 3]> {
     let point = match system.compiled() {
-        Some(Compiled::Caricature(c)) => two_fold(&c, &vector![0.0, 0.0, 0.0]),
-        Some(Compiled::Wheel(w)) => two_fold(&w, &vector![0.69, -0.57, -0.87]),
+        Some(Compiled::Caricature(c)) => two_fold(&c, &vector![0.0, 0.0, 0.0]).ok().map(|t| t.point),
+        Some(Compiled::Wheel(w)) => search(&w, ranges, |r, omega| vector![r, w.sticking_speed(r, omega), omega]),
         None => {
             let start: [f64; 3] = system.definition().start()?.try_into().ok()?;
-            two_fold(&system.bind::<3>().ok()?, &start.into())
+            two_fold(&system.bind::<3>().ok()?, &start.into()).ok().map(|t| t.point)
         }
     };
-    point.ok().map(|t| t.point.into())
+    let inside = |p: &SVector<f64, 3>| p.iter().zip(ranges).all(|(x, (low, high))| (low..=high).contains(&x));
+    point.filter(inside).map(Into::into)
+}
+
+/// Whether sliding runs into the two-fold and out into the repelling region: both folds invisible, v, w < 0, vw > 1 in the normal form
+/// (Jeffrey & Colombo 2009). A system may have other two-folds, through which nothing passes.
+fn breaks_determinism<P: PiecewiseSmooth<3>>(system: &P, fold: &TwoFold<3>) -> bool {
+    let (v, w) = normal_form_constants(system, fold);
+    fold.visibility() == (Visibility::Invisible, Visibility::Invisible) && v < 0.0 && v * w > 1.0
+}
+
+/// Cells a side in which a two-fold is looked for.
+const SEARCH_CELLS: usize = 48;
+
+/// The two-fold where determinism breaks that Newton's method finds from a cell of the surface, over the first and the last coordinate, in
+/// which both Lie derivatives change sign.
+fn search<P: PiecewiseSmooth<3>>(
+    system: &P,
+    ranges: &[(f64, f64); 3],
+    point: impl Fn(f64, f64) -> SVector<f64, 3>,
+) -> Option<SVector<f64, 3>> {
+    let (us, vs) = (lines(ranges[0], SEARCH_CELLS), lines(ranges[2], SEARCH_CELLS));
+    let signs = |u: f64, v: f64| {
+        let (p, q) = lie_derivatives(system, &point(u, v));
+        [p > 0.0, q > 0.0]
+    };
+    us.windows(2).flat_map(|a| vs.windows(2).map(move |b| (a, b))).find_map(|(a, b)| {
+        let corners = [signs(a[0], b[0]), signs(a[1], b[0]), signs(a[1], b[1]), signs(a[0], b[1])];
+        let changes = |i: usize| corners.iter().any(|c| c[i] != corners[0][i]);
+        if !(changes(0) && changes(1)) {
+            return None;
+        }
+        let found = two_fold(system, &point(0.5 * (a[0] + a[1]), 0.5 * (b[0] + b[1]))).ok()?;
+        breaks_determinism(system, &found).then_some(found.point)
+    })
 }
 
 /// x = 0 over (y, z).
@@ -49,33 +83,9 @@ fn caricature(system: &Caricature, ranges: &[(f64, f64); 3], cells: usize) -> Ve
     grid(system, ranges[1], ranges[2], cells, |y, z| vector![0.0, y, z])
 }
 
-/// h = 0 over (r, omega): v = O (d - r cot gamma), as long as that is inside the box.
+/// h = 0 over (r, omega): v = O (d - r cot gamma). What of it leaves the box is cut off where it is drawn.
 fn wheel(system: &Wheel, ranges: &[(f64, f64); 3], cells: usize) -> Vec<Patch> {
-    let mut patches =
-        grid(system, ranges[0], ranges[2], cells, |r, omega| vector![r, system.sticking_speed(r, omega), omega]);
-    let (low, high) = ranges[1];
-    for patch in &mut patches {
-        patch.corners = clip(&clip(&patch.corners, |c| c[1] - low), |c| high - c[1]);
-    }
-    patches.retain(|p| p.corners.len() > 2);
-    patches
-}
-
-/// The part of a polygon where `inside` is not negative (Sutherland & Hodgman 1974).
-fn clip(polygon: &[[f64; 3]], inside: impl Fn(&[f64; 3]) -> f64) -> Vec<[f64; 3]> {
-    let mut kept = Vec::with_capacity(polygon.len() + 1);
-    for (i, a) in polygon.iter().enumerate() {
-        let b = &polygon[(i + 1) % polygon.len()];
-        let (da, db) = (inside(a), inside(b));
-        if da >= 0.0 {
-            kept.push(*a);
-        }
-        if (da < 0.0) != (db < 0.0) {
-            let s = da / (da - db);
-            kept.push(std::array::from_fn(|k| a[k] + s * (b[k] - a[k])));
-        }
-    }
-    kept
+    grid(system, ranges[0], ranges[2], cells, |r, omega| vector![r, system.sticking_speed(r, omega), omega])
 }
 
 /// Cells over two coordinates, coloured by region. A cell that an edge between regions runs through is divided until its
@@ -135,4 +145,24 @@ fn lines((low, high): (f64, f64), cells: usize) -> Vec<f64> {
         lines.sort_by(f64::total_cmp);
     }
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_wheels_two_fold_is_found_whatever_its_parameters() {
+        let ranges = [(0.0, 1.5), (-3.0, 1.5), (-3.0, 1.5)];
+        for (gamma, k_w) in [(std::f64::consts::FRAC_PI_4, 2.0), (0.75, 2.0), (std::f64::consts::FRAC_PI_4, 2.2)] {
+            let wheel = Wheel { gamma, k_w, ..Wheel::default() };
+            let at = SVector::from(singularity(&wheel.into(), &ranges).unwrap());
+            let (p, q) = lie_derivatives(&wheel, &at);
+            assert!(wheel.switching(&at).abs() < 1e-12 && p.abs() < 1e-9 && q.abs() < 1e-9, "{at} {p} {q}");
+        }
+        let default = singularity(&Wheel::default().into(), &ranges).unwrap();
+        assert!((default[0] - 0.692_669_889_7).abs() < 1e-9, "{default:?}");
+        let elsewhere = [(0.0, 0.1), (-3.0, 1.5), (-3.0, 1.5)];
+        assert_eq!(singularity(&Wheel::default().into(), &elsewhere), None);
+    }
 }

@@ -70,7 +70,7 @@ pub struct Summary<const N: usize> {
     pub x: SVector<f64, N>,
     /// Work done.
     pub statistics: Statistics,
-    /// The largest number of steps in one segment. NDSolve would have stopped at 10,000.
+    /// The largest number of steps in one segment between restarts or kicks.
     pub most_steps_in_segment: u64,
     /// Why it ended.
     pub stop: StopReason,

@@ -6,10 +6,10 @@ use super::step::{Stepper, Tolerance};
 use super::{Dopri5, Lsoda, Radau5, Taylor};
 
 /// An integration method.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// LSODA: Adams and BDF with automatic switching, the default NDSolve of the paper's day.
+    /// LSODA: Adams and BDF with automatic switching.
     Lsoda,
     /// Dormand-Prince 5(4).
     Dopri5,
@@ -74,7 +74,7 @@ mod tests {
         }
     }
 
-    /// x' = x^2 from 1: x = 1/(1 - t).
+    /// x' = x^2 from 0.7: x = 1/(1/0.7 - t). Not from 1: with such numbers f64 and extended arithmetic may agree to the last bit.
     struct Growing;
     impl VectorField<1> for Growing {
         fn eval<S: Elementary>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
@@ -86,7 +86,7 @@ mod tests {
     impl WithStepper<1> for ToOneHalf {
         type Answer = (f64, Statistics);
         fn with<M: Stepper<1>>(self, mut stepper: M) -> Self::Answer {
-            let end = drive(&Growing, vector![1.0], &Course::to(0.5), &mut stepper, &mut Ignore, &()).unwrap();
+            let end = drive(&Growing, vector![0.7], &Course::to(0.9), &mut stepper, &mut Ignore, &()).unwrap();
             (end.x[0], end.statistics)
         }
     }
@@ -96,7 +96,7 @@ mod tests {
         let tolerance = Tolerance { rtol: 1e-10, atol: 1e-10 };
         let found = Method::ALL.map(|m| m.with_stepper(tolerance, ToOneHalf));
         for (x, s) in &found {
-            assert!((x - 2.0).abs() < 1e-8, "{x} {s:?}");
+            assert!((x - 0.7 / (1.0 - 0.63)).abs() < 1e-8, "{x} {s:?}");
         }
         for (i, a) in found.iter().enumerate() {
             assert!(found[..i].iter().all(|b| a.1 != b.1 || a.0 != b.0), "two names do the same work: {found:?}");

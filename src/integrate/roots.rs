@@ -418,8 +418,12 @@ mod tests {
         // Back to where it came from: a touch; the next passage still alternates.
         let touch = [[1.0, -1.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [1.0, -2.0, 0.0, 0.0]];
         assert_eq!(senses(0.0, &touch), [(2, 0.5, false)]);
-        // A touch at a sample inside a step: (s - 2/5)^2, sampled at fifths.
-        assert_eq!(senses(0.0, &[[0.16, -0.8, 1.0, 0.0]]), []);
+        // A touch at a sample inside a step: |s - 2/5|, sampled at fifths.
+        let p = Cubic([-0.4, 1.0, 0.0, 0.0]);
+        let step = Step { t0: 0.0, t1: 1.0, x0: p.at(0.0), x1: p.at(1.0), interpolant: &p };
+        assert_eq!(step.at(0.4)[0], 0.0);
+        assert_eq!(Passages::default().in_step(&step, |x| x[0].abs()), []);
+        assert_eq!(Passages::default().in_step(&step, |x| x[0]), [Passage { theta: 0.4, upward: true }]);
     }
 
     #[test]

@@ -1,7 +1,7 @@
-//! What happens around a run at fixed times: restarts (fig. 7) and kicks (sec. 4.2).
+//! What happens around a run at fixed times: restarts and kicks.
 //!
 //! Noise and restarts are not kinds of system. They cut the time axis into segments; each segment is integrated as if
-//! it were a run of its own, which is what a loop around NDSolve does.
+//! it were a run of its own, which is what a loop around a solver does.
 
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ pub enum StepCap {
     None,
     /// A fixed length.
     Absolute(f64),
-    /// A fraction of the segment between restarts or kicks: NDSolve's MaxStepFraction, 1/10 by default.
+    /// A fraction of the segment between restarts or kicks: what some solvers call MaxStepFraction.
     FractionOfSegment(f64),
 }
 
@@ -33,8 +33,8 @@ impl StepCap {
     }
 }
 
-/// The law of a random perturbation "of size eps" (sec. 4.2 does not say which).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+/// The law of a random perturbation of a given size.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum KickLaw {
     /// Length exactly `size`, direction uniform on the sphere.

@@ -193,7 +193,7 @@ pub enum Failure {
     },
     /// The budget of steps is used up.
     #[error(
-        "{limit} steps were not enough: stopped at t = {t}, state {state:?}. If this is near (0, alpha/beta, alpha/beta), the run has landed on the stiff far attractor: use an implicit method; otherwise raise the step limit"
+        "{limit} steps were not enough: stopped at t = {t}, state {state:?}. If the last steps were tiny, the equation is stiff there: use an implicit method (lsoda, radau5); otherwise raise the step limit"
     )]
     TooManySteps {
         /// Time reached.

@@ -4,7 +4,7 @@
 //!
 //! **Layers.** A smoothed switch, tanh(h/eps), is constant to working precision outside a layer |h/eps| < w. There all
 //! its derivatives vanish, so that a high-order method with long steps jumps across the layer and its own error
-//! estimate sees nothing. (Adaptive Taylor methods without a cure get the first crossing of the paper's system wrong at
+//! estimate sees nothing. (Adaptive Taylor methods without a cure get even a first crossing wrong at
 //! every tolerance.) This one knows the arguments of every tanh in the equation, because it computes their series:
 //! outside a layer, a step ends before the argument has come nearer than the layer's edge, with certainty (a bound on
 //! the argument's speed over the step, not a sample); inside, a step may change the argument by at most

@@ -76,6 +76,16 @@ pub enum JobError {
     /// The Filippov motion could not go on.
     #[error(transparent)]
     Filippov(#[from] FilippovError),
+    /// More points than fit in memory.
+    #[error(
+        "more than {limit} points were recorded by t = {t}, the most that are kept in memory (0.6 GB): record passages through a plane instead of the path, give a larger chord, or an earlier end time"
+    )]
+    TooManyPoints {
+        /// Time reached.
+        t: f64,
+        /// The limit.
+        limit: usize,
+    },
     /// The question is for systems with another number of states.
     #[error(transparent)]
     Dimension(#[from] DimensionError),

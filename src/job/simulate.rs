@@ -2,10 +2,11 @@
 
 use nalgebra::{SVector, vector};
 
-use super::answer::Answer;
+use super::answer::{Answer, Stop};
 use super::question::JobError;
 use super::recording::{Data, Future, Recording};
 use super::spec::{FunnelSpec, MethodSpec, Observation, RunSpec, SpecError, SwitchSpec};
+use crate::analyse::path::MOST_POINTS;
 use crate::analyse::{Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder};
 use crate::integrate::filippov::{
     self, AllModes, ExitRule, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent, SlidingFlow,
@@ -23,7 +24,11 @@ pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, JobError
     if spec.system.dimension() != 3 {
         return Err(too_many_states(spec, "three states are looked at here"));
     }
-    three_states(spec, watch)
+    let recording = three_states(spec, watch)?;
+    if recording.stop == StopReason::Observer {
+        return Err(full(recording.t));
+    }
+    Ok(recording)
 }
 
 /// Computes a run of a system with any number of states.
@@ -33,7 +38,7 @@ pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, JobError
 /// If the spec is wrong, or the orbit cannot be followed.
 pub fn answer(spec: &RunSpec, watch: &dyn Watch) -> Result<Answer, JobError> {
     spec.validate()?;
-    Ok(match spec.system.dimension() {
+    let answer = match spec.system.dimension() {
         1 => record::<1, 2>(spec, watch)?.to_answer(spec),
         2 => record::<2, 3>(spec, watch)?.to_answer(spec),
         3 => three_states(spec, watch)?.to_answer(spec),
@@ -43,7 +48,13 @@ pub fn answer(spec: &RunSpec, watch: &dyn Watch) -> Result<Answer, JobError> {
         7 => record::<7, 8>(spec, watch)?.to_answer(spec),
         8 => record::<8, 9>(spec, watch)?.to_answer(spec),
         _ => return Err(too_many_states(spec, "runs are computed with up to eight states")),
-    })
+    };
+    if answer.stop == Stop::Found { Err(full(answer.fact("t")?)) } else { Ok(answer) }
+}
+
+/// The only observers here are recorders, which stop a run when they are full.
+fn full(t: f64) -> JobError {
+    JobError::TooManyPoints { t, limit: MOST_POINTS }
 }
 
 /// What a dimension that is not provided for looks like to the one who asked.

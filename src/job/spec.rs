@@ -140,6 +140,11 @@ pub enum Observation {
     },
 }
 
+/// The latest end time: its neighbours in f64 are 1e-4 apart.
+const LATEST: f64 = 1e12;
+/// The smallest absolute tolerance: methods square the quotient of an error and its tolerance.
+const FINEST_ATOL: f64 = 1e-140;
+
 /// Columns of recorded data beside the states'.
 const COLUMNS: [&str; 15] = [
     "t",
@@ -186,6 +191,9 @@ impl RunSpec {
             if value.is_finite() { Ok(()) } else { error(field, value, "give a finite number") }
         };
         positive("t-end", self.t_end)?;
+        if self.t_end > LATEST {
+            return error("t-end", self.t_end, "beyond 1e12 a time in f64 has no digits left for a step");
+        }
         let states = self.system.coordinates();
         if self.start.len() != states.len() {
             return Err(SpecError {
@@ -224,7 +232,7 @@ impl RunSpec {
                 finite("phi0", phi0)?;
             }
             SwitchSpec::Filippov { exit, funnel } => {
-                let wrong = |rule| Err(SpecError { field: "exit", value: format!("{exit:?}"), rule });
+                let wrong = |rule| Err(SpecError { field: "exit", value: exit.to_string(), rule });
                 if exit.validate().is_err() {
                     return wrong("times and lengths are finite and not below 0, probabilities between 0 and 1");
                 }
@@ -267,6 +275,10 @@ impl RunSpec {
         };
         if self.method.tolerance.rtol < finest {
             return error("rtol", self.method.tolerance.rtol, rule);
+        }
+        if self.method.tolerance.atol < FINEST_ATOL {
+            let rule = "errors are divided by it and squared, which f64 cannot hold below 1e-140; give that or more";
+            return error("atol", self.method.tolerance.atol, rule);
         }
         match self.method.step_cap {
             StepCap::None => {}

@@ -109,7 +109,7 @@ pub fn sqrt(x: f64) -> f64 {
     x.sqrt()
 }
 
-/// The point 10^x, for tolerances such as NDSolve's 10^-7.97727.
+/// The point 10^x, for tolerances such as 10^-7.97727.
 #[inline]
 pub fn exp10(x: f64) -> f64 {
     libm::exp10(x)

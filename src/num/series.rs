@@ -58,7 +58,7 @@ pub enum Constants {
     /// The nearest `f64`, and terms without variables are computed in `f64`: the same equation that `f64` methods solve.
     #[default]
     Binary,
-    /// Themselves: 0.1 is one tenth. In extended precision, that is another equation: on the paper's orbits, the 1e-17 between the
+    /// Themselves: 0.1 is one tenth. In extended precision, that is another equation: near a two-fold, the 1e-17 between the
     /// two has grown to 1e-12 a hundred units of time later.
     Decimal,
 }

@@ -125,7 +125,7 @@ fn space_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording], c
         if !exits.is_empty() {
             chart = chart.markers(exits, EXIT);
         }
-        if let Some(point) = surface::singularity(&panel.run.system) {
+        if let Some(point) = surface::singularity(&panel.run.system, &ranges) {
             chart = chart.markers(vec![turn(point)], SINGULARITY);
         }
         sheet = sheet.panel(label(picture, panel), panel.title.as_str(), chart);

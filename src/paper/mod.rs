@@ -5,6 +5,7 @@
 //! -> [`drawing`] -> bytes -> files. The figures themselves stand in `figures/figN/main.rs`: every number of the
 //! paper's caption, and nothing else.
 
+pub mod claim;
 pub mod drawing;
 pub mod figures;
 pub mod pipeline;
@@ -96,7 +97,7 @@ pub struct Camera {
 }
 
 /// The two readings of the paper's parameters, always shown side by side.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reading {
     /// As printed: alpha = 1e-3, beta = 1e-5. Its late motion is always one stable periodic orbit.

@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+pub use super::claim::Claim as SectionClaim;
 use super::{Picture, Reading};
-pub use crate::analyse::attractor::Claim as SectionClaim;
 use crate::analyse::attractor::Evidence;
 use crate::analyse::divider::Shared;
 use crate::job::{AnyQuestion, Classification, Desk, JobError, PathComparison};

@@ -4,38 +4,8 @@ use super::Reading;
 use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use crate::integrate::{Kick, StepCap};
 use crate::job::spec::{MethodSpec, RunSpec, SwitchSpec};
+pub use crate::render::number::number;
 use crate::system::{Compiled, Relaxation, System, Transition};
-
-/// A number as a printer would set it: 0.13, 10^{-5}, 1.05×10^{-8}, 200 000.
-pub fn number(value: f64) -> String {
-    let magnitude = value.abs();
-    if value == 0.0 {
-        return "0".into();
-    }
-    if (1e4..1e16).contains(&magnitude) && value == value.trunc() {
-        let digits = format!("{magnitude:.0}");
-        let mut grouped = String::new();
-        for (i, digit) in digits.chars().enumerate() {
-            if i > 0 && (digits.len() - i).is_multiple_of(3) {
-                grouped.push('\u{2009}');
-            }
-            grouped.push(digit);
-        }
-        return if value < 0.0 { format!("−{grouped}") } else { grouped };
-    }
-    if (1e-2..1e4).contains(&magnitude) {
-        return format!("{value}").replace('-', "−");
-    }
-    let text = format!("{value:.2e}");
-    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
-    let mantissa = mantissa.trim_end_matches('0').trim_end_matches('.');
-    let power = format!("10^{{{exponent}}}");
-    match mantissa {
-        "1" => power,
-        "-1" => format!("−{power}"),
-        _ => format!("{}×{power}", mantissa.replace('-', "−")),
-    }
-}
 
 /// "reconstructed reading: *α* = 0.1, *β* = 10^{-5}".
 pub fn reading(reading: Reading) -> String {
@@ -59,7 +29,7 @@ pub fn system(system: &System) -> String {
             number(w.m),
             number(w.j),
             number(w.d),
-            if w.gamma == std::f64::consts::FRAC_PI_4 { "π/4".into() } else { number(w.gamma) },
+            angle(w.gamma),
             number(w.k_w),
             number(w.c_w),
             number(w.c_h),
@@ -74,6 +44,12 @@ pub fn system(system: &System) -> String {
             name.into_iter().chain(parameters).collect::<Vec<_>>().join(", ")
         }
     }
+}
+
+/// An angle, where it is a plain fraction of π as that.
+fn angle(radians: f64) -> String {
+    let fraction = [2, 3, 4, 6, 8, 12].into_iter().find(|n| radians == std::f64::consts::PI / f64::from(*n));
+    fraction.map_or_else(|| number(radians), |n| format!("π/{n}"))
 }
 
 /// How the switch is modelled.
@@ -193,7 +169,7 @@ pub fn small_print(reading: Option<Reading>, runs: &[&RunSpec]) -> Vec<String> {
 
 /// Rich text without its markup, for readers without typesetting.
 pub fn plain(rich: &str) -> String {
-    rich.replace(['*', '{', '}'], "")
+    crate::render::markup::plain(rich)
 }
 
 #[cfg(test)]
@@ -201,19 +177,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers() {
-        for (value, text) in [
-            (0.13, "0.13"),
-            (1e-5, "10^{-5}"),
-            (1.0536712e-8, "1.05×10^{-8}"),
-            (2e5, "200\u{2009}000"),
-            (-1.2, "−1.2"),
-            (1e-3, "10^{-3}"),
-            (150.0, "150"),
-            (0.0, "0"),
-            (-2.5e-4, "−2.5×10^{-4}"),
-        ] {
-            assert_eq!(number(value), text);
-        }
+    fn angles() {
+        assert_eq!(angle(std::f64::consts::FRAC_PI_4), "π/4");
+        assert_eq!(angle(0.7), "0.7");
+        let wheel = crate::system::Wheel { gamma: 0.7, ..Default::default() };
+        assert!(system(&wheel.into()).contains("*γ* = 0.7,"));
     }
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 /// A SHA-256 digest.
@@ -46,7 +47,7 @@ impl Hash {
         Hash(text)
     }
 
-    /// The digest of a value's canonical JSON: fields in declaration order, no spaces, shortest round-trip numbers.
+    /// The digest of a value's [`canonical_json`].
     pub fn of_json<T: Serialize>(value: &T) -> Self {
         Self::of(&canonical_json(value))
     }
@@ -62,9 +63,47 @@ impl Hash {
     }
 }
 
-/// The JSON bytes that are hashed.
+/// The JSON bytes that are hashed: keys of every object in the order of their bytes, no spaces, shortest round-trip numbers. The order
+/// is made here, because the JSON library's own depends on a cargo feature that any dependency can turn on.
 pub fn canonical_json<T: Serialize>(value: &T) -> Vec<u8> {
-    serde_json::to_vec(value).expect("specs are plain data: string keys, no failing serialisers")
+    let value = serde_json::to_value(value).expect("specs are plain data: string keys, no failing serialisers");
+    let mut bytes = Vec::new();
+    write_canonical(&value, &mut bytes);
+    bytes
+}
+
+fn write_canonical(value: &Value, into: &mut Vec<u8>) {
+    match value {
+        Value::Object(map) => {
+            let mut entries: Vec<_> = map.iter().collect();
+            entries.sort_by(|a, b| a.0.cmp(b.0));
+            into.push(b'{');
+            for (i, (key, value)) in entries.into_iter().enumerate() {
+                if i > 0 {
+                    into.push(b',');
+                }
+                write_scalar(key, into);
+                into.push(b':');
+                write_canonical(value, into);
+            }
+            into.push(b'}');
+        }
+        Value::Array(values) => {
+            into.push(b'[');
+            for (i, value) in values.iter().enumerate() {
+                if i > 0 {
+                    into.push(b',');
+                }
+                write_canonical(value, into);
+            }
+            into.push(b']');
+        }
+        scalar => write_scalar(scalar, into),
+    }
+}
+
+fn write_scalar<T: Serialize + ?Sized>(value: &T, into: &mut Vec<u8>) {
+    serde_json::to_writer(into, value).expect("writing to memory does not fail");
 }
 
 #[cfg(test)]
@@ -74,6 +113,29 @@ mod tests {
     #[test]
     fn known_digest() {
         assert_eq!(Hash::of(b"abc").as_str(), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+    }
+
+    #[test]
+    fn json_is_canonical_whatever_order_it_is_made_in() {
+        #[derive(Serialize)]
+        struct Declared {
+            zeta: f64,
+            alpha: Vec<Option<u64>>,
+            words: Inner,
+        }
+        #[derive(Serialize)]
+        struct Inner {
+            b: &'static str,
+            a: bool,
+        }
+        let value = Declared { zeta: 1e-5, alpha: vec![Some(1), None], words: Inner { b: "\"\n", a: true } };
+        let want = r#"{"alpha":[1,null],"words":{"a":true,"b":"\"\n"},"zeta":0.00001}"#;
+        assert_eq!(String::from_utf8(canonical_json(&value)).unwrap(), want);
+        // The same object from text in two orders.
+        for text in [want, r#"{"zeta":1e-5,"words":{"b":"\"\n","a":true},"alpha":[1,null]}"#] {
+            let read: Value = serde_json::from_str(text).unwrap();
+            assert_eq!(Hash::of_json(&read), Hash::of_json(&value), "{text}");
+        }
     }
 
     #[test]

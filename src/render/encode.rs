@@ -1,20 +1,18 @@
 //! Bare pixels as a PNG file: for pictures about pictures, which carry no provenance of their own.
 
-use png::{BitDepth, ColorType, DeflateCompression, Encoder, Filter};
+use png::{BitDepth, ColorType, Encoder, Info, chunk};
 
+use super::png_file::{image_stream, rgb};
 use super::{Pixels, RenderError};
 
 /// Writes pixels as an RGB file without metadata; transparency is dropped. Same pixels, same bytes.
 pub fn encode_png(pixels: &Pixels) -> Result<Vec<u8>, RenderError> {
+    let mut info = Info::with_size(pixels.width, pixels.height);
+    info.bit_depth = BitDepth::Eight;
+    info.color_type = ColorType::Rgb;
     let mut file = Vec::new();
-    let mut encoder = Encoder::new(&mut file, pixels.width, pixels.height);
-    encoder.set_color(ColorType::Rgb);
-    encoder.set_depth(BitDepth::Eight);
-    encoder.set_filter(Filter::Up);
-    encoder.set_deflate_compression(DeflateCompression::Level(6));
-    let rgb: Vec<u8> = pixels.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(&rgb)?;
+    let mut writer = Encoder::with_info(&mut file, info)?.write_header()?;
+    writer.write_chunk(chunk::IDAT, &image_stream(&rgb(pixels), 3 * pixels.width as usize))?;
     writer.finish()?;
     Ok(file)
 }

@@ -8,6 +8,9 @@
 //! Everything here is a pure function of the sheet: no file, clock, locale or machine property enters, and no platform logarithm or
 //! trigonometric function decides where ink lies.
 
+pub mod colour;
+pub mod markup;
+pub mod number;
 pub mod sheet;
 pub mod style;
 
@@ -25,18 +28,19 @@ mod provenance;
 mod raster;
 mod rich_text;
 mod scene;
+mod seal;
 mod space;
 mod svg;
 mod ticks;
 
 pub use encode::encode_png;
-pub use png_file::decode_png;
+pub use png_file::{decode_png, png_size};
 pub use provenance::{Format, Provenance, ProvenanceError, read_provenance};
 pub use raster::Pixels;
 pub use rich_text::RichTextError;
 pub use sheet::Sheet;
 
-use provenance::Sealed;
+use seal::Sealed;
 
 /// Why a sheet cannot be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -71,6 +75,14 @@ pub enum RenderError {
     /// The picture is higher than 8000 pixels.
     #[error("the picture is too large: give it fewer rows of panels, or a smaller aspect")]
     TooLarge,
+    /// A PNG file that claims more pixels than are decoded.
+    #[error("it claims {width} by {height} pixels, more than are read here")]
+    Claims {
+        /// Width.
+        width: u32,
+        /// Height.
+        height: u32,
+    },
     /// Drawing failed inside plotters.
     #[error("drawing failed: {0}")]
     Drawing(String),

@@ -3,8 +3,8 @@
 use miniz_oxide::deflate::compress_to_vec_zlib;
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect, Ref, Str, TextStr};
 
-use super::provenance::{self, Sealed};
 use super::scene::{Item, Paint, Position, Scene, Segment, UNITS_PER_POINT};
+use super::seal::{SEAL_KEY, Sealed, to_ascii_json};
 
 /// Key of the document information entry that holds the provenance as JSON.
 pub const INFO_KEY: &str = "TwofoldProvenance";
@@ -44,9 +44,9 @@ pub fn write(scene: &Scene, title: &str, description: &str, sealed: &Sealed) -> 
     details.title(TextStr(title)).subject(TextStr(description));
     details.creator(TextStr(concat!("twofold ", env!("CARGO_PKG_VERSION"))));
     let readable: Vec<String> = sealed.entries.iter().map(|(k, v)| format!("{k}={v}")).collect();
-    let readable: Vec<String> = readable.into_iter().filter(|e| !e.starts_with(provenance::SEAL_KEY)).collect();
+    let readable: Vec<String> = readable.into_iter().filter(|e| !e.starts_with(SEAL_KEY)).collect();
     details.keywords(TextStr(&readable.join("; ")));
-    details.insert(Name(INFO_KEY.as_bytes())).primitive(Str(provenance::to_ascii_json(&sealed.entries).as_bytes()));
+    details.insert(Name(INFO_KEY.as_bytes())).primitive(Str(to_ascii_json(&sealed.entries).as_bytes()));
     details.finish();
     pdf.finish()
 }

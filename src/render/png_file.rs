@@ -7,9 +7,9 @@ use miniz_oxide::deflate::compress_to_vec_zlib;
 use png::{BitDepth, ColorType, Encoder, Info, PixelDimensions, Unit};
 
 use super::RenderError;
-use super::provenance::Sealed;
 use super::raster::Pixels;
 use super::scene::DPI;
+use super::seal::Sealed;
 
 /// Prefix of the keywords under which provenance is kept.
 pub const KEYWORD_PREFIX: &str = "twofold:";
@@ -29,11 +29,7 @@ pub fn write(pixels: &Pixels, title: &str, description: &str, sealed: &Sealed) -
         }
         None => {
             info.color_type = ColorType::Rgb;
-            let mut rgb = vec![0; pixels.rgba.len() / 4 * 3];
-            for (to, from) in rgb.chunks_exact_mut(3).zip(pixels.rgba.chunks_exact(4)) {
-                to.copy_from_slice(&from[..3]);
-            }
-            image_stream(&rgb, 3 * pixels.width as usize)
+            image_stream(&rgb(pixels), 3 * pixels.width as usize)
         }
     };
     let mut file = Vec::new();
@@ -49,11 +45,20 @@ pub fn write(pixels: &Pixels, title: &str, description: &str, sealed: &Sealed) -
     Ok(file)
 }
 
+/// The pixels without transparency, three bytes each.
+pub(super) fn rgb(pixels: &Pixels) -> Vec<u8> {
+    let mut rgb = vec![0; pixels.rgba.len() / 4 * 3];
+    for (to, from) in rgb.chunks_exact_mut(3).zip(pixels.rgba.chunks_exact(4)) {
+        to.copy_from_slice(&from[..3]);
+    }
+    rgb
+}
+
 /// The compressed image data of rows of so many bytes.
 ///
 /// Rows are not filtered: drawings repeat whole stretches of pixels, and filters made for photographs hide that. Compressed here rather
 /// than by the PNG crate, whose compressor is chosen by cargo features that any dependency can turn on.
-fn image_stream(data: &[u8], row: usize) -> Vec<u8> {
+pub(super) fn image_stream(data: &[u8], row: usize) -> Vec<u8> {
     let mut rows = Vec::with_capacity(data.len() + data.len() / row + 1);
     for line in data.chunks_exact(row) {
         rows.push(0);
@@ -119,9 +124,28 @@ impl ColourTable {
     }
 }
 
-/// Pixels of any PNG file of eight bits or fewer per channel, as opaque RGBA where the file has no transparency.
+/// The most pixels that are decoded: five times the largest picture that [`render`](super::render) makes.
+const MOST_PIXELS: u64 = 1 << 26;
+
+/// Width and height as a PNG file's first bytes claim them; nothing else of the file is looked at.
+pub fn png_size(bytes: &[u8]) -> Option<(u32, u32)> {
+    let header = bytes.strip_prefix(b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR")?;
+    let number = |at: usize| Some(u32::from_be_bytes(header.get(at..at + 4)?.try_into().ok()?));
+    Some((number(0)?, number(4)?))
+}
+
+/// Pixels of any PNG file, at eight bits per channel, as opaque RGBA where the file has no transparency.
+///
+/// # Errors
+/// If it is no PNG file, is damaged, or claims more than 67 million pixels: what it claims is checked before memory is asked for.
 pub fn decode_png(bytes: &[u8]) -> Result<Pixels, RenderError> {
-    let mut decoder = png::Decoder::new(Cursor::new(bytes));
+    if let Some((width, height)) = png_size(bytes)
+        && u64::from(width) * u64::from(height) > MOST_PIXELS
+    {
+        return Err(RenderError::Claims { width, height });
+    }
+    let limits = png::Limits { bytes: 4 * MOST_PIXELS as usize };
+    let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), limits);
     decoder.set_transformations(png::Transformations::normalize_to_color8());
     let mut reader = decoder.read_info()?;
     let size = reader.output_buffer_size().ok_or(RenderError::TooLarge)?;

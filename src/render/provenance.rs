@@ -5,13 +5,8 @@
 
 use sha2::{Digest, Sha256};
 
+use super::seal::{BLANK, SEAL_KEY, SEAL_LENGTH};
 use super::{pdf, png_file, svg};
-
-/// Key under which the seal is kept.
-pub const SEAL_KEY: &str = "seal-sha256";
-const SEAL_LENGTH: usize = 64;
-/// What stands in place of the seal while it is computed.
-const BLANK: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
 /// Kind of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,22 +49,6 @@ pub enum ProvenanceError {
     /// It has been cut off or damaged.
     #[error("the file's provenance is damaged")]
     Damaged,
-}
-
-/// Provenance with the blank seal, ready to be written.
-#[derive(Clone, Debug)]
-pub struct Sealed {
-    /// The pairs, the seal last.
-    pub entries: Vec<(String, String)>,
-}
-
-impl Sealed {
-    /// Adds a blank seal.
-    pub fn new(entries: &[(String, String)]) -> Self {
-        let mut entries: Vec<_> = entries.iter().filter(|(k, _)| k != SEAL_KEY).cloned().collect();
-        entries.push((SEAL_KEY.to_owned(), BLANK.to_owned()));
-        Self { entries }
-    }
 }
 
 /// Computes the seal of a file that was written with a blank one, and puts it in.
@@ -237,23 +216,6 @@ fn pdf_entries(bytes: &[u8]) -> Result<Vec<(String, String)>, ProvenanceError> {
         at += 1;
     }
     serde_json::from_slice(&json).map_err(|_| ProvenanceError::Damaged)
-}
-
-/// Pairs as JSON in ASCII.
-pub fn to_ascii_json(entries: &[(String, String)]) -> String {
-    let text = serde_json::to_string(entries).unwrap_or_default();
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        if c.is_ascii() && c != '\u{7f}' {
-            out.push(c);
-        } else {
-            let mut pair = [0; 2];
-            for unit in c.encode_utf16(&mut pair) {
-                out.push_str(&format!("\\u{unit:04x}"));
-            }
-        }
-    }
-    out
 }
 
 /// The checksum of PNG chunks (ISO 3309).

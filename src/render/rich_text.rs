@@ -1,9 +1,9 @@
-//! Rich text: a small markup for variables, superscripts and subscripts, set in the embedded font.
+//! Rich text: variables, superscripts and subscripts, set in the embedded font.
 //!
-//! `*x*` is italic; `^{...}` and `_{...}` raise and lower (one character needs no braces); a backslash
-//! takes the next character literally. A hyphen before a number or inside a superscript or subscript becomes a minus sign.
+//! The markup is [`markup`](super::markup)'s.
 
 use super::font::{self, FontFace, Glyph, Stroke};
+use super::markup::{self, MarkupError, Token};
 use super::scene::{Position, Segment, units};
 
 /// Why a text cannot be set.
@@ -58,8 +58,6 @@ pub struct Line {
 
 struct Setter<'a> {
     source: &'a str,
-    characters: Vec<char>,
-    next: usize,
     italic: bool,
     base: FontFace,
     pen: f64,
@@ -69,79 +67,61 @@ struct Setter<'a> {
 
 /// Sets a line of rich text in the given face.
 pub fn set(source: &str, base: FontFace) -> Result<Line, RichTextError> {
+    let tokens = markup::parse(source).map_err(|fault| match fault {
+        MarkupError::Braces => RichTextError::Braces { text: source.to_owned() },
+        MarkupError::Italic => RichTextError::Italic { text: source.to_owned() },
+    })?;
     let mut setter = Setter {
         source,
-        characters: source.chars().collect(),
-        next: 0,
         italic: false,
         base,
         pen: 0.0,
         previous: None,
         line: Line { glyphs: Vec::new(), width: 0.0, plain: String::new() },
     };
-    setter.group(0, 1.0, 0.0)?;
-    if setter.italic {
-        return Err(RichTextError::Italic { text: source.to_owned() });
-    }
+    setter.set(&tokens)?;
     setter.line.width = setter.pen;
     Ok(setter.line)
 }
 
+/// A script or group that is open: the size and rise of what surrounds it, and whether it is a script.
+struct Around {
+    scale: f64,
+    rise: f64,
+    script: bool,
+}
+
 impl Setter<'_> {
-    fn group(&mut self, depth: usize, scale: f64, rise: f64) -> Result<(), RichTextError> {
-        while let Some(c) = self.characters.get(self.next).copied() {
-            self.next += 1;
-            match c {
-                '\\' => {
-                    let literal = self.characters.get(self.next).copied().unwrap_or('\\');
-                    self.next += 1;
-                    self.place(literal, scale, rise)?;
+    fn set(&mut self, tokens: &[Token]) -> Result<(), RichTextError> {
+        let (mut scale, mut rise) = (1.0, 0.0);
+        let mut open: Vec<Around> = Vec::new();
+        for token in tokens {
+            match token {
+                Token::Sign(c) => self.place(*c, scale, rise)?,
+                Token::Minus => self.place('\u{2212}', scale, rise)?,
+                Token::Italic => self.italic = !self.italic,
+                Token::Raise | Token::Lower => {
+                    open.push(Around { scale, rise, script: true });
+                    (scale, rise) = match token {
+                        Token::Raise => (scale * SCRIPT_SIZE, rise + RAISE * scale),
+                        _ => (scale * SCRIPT_SIZE, rise - LOWER * scale),
+                    };
+                    self.previous = None;
+                    self.pen += 0.02 * scale;
+                    self.line.plain.push(if *token == Token::Raise { '^' } else { '_' });
                 }
-                '*' => self.italic = !self.italic,
-                '^' => self.script(depth, scale * SCRIPT_SIZE, rise + RAISE * scale, '^')?,
-                '_' => self.script(depth, scale * SCRIPT_SIZE, rise - LOWER * scale, '_')?,
-                '{' => self.group(depth + 1, scale, rise)?,
-                '}' if depth > 0 => return Ok(()),
-                '}' => return Err(self.unbalanced()),
-                '-' if self.is_minus(depth) => self.place('\u{2212}', scale, rise)?,
-                other => self.place(other, scale, rise)?,
+                Token::Group => open.push(Around { scale, rise, script: false }),
+                Token::End => {
+                    let Some(around) = open.pop() else { continue };
+                    if around.script {
+                        self.pen += 0.04 * scale;
+                        self.previous = None;
+                    }
+                    (scale, rise) = (around.scale, around.rise);
+                }
             }
         }
-        if depth == 0 { Ok(()) } else { Err(self.unbalanced()) }
-    }
-
-    fn script(&mut self, depth: usize, scale: f64, rise: f64, sign: char) -> Result<(), RichTextError> {
-        self.previous = None;
-        self.pen += 0.02 * scale;
-        self.line.plain.push(sign);
-        match self.characters.get(self.next).copied() {
-            Some('{') => {
-                self.next += 1;
-                self.group(depth + 1, scale, rise)?;
-            }
-            Some('-') => {
-                self.next += 1;
-                self.place('\u{2212}', scale, rise)?;
-            }
-            Some(c) => {
-                self.next += 1;
-                self.place(c, scale, rise)?;
-            }
-            None => return Err(self.unbalanced()),
-        }
-        self.pen += 0.04 * scale;
-        self.previous = None;
         Ok(())
-    }
-
-    /// A hyphen is a minus sign before a digit, unless it joins words or numbers such as `2-10`; between spaces; and in scripts.
-    fn is_minus(&self, depth: usize) -> bool {
-        let before = self.next.checked_sub(2).map(|i| self.characters[i]);
-        let after = self.characters.get(self.next).copied();
-        let joins = before.is_some_and(char::is_alphanumeric);
-        depth > 0
-            || (!joins && after.is_some_and(|c| c.is_ascii_digit() || c == '.' || c == '*'))
-            || (before == Some(' ') && after == Some(' '))
     }
 
     fn place(&mut self, c: char, scale: f64, rise: f64) -> Result<(), RichTextError> {
@@ -165,10 +145,6 @@ impl Setter<'_> {
         self.previous = Some(glyph);
         self.line.plain.push(c);
         Ok(())
-    }
-
-    fn unbalanced(&self) -> RichTextError {
-        RichTextError::Braces { text: self.source.to_owned() }
     }
 }
 

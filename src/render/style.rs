@@ -4,7 +4,7 @@
 //! (2008), which stays distinguishable under the common forms of colour blindness; the three region colours also differ in
 //! lightness, so that they can be told apart in greyscale.
 
-use super::sheet::Colour;
+use super::colour::Colour;
 
 /// Black of text and axes, and of the dark class of points.
 pub const INK: Colour = Colour::rgb(0x1a, 0x1a, 0x1a);

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::provenance::Sealed;
 use super::scene::{Item, Paint, Position, Scene, Segment, UNITS_PER_POINT};
+use super::seal::Sealed;
 use super::sheet::Colour;
 
 /// Namespace of the provenance elements.

@@ -372,3 +372,20 @@ fn density_shading_never_changes_where_points_are() {
     };
     assert_eq!(places(true), places(false));
 }
+
+#[test]
+fn a_picture_that_claims_too_much_is_refused_before_memory_is_asked_for() {
+    // 46 bytes that claim 100000 x 100000.
+    let hex = "89504e470d0a1a0a0000000d49484452000186a0000186a00806000000a8520bc800000001494441547876e684e6";
+    let bytes: Vec<u8> = (0..hex.len()).step_by(2).map(|i| u8::from_str_radix(&hex[i..i + 2], 16).unwrap()).collect();
+    assert_eq!(png_size(&bytes), Some((100_000, 100_000)));
+    let error = decode_png(&bytes).unwrap_err();
+    assert!(matches!(error, RenderError::Claims { width: 100_000, height: 100_000 }), "{error}");
+    // Within the limit a claim without data is damage; a file cut anywhere, or grown in any byte, never panics.
+    let mut small = bytes.clone();
+    small[16..24].copy_from_slice(&[0, 0, 16, 0, 0, 0, 16, 0]);
+    assert!(decode_png(&small).is_err());
+    for end in 0..bytes.len() {
+        assert!(decode_png(&bytes[..end]).is_err());
+    }
+}

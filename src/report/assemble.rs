@@ -125,6 +125,9 @@ fn figure(id: &str, files: &[&FileBytes], committed: &Committed<'_>, problems: &
         for missing in picture.files.iter().filter(|f| f.integrity == Integrity::Missing) {
             problems.push(format!("{}: not there, but the record of {} lists it", missing.path, picture.name));
         }
+        for changed in picture.files.iter().filter(|f| f.integrity == Integrity::Changed) {
+            problems.push(format!("{}: changed since it was made; make it again", changed.path));
+        }
     }
     if let Ok(manifest) = &manifest {
         for entry in manifest.pictures.iter().filter(|e| !pictures.iter().any(|p| p.name == e.name)) {

@@ -1,5 +1,6 @@
 //! Text, rich text and files inside a page. Everything that comes from data passes through here.
 
+use crate::render::markup::{self, Token};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
@@ -31,45 +32,35 @@ pub fn rich(text: &str) -> String {
 fn try_rich(text: &str) -> Option<String> {
     let mut out = String::new();
     let mut italic = false;
-    // Elements that a closing brace ends; an italic passage may not straddle them.
+    // Elements that an end closes; an italic passage may not straddle them.
     let mut open: Vec<(&str, bool)> = Vec::new();
-    let mut characters = text.chars().peekable();
-    while let Some(c) = characters.next() {
-        match c {
-            '\\' => out.push_str(&escape(&characters.next()?.to_string())),
-            '*' => {
+    for token in markup::parse(text).ok()? {
+        match token {
+            Token::Sign(c) => out.push_str(&escape(&c.to_string())),
+            Token::Minus => out.push('−'),
+            Token::Italic => {
                 out.push_str(if italic { "</i>" } else { "<i>" });
                 italic = !italic;
             }
-            '^' | '_' => {
-                let element = if c == '^' { "sup" } else { "sub" };
+            Token::Raise | Token::Lower | Token::Group => {
+                let element = match token {
+                    Token::Raise => "sup",
+                    Token::Lower => "sub",
+                    _ => "span",
+                };
                 out.push_str(&format!("<{element}>"));
-                if characters.peek() == Some(&'{') {
-                    characters.next();
-                    open.push((element, italic));
-                } else {
-                    out.push_str(&script(&characters.next()?.to_string()));
-                    out.push_str(&format!("</{element}>"));
-                }
+                open.push((element, italic));
             }
-            '}' => {
+            Token::End => {
                 let (element, was_italic) = open.pop()?;
                 if was_italic != italic {
                     return None;
                 }
                 out.push_str(&format!("</{element}>"));
             }
-            '{' => return None,
-            c if open.is_empty() => out.push_str(&escape(&c.to_string())),
-            c => out.push_str(&script(&c.to_string())),
         }
     }
-    (open.is_empty() && !italic).then_some(out)
-}
-
-/// Inside superscripts and subscripts a hyphen is a minus sign.
-fn script(text: &str) -> String {
-    if text == "-" { "−".to_owned() } else { escape(text) }
+    Some(out)
 }
 
 /// A file as a data address.
@@ -107,6 +98,7 @@ mod tests {
     fn rich_text() {
         assert_eq!(rich("*α* = 10^{-5}, *v*_{+} < 1"), "<i>α</i> = 10<sup>−5</sup>, <i>v</i><sub>+</sub> &lt; 1");
         assert_eq!(rich("x^2"), "x<sup>2</sup>");
+        assert_eq!(rich("from -1.2 to 2-10, {a}"), "from −1.2 to 2-10, <span>a</span>");
         for broken in ["*a", "a}", "^{b", "{", "^", "*a_{b*}"] {
             assert_eq!(rich(broken), broken);
         }

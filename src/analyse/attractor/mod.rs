@@ -13,10 +13,9 @@
 //!
 //! Every limit is in [`Thresholds`].
 //!
-//! Why not the exponent alone? Because the reconstructed system spirals at rates of 1e-5 to 1e-4 per unit time: over 10^5 the
+//! Why not the exponent alone? Because systems near a two-fold spiral at rates of 1e-5 to 1e-4 per unit time: over 10^5 the
 //! exponent of such a run cannot be told from zero, while its points say plainly what it does.
 
-mod claim;
 mod cycle;
 mod divergence;
 mod occupancy;
@@ -24,7 +23,6 @@ mod thresholds;
 mod verdict;
 mod zero_one;
 
-pub use claim::{Claim, Score};
 pub use divergence::{Divergence, divergence};
 pub use occupancy::{Overlap, overlap};
 pub use thresholds::Thresholds;
@@ -50,7 +48,7 @@ pub struct SectionPoint {
 pub struct Question<'a> {
     /// End of the run; with it, an orbit that has stopped crossing is noticed.
     pub t_end: Option<f64>,
-    /// Time from which on the picture shows points (the paper: half of the run).
+    /// Time from which on the picture shows points (usually half of the run).
     pub shown_from: f64,
     /// Whether random kicks act.
     pub kicked: bool,

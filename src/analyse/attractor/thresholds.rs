@@ -4,11 +4,11 @@ use serde::{Deserialize, Serialize};
 
 /// The limits between one verdict and the next, one set for every panel. They were chosen on systems with known answers
 /// (`tests/attractor.rs`, which also checks that none of those answers changes when a limit moves by a third), and two of them,
-/// `dot` and `thickness`, with the sizes seen in Dormand-Prince trial runs of the caricature in view. Every
+/// `dot` and `thickness`, with the sizes seen in Dormand-Prince trial runs of the first system studied in view. Every
 /// [`Evidence`](super::Evidence) carries the ones it was made with.
 ///
-/// Lengths are fractions of the section's extent (the diagonal of the box around all of its points), because the
-/// paper's claims are about what is seen in a picture whose axes hold that box.
+/// Lengths are fractions of the section's extent (the diagonal of the box around all of its points), because
+/// what a section shows is judged by what is seen in a picture whose axes hold that box.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Thresholds {
@@ -42,7 +42,7 @@ pub struct Thresholds {
     pub block: usize,
     /// Largest thickness of an invariant curve: the root mean square difference of ln(distance from the centre) between
     /// neighbours in angle, over sqrt 2, after a linear trend in time. Smooth rings and spirals of 200 points give less than
-    /// 0.015, the reconstructed system's chaotic sea never less than 0.020 with 100 points and a median of 0.07.
+    /// 0.015, the chaotic sea of the first system studied never less than 0.020 with 100 points and a median of 0.07.
     pub thickness: f64,
     /// Largest jump of ln(distance from the centre) where one block follows another: ln 1.5. A spiral is continuous.
     pub continuity: f64,

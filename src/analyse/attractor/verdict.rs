@@ -32,7 +32,7 @@ pub struct Rate {
 /// A closed orbit as the section shows it, and how the run came to it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cycle {
-    /// Points of one direction per turn: one for the paper's "periodic", three for its "period three".
+    /// Points of one direction per turn: one for "period one", three for "period three".
     pub period: usize,
     /// All dots: first those of the counted direction in the order of the motion, then those of the other.
     pub points: Vec<CyclePoint>,
@@ -177,7 +177,7 @@ pub struct Evidence {
     pub extent: f64,
     /// Mean time between crossings of one direction.
     pub return_time: f64,
-    /// From this time on the paper shows points.
+    /// From this time on the picture shows points.
     pub shown_from: f64,
     /// The run changed its character after that: a picture of the shown part holds both.
     pub mixed: bool,

@@ -9,6 +9,7 @@ use crate::integrate::filippov::{ExitRule, Mode, Settings, Side, Trajectory, run
 use crate::job::JobError;
 use crate::job::table::Table;
 use crate::render::Sheet;
+use crate::render::number::number;
 use crate::render::sheet::{
     Axis, ColumnWidth, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle, SpacePanel,
 };
@@ -113,9 +114,9 @@ pub fn draw(tables: &[Table], v: f64, w: f64) -> Sheet {
         .legend(LegendEntry::new(LegendKey::Marker(MarkerStyle::new(MarkerShape::Dot, style::MAGENTA)), "two-fold"))
         .footer(format!(
             "*v* = {}, *w* = {}, *vw* = {} > 1; every line is a computed orbit",
-            crate::paper::wording::number(v),
-            crate::paper::wording::number(w),
-            crate::paper::wording::number((v * w * 100.0).round() / 100.0)
+            number(v),
+            number(w),
+            number((v * w * 100.0).round() / 100.0)
         ))
 }
 

@@ -110,6 +110,25 @@ pub enum ExitRule {
     All,
 }
 
+impl std::fmt::Display for ExitRule {
+    /// As it is written in words: "after-time:0.3:minus".
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let word = |side: &Side| if *side == Side::Plus { "plus" } else { "minus" };
+        match self {
+            ExitRule::AtOnce { side } => write!(f, "at-once:{}", word(side)),
+            ExitRule::AfterTime { time, side } => write!(f, "after-time:{time:?}:{}", word(side)),
+            ExitRule::AfterArc { arc, side } => write!(f, "after-arc:{arc:?}:{}", word(side)),
+            ExitRule::Random { law: SlidingLaw::Exponential { mean }, plus_probability, .. } => {
+                write!(f, "random:exponential:{mean:?}, to h > 0 with probability {plus_probability:?}")
+            }
+            ExitRule::Random { law: SlidingLaw::Uniform { longest }, plus_probability, .. } => {
+                write!(f, "random:uniform:{longest:?}, to h > 0 with probability {plus_probability:?}")
+            }
+            ExitRule::All => write!(f, "all"),
+        }
+    }
+}
+
 impl ExitRule {
     /// Whether the rule's numbers make sense; the message says what to change.
     pub fn validate(&self) -> Result<(), String> {

@@ -59,6 +59,9 @@ pub struct Funnel<const N: usize> {
     pub members: Vec<FunnelMember<N>>,
 }
 
+/// The most points that all members of a funnel have together: 0.6 GB.
+const MOST_POINTS: usize = 20_000_000;
+
 /// Follows the orbit of `x0` to the first point where its future is a set, then that set: [`ExitRule::All`].
 ///
 /// # Errors
@@ -132,8 +135,8 @@ where
 }
 
 /// A trajectory from `a` to `b` through a two-fold: the future of `a` up to the singularity, then a past of `b` from there on. That
-/// two such points are joined by a trajectory in finite time is the paper's description of non-deterministic chaos
-/// (sec. 3, fig. 4). Events are those of the first part; the second part's pieces tell its modes.
+/// two such points are joined by a trajectory in finite time is what Jeffrey (2013, sec. 3) calls
+/// non-deterministic chaos. Events are those of the first part; the second part's pieces tell its modes.
 ///
 /// # Errors
 /// [`FilippovError::NoSuchExit`] if the future of `a` or the past of `b` comes to no two-fold within `longest`, or to different
@@ -192,7 +195,8 @@ impl<const N: usize> Funnel<N> {
         } else {
             Departure::Repelling
         };
-        let mut members = Vec::with_capacity(2 * grid.times);
+        let mut members = Vec::new();
+        let mut points = 0;
         for k in 0..grid.times {
             let fraction = if grid.times > 1 { k as f64 / (grid.times - 1) as f64 } else { 1.0 };
             let exit_time = grid.shortest * pow(grid.longest / grid.shortest, fraction);
@@ -209,6 +213,10 @@ impl<const N: usize> Funnel<N> {
                 let until = self.t + grid.horizon;
                 let summary =
                     engine::run_from(system, origin, until, settings, rule, &mut trajectory, &())?.within_budget()?;
+                points += trajectory.points().count();
+                if points > MOST_POINTS {
+                    return Err(FilippovError::TooManyPoints { limit: MOST_POINTS, members: members.len() });
+                }
                 members.push(FunnelMember { exit_time, side, trajectory, summary });
             }
         }

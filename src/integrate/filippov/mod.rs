@@ -33,7 +33,7 @@
 //!
 //! **At a two-fold** F = 0. [`two_fold`] has the local analysis. If sliding runs into it, the last leg is a closed form with a
 //! stated error ([`EventKind::TwoFoldReached`]). There the future is a set, and the exit rule selects from it:
-//! where the sliding flow continues into the repelling region (an invisible two-fold with vw > 1, v < 0: the paper's; a
+//! where the sliding flow continues into the repelling region (an invisible two-fold with vw > 1, v < 0; a
 //! visible one where the line of entry leads on) the orbit follows the analytic continuation of the invariant curve for as
 //! long as the rule says; [`ExitRule::AtOnce`] to a visible side takes that side's tangent orbit. Where the rule asks for a
 //! future that does not exist the run ends with [`FilippovError::NoSuchExit`].
@@ -300,6 +300,16 @@ pub enum FilippovError {
         state: Vec<f64>,
         /// Why.
         why: &'static str,
+    },
+    /// The recorded futures are more than fits in memory.
+    #[error(
+        "more than {limit} points were recorded in the first {members} futures of the funnel: follow fewer of them, or each for a shorter time"
+    )]
+    TooManyPoints {
+        /// The limit.
+        limit: usize,
+        /// Futures that had been followed.
+        members: usize,
     },
     /// The budget of events is used up.
     #[error(

@@ -15,7 +15,7 @@
 //! sigma^k/(k mu), where sum g_k sigma^k is q - p on W. sigma > 0 lies in the attracting region and sigma < 0 in the
 //! repelling one, so t(sigma) runs from negative to positive through the singularity: the curve is the analytic
 //! continuation of sliding through it. All other sliding orbits of a node touch this curve at the two-fold to an order
-//! mu_strong/mu_weak (7.8 for the caricature): each one of them is another future in the repelling region, all of them
+//! mu_strong/mu_weak (7.8 for v = -1.2, w = -1.4): each one of them is another future in the repelling region, all of them
 //! indistinguishable from W near the point. [`funnel`](super::funnel) and the exit rules follow W.
 
 use nalgebra::{SMatrix, SVector};

@@ -4,8 +4,8 @@
 //!
 //! Written from the literature: Hindmarsh, ODEPACK, a systematized collection of ODE solvers (1983); Petzold, Automatic
 //! selection of methods for solving stiff and nonstiff systems (1983); Radhakrishnan & Hindmarsh, Description and use
-//! of LSODE (1993); Gear (1971); Hairer, Norsett & Wanner (1993), ch. III; Hairer & Wanner (1996), ch. V. It was the
-//! default of the NDSolve that made the paper's figures. Names there and here:
+//! of LSODE (1993); Gear (1971); Hairer, Norsett & Wanner (1993), ch. III; Hairer & Wanner (1996), ch. V. Names there
+//! and here:
 //!
 //! | here | there |
 //! |---|---|

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Evidence, Verdict};
+use crate::analyse::attractor::{Evidence, Verdict};
 
 /// What the paper says of a section (figs 7-9).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -47,7 +47,7 @@ impl Claim {
     /// - a period agrees with that period, reached or still being approached, if the whole of the shown part follows it;
     /// - chaos agrees with chaos and nothing else: not with a picture whose chaos ended in the shown part;
     /// - "partly washed out" agrees with noise that leaves a share of the structure that is neither all nor nothing, by the
-    ///   limits in [`Thresholds`](super::Thresholds), and that does not merely hold the run around a closed orbit.
+    ///   limits in [`Thresholds`](crate::analyse::attractor::Thresholds), and that does not merely hold the run around a closed orbit.
     pub fn score(self, evidence: &Evidence) -> Score {
         let (agrees, because) = match (self, &evidence.verdict) {
             (Self::Period(k), Verdict::Periodic(c) | Verdict::Spiralling(c)) if c.period != k => {

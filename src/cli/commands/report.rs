@@ -2,16 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use twofold::cli::print;
-use twofold::record::{self, FileBytes, read_tree};
-use twofold::report::{Links, Report, archive, assemble, names, page};
+use serde_json::json;
 
-use super::{Outcome, Problem};
+use crate::cli::speak::print_json;
+use crate::cli::{CliError, Exit, print};
+use crate::record::{self, FileBytes, read_tree};
+use crate::report::{Links, Report, archive, assemble, names, page};
 
 /// Write a self-contained page about the figures in a folder, and beside it report.json, verdicts.json and RO-Crate metadata.
 ///
 /// A difference from the reference is shown on the page; it is not a failure of this command (see `twofold check`).
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  twofold report\n  twofold report --figures pictures --out page.html --json")]
 pub struct Arguments {
     /// Folder with the figures; the JSON files are written to it.
     #[arg(long, value_name = "DIR", default_value = "target/figures")]
@@ -22,23 +24,27 @@ pub struct Arguments {
     /// The page; index.html in the folder with the figures if not given. Elsewhere it names the files instead of linking to them.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// What was written and found, as JSON on standard output.
+    #[arg(long)]
+    json: bool,
 }
 
-pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
+pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let folder = &arguments.figures;
     let made = read_tree(folder, &|_| true)
-        .map_err(|e| format!("{e}; run `make figures` first, or name another --figures"))?
+        .map_err(|e| CliError::Usage(format!("{e}; run `make figures` first, or name another --figures")))?
         .files;
     let report = assemble(&made, &references(&arguments.expected)?);
     if report.figures.is_empty() {
-        return Err(format!(
+        return Err(CliError::Usage(format!(
             "{}: no figure's pictures are in this folder; run `make figures` first, or name another --figures",
             folder.display()
-        )
-        .into());
+        )));
     }
+    record::files::try_folder(folder)?;
     let beside = folder.join(names::PAGE);
     let out = arguments.out.as_ref().unwrap_or(&beside);
+    record::files::try_place(out)?;
     let html = page(&report, if stands_in(out, folder) { Links::Beside } else { Links::None });
     let (json, verdicts) = (report.to_json(), report.verdicts_json());
     record::write(&folder.join(names::REPORT), &json)?;
@@ -50,12 +56,22 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
     }
     record::write(&folder.join(names::ARCHIVE), &archive(&report, &made, &added))?;
     record::write(out, &html)?;
-    print(&said(&report, out))?;
-    Ok(Outcome::Fine)
+    if arguments.json {
+        print_json(&json!({
+            "format": "twofold-report-written",
+            "version": 1,
+            "page": out,
+            "summary": report.summary,
+            "problems": report.problems,
+        }))?;
+    } else {
+        print(&said(&report, out))?;
+    }
+    Ok(Exit::Fine)
 }
 
 /// The committed manifests and pictures; none if the folder is not there.
-pub fn references(folder: &Path) -> Result<Vec<FileBytes>, Problem> {
+pub fn references(folder: &Path) -> Result<Vec<FileBytes>, CliError> {
     if !folder.exists() {
         return Ok(Vec::new());
     }

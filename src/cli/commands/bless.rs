@@ -3,18 +3,21 @@
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-use twofold::cli::progress::Progress;
-use twofold::cli::{in_pool, print};
-use twofold::job::Desk;
-use twofold::paper::pipeline::{compute, questions};
-use twofold::record::manifest::VERSION;
-use twofold::record::{self, Manifest};
+use serde_json::json;
 
-use super::{Outcome, Problem, check};
+use super::chosen;
+use crate::cli::progress::Progress;
+use crate::cli::speak::print_json;
+use crate::cli::{CliError, Exit, in_pool, print};
+use crate::job::Desk;
+use crate::paper::pipeline::{compute, questions};
+use crate::record::manifest::VERSION;
+use crate::record::{self, Manifest};
 
 /// Recompute figures and write them as the new reference: figures/figN/expected.json, its PNG, and a line in CHANGES.md.
 /// Refused while any test other than the golden ones fails.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  twofold bless fig7 --reason \"the exits are resolved in extended precision\"")]
 pub struct Arguments {
     /// Figures to bless, such as fig7; all if none is named.
     figures: Vec<String>,
@@ -27,25 +30,39 @@ pub struct Arguments {
     /// Threads; 0 is one per core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
+    /// What was done, as JSON on standard output.
+    #[arg(long)]
+    json: bool,
     /// No progress on standard error.
     #[arg(long)]
     quiet: bool,
 }
 
-pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
+pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let reason = arguments.reason.trim();
     if reason.is_empty() || reason.contains('\n') {
-        return Err("--reason: give one line that says why the reference changes".into());
+        return Err(CliError::Usage("--reason: give one line that says why the reference changes".into()));
     }
-    let figures = check::chosen(&arguments.figures)?;
+    let figures = chosen(&arguments.figures)?;
+    record::files::try_folder(&arguments.expected)?;
+    let say = |outcome: &str, changed: &[(String, String)], text: &str| {
+        if !arguments.json {
+            return print(text);
+        }
+        let changed: Vec<_> = changed.iter().map(|(name, what)| json!({ "picture": name, "what": what })).collect();
+        print_json(
+            &json!({ "format": "twofold-bless", "version": 1, "outcome": outcome, "reason": reason, "changed": changed }),
+        )
+    };
     if !tests_pass()? {
-        print("refused: a test that is not golden fails; a reference must not be made from a program that is wrong")?;
-        return Ok(Outcome::Differs);
+        let why = "refused: a test that is not golden fails; a reference must not be made from a program that is wrong";
+        say("refused", &[], why)?;
+        return Ok(Exit::CheckFailed);
     }
     let progress = Progress::new(arguments.quiet);
     let desk = Desk::new(None, &progress);
     in_pool(arguments.threads, || desk.gather(&questions(figures.iter().flat_map(|f| &f.pictures))))?;
-    let mut changed = Vec::new();
+    let mut changed: Vec<(String, String)> = Vec::new();
     for figure in &figures {
         let folder = arguments.expected.join(figure.id);
         let path = folder.join("expected.json");
@@ -66,7 +83,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
                 Some(old) => old.first_difference(&entry).map(|d| d.layer.name().to_owned()),
             };
             if let Some(what) = what {
-                changed.push(format!("{} ({what})", entry.name));
+                changed.push((entry.name.clone(), what));
             }
             record::write(&folder.join(format!("{}.png", entry.name)), &computed.rendered.png)?;
             manifest.pictures.push(entry);
@@ -74,28 +91,32 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
         record::write(&path, &manifest.to_json())?;
     }
     if changed.is_empty() {
-        print("nothing changed")?;
-        return Ok(Outcome::Fine);
+        say("nothing", &[], "nothing changed")?;
+        return Ok(Exit::Fine);
     }
+    let list: Vec<String> = changed.iter().map(|(name, what)| format!("{name} ({what})")).collect();
+    let list = list.join(", ");
     let log = arguments.expected.join("CHANGES.md");
     let mut text = record::files::read_text(&log).unwrap_or_else(|_| HEADER.to_owned());
-    text += &format!("- {reason}: {}\n", changed.join(", "));
+    text += &format!("- {reason}: {list}\n");
     record::write(&log, text.as_bytes())?;
-    print(&format!("blessed: {}", changed.join(", ")))?;
-    Ok(Outcome::Fine)
+    say("blessed", &changed, &format!("blessed: {list}"))?;
+    Ok(Exit::Fine)
 }
 
 const HEADER: &str = "# Why the reference pictures changed\n\nA line per `twofold bless`, oldest first: reason, then each picture \
                       with the first layer that changed.\n\n";
 
 /// Runs the test suite without the golden tests (which a new reference is about to change).
-fn tests_pass() -> Result<bool, Problem> {
+fn tests_pass() -> Result<bool, CliError> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let status = Command::new(cargo)
         .args(["test", "--quiet", "--", "--skip", "golden"])
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .status()
-        .map_err(|e| format!("cannot run the tests with cargo: {e}; bless from a checkout with Rust installed"))?;
+        .map_err(|e| {
+            CliError::Usage(format!("cannot run the tests with cargo: {e}; bless from a checkout with Rust installed"))
+        })?;
     Ok(status.success())
 }

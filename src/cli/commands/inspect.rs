@@ -3,18 +3,19 @@
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use twofold::cli::print;
-use twofold::paper::pipeline::pixel_hash;
-use twofold::record::{self, Hash, Manifest, PictureEntry, read_tree};
-use twofold::render::{Format, Provenance, ProvenanceError, decode_png, read_provenance};
 
-use super::{Outcome, Problem};
+use crate::cli::speak::{harmless, print_json};
+use crate::cli::{CliError, Exit, print};
+use crate::paper::pipeline::pixel_hash;
+use crate::record::{self, Hash, Manifest, PictureEntry, read_tree};
+use crate::render::{Format, Provenance, ProvenanceError, decode_png, read_provenance};
 
 /// Print the provenance inside a PNG, SVG or PDF file and say whether it is one of ours and unchanged.
 ///
 /// Exit code 0: ours and unchanged. 1: not ours, or changed, or of the name of a committed picture but not its bytes. 2: the file cannot
 /// be read as a picture. The seal inside a file tells damage and editing; only the committed hash tells forgery.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  twofold inspect fig7-printed.png\n  twofold inspect --json someone-elses.pdf")]
 pub struct Arguments {
     /// The picture.
     file: PathBuf,
@@ -66,24 +67,24 @@ struct Inspection {
     provenance: Vec<(String, String)>,
 }
 
-pub fn run(arguments: &Arguments) -> Result<Outcome, Problem> {
+pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let bytes = record::files::read(&arguments.file)?;
     let read = read_provenance(&bytes);
     if let Err(error @ ProvenanceError::UnknownFormat) = read {
-        return Err(format!("{}: {error}", arguments.file.display()).into());
+        return Err(CliError::Usage(format!("{}: {error}", arguments.file.display())));
     }
     let manifests = manifests(&arguments.expected)?;
     let inspection = inspect(&bytes, read, &manifests);
     if arguments.json {
-        print(&serde_json::to_string_pretty(&inspection)?)?;
+        print_json(&inspection)?;
     } else {
         print(&describe(&inspection, &arguments.file, &arguments.expected))?;
     }
-    Ok(if inspection.ours_and_unchanged { Outcome::Fine } else { Outcome::Differs })
+    Ok(if inspection.ours_and_unchanged { Exit::Fine } else { Exit::CheckFailed })
 }
 
 /// All committed manifests; none if the folder is not there.
-fn manifests(folder: &Path) -> Result<Vec<Manifest>, Problem> {
+fn manifests(folder: &Path) -> Result<Vec<Manifest>, CliError> {
     if !folder.exists() {
         return Ok(Vec::new());
     }
@@ -186,9 +187,4 @@ fn describe(i: &Inspection, file: &Path, expected: &Path) -> String {
         .into(),
     );
     lines.join("\n")
-}
-
-/// Text from a foreign file, without characters that steer a terminal.
-fn harmless(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
 }

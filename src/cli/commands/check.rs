@@ -1,0 +1,164 @@
+//! `twofold check`: recompute the figures and compare with the committed manifests, or with published pictures.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::{chosen, published};
+use crate::cli::progress::Progress;
+use crate::cli::speak::print_json;
+use crate::cli::{CliError, Exit, in_pool, print};
+use crate::job::Desk;
+use crate::paper::pipeline::{PictureRecord, compute, questions};
+use crate::record::{self, Layer, Manifest};
+
+/// Recompute figures and compare spec, data, pixels and files with the committed manifests; exit code 1 on a difference.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  twofold check fig5 fig6\n  twofold check --json --quiet > check.json\n  twofold check --against ~/their-pictures"
+)]
+pub struct Arguments {
+    /// Figures to check, such as fig7; all if none is named.
+    figures: Vec<String>,
+    /// What to check against instead of figures/figN/expected.json: another manifest, or a folder with published pictures (PNG, named
+    /// like ours). A picture holds by the first of these that does: same file, same pixels, few and slightly changed pixels, small RMS,
+    /// high SSIM.
+    #[arg(long, value_name = "DIR|MANIFEST")]
+    against: Option<PathBuf>,
+    /// Folder that holds figN/expected.json.
+    #[arg(long, value_name = "DIR", default_value = "figures", conflicts_with = "against")]
+    expected: PathBuf,
+    /// Threads; 0 is one per core.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// What was found, as JSON on standard output when all is checked.
+    #[arg(long)]
+    json: bool,
+    /// No progress on standard error.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// What was found of one picture, or of a figure's manifest.
+#[derive(Debug, Serialize)]
+struct Finding {
+    /// The picture, or the figure if its manifest cannot be used.
+    name: String,
+    #[serde(flatten)]
+    state: State,
+}
+
+#[derive(Debug, Serialize)]
+#[serde(tag = "state", rename_all = "kebab-case")]
+enum State {
+    Same,
+    Differs { layer: Layer, panels: Vec<String> },
+    MissingReference { why: String },
+    NotMade,
+}
+
+impl Finding {
+    fn line(&self) -> String {
+        let name = &self.name;
+        match &self.state {
+            State::Same => format!("{name}: same (spec, data, verdict, pixels, PNG, SVG, PDF)"),
+            State::Differs { layer, panels } if panels.is_empty() => {
+                format!("{name}: DIFFERS first in its {}", layer.name())
+            }
+            State::Differs { layer, panels } => {
+                format!("{name}: DIFFERS first in its {} of panel {}", layer.name(), panels.join(", "))
+            }
+            State::MissingReference { why } => format!("{name}: MISSING REFERENCE: {why}"),
+            State::NotMade => format!("{name}: NOT MADE: the manifest lists it, but its figure has no such picture"),
+        }
+    }
+}
+
+pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
+    let mut figures = chosen(&arguments.figures)?;
+    if let Some(folder) = arguments.against.as_ref().filter(|path| path.is_dir()) {
+        return published::check(folder, &figures, arguments.threads, arguments.quiet, arguments.json);
+    }
+    let given = match &arguments.against {
+        None => None,
+        Some(path) => {
+            let manifest = read_manifest(path)?;
+            figures.retain(|f| f.id == manifest.figure);
+            if figures.is_empty() {
+                return Err(CliError::Usage(format!(
+                    "{} is about \"{}\", which is not among the figures to check; name another manifest or figure",
+                    path.display(),
+                    manifest.figure
+                )));
+            }
+            Some(manifest)
+        }
+    };
+    // Every manifest is read before the first second of computing is spent.
+    let manifests: Vec<Result<Manifest, CliError>> = figures
+        .iter()
+        .map(|figure| match &given {
+            Some(manifest) => Ok(manifest.clone()),
+            None => read_manifest(&arguments.expected.join(figure.id).join("expected.json")),
+        })
+        .collect();
+    let progress = Progress::new(arguments.quiet);
+    // A check never rests on a store: everything is computed here and now.
+    let desk = Desk::new(None, &progress);
+    in_pool(arguments.threads, || desk.gather(&questions(figures.iter().flat_map(|f| &f.pictures))))?;
+    let mut findings = Vec::new();
+    let mut found = |name: &str, state: State| {
+        let finding = Finding { name: name.to_owned(), state };
+        let line = finding.line();
+        findings.push(finding);
+        if arguments.json { Ok(()) } else { print(&line) }
+    };
+    for (figure, manifest) in figures.iter().zip(manifests) {
+        let manifest = match manifest {
+            Ok(manifest) => manifest,
+            Err(problem) => {
+                found(figure.id, State::MissingReference { why: problem.to_string() })?;
+                continue;
+            }
+        };
+        for picture in &figure.pictures {
+            let actual = compute(picture, &desk)?.record;
+            found(&actual.hashes.name, compare(&manifest, &actual))?;
+        }
+        for missing in manifest.pictures.iter().filter(|e| !figure.pictures.iter().any(|p| p.name == e.name)) {
+            found(&missing.name, State::NotMade)?;
+        }
+    }
+    let failures = findings.iter().filter(|f| !matches!(f.state, State::Same)).count();
+    if arguments.json {
+        print_json(&serde_json::json!({
+            "format": "twofold-check",
+            "version": 1,
+            "all_the_same": failures == 0,
+            "findings": findings,
+        }))?;
+    } else if failures == 0 {
+        print(&format!("{} pictures checked, all the same", findings.len()))?;
+    } else {
+        print(&format!(
+            "{failures} differ. If the change is meant, look at the pictures (twofold report), then: twofold bless --reason \"why\""
+        ))?;
+    }
+    Ok(if failures == 0 { Exit::Fine } else { Exit::CheckFailed })
+}
+
+/// The first layer that differs, if one does.
+fn compare(manifest: &Manifest, actual: &PictureRecord) -> State {
+    let Some(expected) = manifest.picture(&actual.hashes.name) else {
+        return State::MissingReference { why: "the manifest does not list this picture".into() };
+    };
+    match expected.first_difference(&actual.hashes) {
+        None => State::Same,
+        Some(difference) => State::Differs { layer: difference.layer, panels: difference.panels },
+    }
+}
+
+fn read_manifest(path: &Path) -> Result<Manifest, CliError> {
+    let text = record::files::read_text(path)?;
+    Ok(Manifest::parse(&text, &path.display().to_string())?)
+}

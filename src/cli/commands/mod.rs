@@ -1,0 +1,94 @@
+//! The commands of `twofold`.
+
+mod bless;
+mod check;
+mod figure;
+mod inspect;
+mod manual;
+mod published;
+mod report;
+mod run;
+mod sweep;
+
+use std::process::ExitCode;
+
+use clap::{CommandFactory, Parser, Subcommand};
+
+use super::speak::complain;
+use super::{CliError, Exit, LONG_VERSION, interrupt};
+use crate::paper::{Figure, figures};
+
+/// Reference software for the breakdown of determinism at a two-fold singularity (Jeffrey 2013).
+#[derive(Debug, Parser)]
+#[command(name = "twofold", version, long_version = LONG_VERSION, propagate_version = true, max_term_width = 120, after_help = Exit::HELP)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Run(Box<run::Arguments>),
+    Figure(Box<figure::Arguments>),
+    Sweep(Box<sweep::Arguments>),
+    Check(check::Arguments),
+    Bless(bless::Arguments),
+    Report(report::Arguments),
+    Inspect(inspect::Arguments),
+    Completions(manual::Completions),
+    Man(manual::Man),
+}
+
+/// The program `twofold`.
+pub fn main() -> ExitCode {
+    interrupt::listen();
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return usage(&error).into(),
+    };
+    let result = match arguments.command {
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Figure(arguments) => figure::run(&arguments),
+        Command::Sweep(arguments) => sweep::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
+        Command::Bless(arguments) => bless::run(&arguments),
+        Command::Report(arguments) => report::run(&arguments),
+        Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::Completions(arguments) => manual::completions(&arguments, Arguments::command()),
+        Command::Man(arguments) => manual::man(&arguments, Arguments::command()),
+    };
+    match result {
+        Ok(exit) => exit.into(),
+        Err(error) => {
+            complain(&format!("error: {error}"));
+            error.exit().into()
+        }
+    }
+}
+
+/// Prints what clap has to say: help and version on standard output, errors on standard error.
+pub(super) fn usage(error: &clap::Error) -> Exit {
+    // A stream that nobody reads loses the text, and nothing else.
+    let _ = error.print();
+    if error.use_stderr() { Exit::Usage } else { Exit::Fine }
+}
+
+/// The figures of these names, or all.
+fn chosen(names: &[String]) -> Result<Vec<Figure>, CliError> {
+    let all = figures::all();
+    if let Some(unknown) = names.iter().find(|n| !all.iter().any(|f| f.id == *n)) {
+        let known: Vec<&str> = all.iter().map(|f| f.id).collect();
+        return Err(CliError::Usage(format!("there is no figure \"{unknown}\"; choose among {}", known.join(", "))));
+    }
+    Ok(all.into_iter().filter(|f| names.is_empty() || names.iter().any(|n| n == f.id)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_definition_of_the_flags_is_sound() {
+        Arguments::command().debug_assert();
+    }
+}

@@ -1,0 +1,173 @@
+//! How a program ends: exit codes, and errors in words.
+
+use std::io;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use crate::job::JobError;
+use crate::job::spec::SpecError;
+use crate::paper::pipeline::PipelineError;
+use crate::record::FileError;
+use crate::record::manifest::ManifestError;
+
+/// The exit code of every program of this project.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Exit {
+    /// All is well.
+    Fine = 0,
+    /// A check failed: something differs, is missing, or is not ours.
+    CheckFailed = 1,
+    /// What was asked for cannot be: a flag, a number, an input, or a place (a file that cannot be read or written, whenever that is
+    /// noticed).
+    Usage = 2,
+    /// What was asked for was right, and the computation or the drawing failed.
+    Failed = 3,
+    /// Ended by Ctrl-C (SIGINT): 128 + 2, as shells count.
+    Interrupted = 130,
+    /// Ended by SIGTERM, as batch systems send it: 128 + 15.
+    Terminated = 143,
+}
+
+impl Exit {
+    /// All of them, as `--help` says it.
+    pub const HELP: &str = "Exit codes: 0 fine; 1 a check failed; 2 bad usage, bad input, or a file that cannot be read or written; \
+                            3 a computation failed; 130 interrupted (Ctrl-C); 143 terminated (SIGTERM).";
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        ExitCode::from(exit as u8)
+    }
+}
+
+/// What can go wrong under the command line. Its text says what was wrong, where, and what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum CliError {
+    /// Bad usage that only one command knows of.
+    #[error("{0}")]
+    Usage(String),
+    /// A flag that would have no effect.
+    #[error("{flag} has no effect here: {why}")]
+    NoEffect {
+        /// The flag.
+        flag: String,
+        /// Why not, and what to do.
+        why: String,
+    },
+    /// No panel of that name.
+    #[error("there is no panel \"{panel}\" in {figure}; choose one of {known}")]
+    NoSuchPanel {
+        /// What was asked for.
+        panel: String,
+        /// The figure.
+        figure: &'static str,
+        /// What there is.
+        known: String,
+    },
+    /// A wrong number.
+    #[error("--{0}")]
+    Spec(#[from] SpecError),
+    /// A run failed.
+    #[error(transparent)]
+    Job(#[from] JobError),
+    /// A run or a drawing of a figure failed.
+    #[error(transparent)]
+    Pipeline(#[from] PipelineError),
+    /// A manifest could not be used.
+    #[error(transparent)]
+    Manifest(#[from] ManifestError),
+    /// A file could not be read or written.
+    #[error("{source}{}", advice(source))]
+    File {
+        /// Which, and why.
+        #[from]
+        source: FileError,
+    },
+    /// Threads could not be started.
+    #[error("--threads {threads}: {reason}; give a smaller number, or 0 for one per core")]
+    Threads {
+        /// How many.
+        threads: usize,
+        /// Why.
+        reason: String,
+    },
+    /// Standard output could not be written.
+    #[error("cannot write to standard output: {0}")]
+    Output(#[from] io::Error),
+    /// Somebody asked to stop; what was finished has been kept.
+    #[error("{said}")]
+    Stopped {
+        /// What was kept, and where.
+        said: String,
+        /// By which signal.
+        exit: Exit,
+    },
+}
+
+impl CliError {
+    /// The exit code.
+    pub fn exit(&self) -> Exit {
+        let of_job = |e: &JobError| if e.is_bad_question() { Exit::Usage } else { Exit::Failed };
+        match self {
+            CliError::Job(source) | CliError::Pipeline(PipelineError::Job { source, .. }) => of_job(source),
+            CliError::Pipeline(PipelineError::Render { .. }) => Exit::Failed,
+            CliError::Stopped { exit, .. } => *exit,
+            CliError::Usage(_)
+            | CliError::NoEffect { .. }
+            | CliError::NoSuchPanel { .. }
+            | CliError::Spec(_)
+            | CliError::Manifest(_)
+            | CliError::File { .. }
+            | CliError::Threads { .. }
+            | CliError::Output(_) => Exit::Usage,
+        }
+    }
+
+    /// A flag that would have no effect.
+    pub fn no_effect(flag: impl Into<String>, why: impl Into<String>) -> Self {
+        CliError::NoEffect { flag: flag.into(), why: why.into() }
+    }
+}
+
+/// What to do about a place that cannot be used.
+fn advice(error: &FileError) -> &'static str {
+    if error.action == "read" || error.action == "list" {
+        return "";
+    }
+    match error.source.kind() {
+        io::ErrorKind::PermissionDenied => "; choose a place you may write to with --out",
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => {
+            "; free some space or choose another place with --out"
+        }
+        io::ErrorKind::ReadOnlyFilesystem => "; choose a writable place with --out",
+        io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists => {
+            "; a part of this path is a file, choose another place with --out"
+        }
+        _ if error.action.starts_with("find") => "; something else removed or changed it meanwhile: run this again",
+        _ => "; choose another place with --out",
+    }
+}
+
+/// Where the rest of an unfinished output is put: beside its place, under a name that nobody takes for the whole.
+pub fn part_of(file: &std::path::Path) -> PathBuf {
+    let mut name = file.as_os_str().to_owned();
+    name.push(".part");
+    name.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn advice_fits_the_failure() {
+        let error = |action, kind: io::ErrorKind| {
+            CliError::from(FileError { action, path: "x".into(), source: kind.into() }).to_string()
+        };
+        assert!(error("write", io::ErrorKind::StorageFull).contains("free some space"));
+        assert!(error("write", io::ErrorKind::NotADirectory).contains("is a file, choose another place with --out"));
+        assert!(!error("read", io::ErrorKind::PermissionDenied).contains("--out"));
+        assert!(error("find again", io::ErrorKind::NotFound).contains("run this again"));
+    }
+}

@@ -1,0 +1,303 @@
+//! The command line that every figure's binary shares.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{CommandFactory, FromArgMatches, Parser};
+use rayon::prelude::*;
+
+use super::progress::Progress;
+use super::speak::{complain, print_json};
+use super::words::{Method, Readings};
+use super::{CliError, Exit, LONG_VERSION, in_pool, interrupt};
+use crate::integrate::filippov::ExitRule;
+use crate::job::spec::{RunSpec, SwitchSpec};
+use crate::job::{Desk, Store};
+use crate::paper::pipeline::{Computed, PictureRecord, compute, questions};
+use crate::paper::{Alterations, Figure, Panel, Picture};
+use crate::record::files::{still_there, try_folder};
+use crate::record::{FileError, write};
+
+/// Compute a figure and write it as PNG, SVG and PDF, with its numbers as CSV.
+#[derive(Clone, Debug, Parser)]
+#[command(version, long_version = LONG_VERSION, after_help = Exit::HELP, max_term_width = 120)]
+struct Arguments {
+    #[command(flatten)]
+    flags: FigureFlags,
+}
+
+/// How figures are made.
+#[derive(Clone, Debug, clap::Args)]
+pub struct FigureFlags {
+    /// Folder to write to; a folder named after the figure is made in it.
+    #[arg(long, value_name = "DIR", default_value = "target/figures")]
+    out: PathBuf,
+    /// Parameter reading [default: all].
+    #[arg(long, value_enum, value_name = "READING")]
+    reading: Option<Readings>,
+    /// One panel only, such as "ii"; the picture is marked.
+    #[arg(long, value_name = "PANEL")]
+    only: Option<String>,
+    /// Threads; 0 is one per core. The bytes do not depend on it.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// Another seed for random kicks and exits; the picture is marked.
+    #[arg(long, value_name = "SEED", allow_negative_numbers = true)]
+    seed: Option<u64>,
+    /// Another final time; the picture is marked as shortened.
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    t_end: Option<f64>,
+    /// Another integration method; the picture is marked.
+    #[arg(long, value_enum, value_name = "METHOD")]
+    method: Option<Method>,
+    #[command(flatten)]
+    store: StoreFlags,
+    /// Print what was made, with hashes and statistics, as JSON on standard output.
+    #[arg(long)]
+    json: bool,
+    /// No progress on standard error.
+    #[arg(long)]
+    quiet: bool,
+    /// Print the runs' specs as JSON and compute nothing; a single one can be given to `twofold run --spec`.
+    #[arg(long, conflicts_with_all = ["out", "threads", "json", "store", "fresh"])]
+    print_spec: bool,
+}
+
+/// Where answers are kept, so that nothing is computed twice.
+#[derive(Clone, Debug, clap::Args)]
+pub struct StoreFlags {
+    /// Folder in which answers are kept for the next time.
+    #[arg(long, value_name = "DIR", default_value = "target/store")]
+    store: PathBuf,
+    /// Compute everything anew and keep nothing.
+    #[arg(long, conflicts_with = "store")]
+    fresh: bool,
+}
+
+impl StoreFlags {
+    /// The store that these flags ask for.
+    pub fn store(&self) -> Option<Store> {
+        (!self.fresh).then(|| Store::new(&self.store))
+    }
+}
+
+/// The definition of a figure's flags, with its own name, description and examples.
+fn command(figure: &Figure) -> clap::Command {
+    let id = figure.id;
+    let caption = figure.pictures.first().map_or("", |p| p.caption.as_str());
+    let about = format!("{id}: {}. Written as PNG, SVG and PDF, with its numbers as CSV.", figure.title);
+    let mut examples = format!("Examples:\n  {id} --out pictures\n  {id} --json --quiet");
+    if figure.pictures.iter().any(|p| p.reading.is_some()) {
+        examples += &format!("\n  {id} --reading printed");
+    }
+    if let Some(panel) = figure.pictures.iter().flat_map(|p| &p.panels).next() {
+        examples += &format!(
+            "\n  {id} --t-end 100\n  {id} --only {0} --reading printed --print-spec > spec.json && twofold run --spec spec.json",
+            panel.label
+        );
+    }
+    Arguments::command()
+        .name(id)
+        .bin_name(id)
+        .about(about.clone())
+        .long_about(format!("{about}\n\n{}", crate::paper::wording::plain(caption)))
+        .after_help(format!("{examples}\n\n{}", Exit::HELP))
+}
+
+/// Runs a figure binary: parses the command line, computes, writes.
+pub fn main(figure: Figure) -> ExitCode {
+    interrupt::listen();
+    let arguments = match command(&figure).try_get_matches().and_then(|m| Arguments::from_arg_matches(&m)) {
+        Ok(arguments) => arguments,
+        Err(error) => return super::commands::usage(&error).into(),
+    };
+    match run(vec![figure], &arguments.flags) {
+        Ok(()) => Exit::Fine.into(),
+        Err(error) => {
+            complain(&format!("error: {error}"));
+            error.exit().into()
+        }
+    }
+}
+
+/// Computes these figures and writes them, as the flags say.
+///
+/// # Errors
+///
+/// See [`CliError`].
+pub fn run(figures: Vec<Figure>, arguments: &FigureFlags) -> Result<(), CliError> {
+    refuse_idle(&figures, arguments)?;
+    let figures = figures.into_iter().map(|f| select(f, arguments)).collect::<Result<Vec<_>, _>>()?;
+    if arguments.print_spec {
+        return print_specs(&figures);
+    }
+    for figure in &figures {
+        try_folder(&arguments.out.join(figure.id))?;
+    }
+    let progress = Progress::new(arguments.quiet);
+    let desk = Desk::new(arguments.store.store(), &progress);
+    let records = in_pool(arguments.threads, || make(&figures, &arguments.out, &desk))??;
+    if arguments.json {
+        print_json(&records)?;
+    }
+    Ok(())
+}
+
+/// Makes these figures, each in a folder of its own under `out`: all their questions first, side by side, the longest first; then the
+/// pictures. Answers that the desk's store keeps are not lost if this is killed.
+///
+/// # Errors
+///
+/// If a computation or a drawing failed, a file could not be written, or what was written has been removed by the time that all is done;
+/// what could be made is there all the same.
+pub fn make(figures: &[Figure], out: &Path, desk: &Desk<'_>) -> Result<Vec<PictureRecord>, CliError> {
+    desk.gather(&questions(figures.iter().flat_map(|f| &f.pictures)));
+    let pictures: Vec<(PathBuf, &Picture)> =
+        figures.iter().flat_map(|f| f.pictures.iter().map(|p| (out.join(f.id), p))).collect();
+    let results: Vec<Result<(PictureRecord, Vec<Written>), CliError>> = pictures
+        .par_iter()
+        .map(|(folder, picture)| {
+            let computed = compute(picture, desk)?;
+            let written = write_picture(folder, &computed)?;
+            let name = &computed.record.hashes.name;
+            desk.progress().line(&format!("wrote {}", folder.join(format!("{name}.png")).display()));
+            Ok((computed.record, written))
+        })
+        .collect();
+    let (records, written): (Vec<_>, Vec<_>) = results.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+    still_there(&written.concat())?;
+    Ok(records)
+}
+
+/// A file and its length.
+type Written = (PathBuf, u64);
+
+/// Writes a picture's files: data first, the record last, so that a record vouches for everything beside it.
+fn write_picture(folder: &Path, computed: &Computed) -> Result<Vec<Written>, FileError> {
+    let name = &computed.record.hashes.name;
+    let mut json = serde_json::to_vec_pretty(&computed.record).expect("a record is plain data");
+    json.push(b'\n');
+    let tables = computed.tables.iter().map(|(label, table)| (format!("{name}-{label}.csv"), table));
+    let files = [
+        (format!("{name}.png"), &computed.rendered.png),
+        (format!("{name}.svg"), &computed.rendered.svg),
+        (format!("{name}.pdf"), &computed.rendered.pdf),
+        (format!("{name}.json"), &json),
+    ];
+    let mut written = Vec::new();
+    for (file, bytes) in tables.chain(files) {
+        let path = folder.join(file);
+        write(&path, bytes)?;
+        written.push((path, bytes.len() as u64));
+    }
+    Ok(written)
+}
+
+/// Refuses a flag that changes none of these figures.
+fn refuse_idle(figures: &[Figure], arguments: &FigureFlags) -> Result<(), CliError> {
+    let names: Vec<&str> = figures.iter().map(|f| f.id).collect();
+    let names = names.join(", ");
+    let pictures = || figures.iter().flat_map(|f| &f.pictures);
+    let of_runs = [
+        ("--only", arguments.only.is_some()),
+        ("--method", arguments.method.is_some()),
+        ("--t-end", arguments.t_end.is_some()),
+        ("--print-spec", arguments.print_spec),
+    ];
+    if let Some((flag, _)) = of_runs.into_iter().find(|(_, given)| *given)
+        && pictures().all(|p| p.panels.is_empty())
+    {
+        return Err(CliError::no_effect(flag, format!("{names}: made in one piece, not of single runs; leave it out")));
+    }
+    if arguments.reading.is_some() && pictures().all(|p| p.reading.is_none()) {
+        return Err(CliError::no_effect("--reading", format!("{names}: the same in every reading; leave it out")));
+    }
+    let wanted = |panel: &&Panel| arguments.only.as_deref().is_none_or(|only| panel.label == label(only));
+    if arguments.seed.is_some() && !pictures().flat_map(|p| &p.panels).filter(wanted).any(|panel| is_random(&panel.run))
+    {
+        return Err(CliError::no_effect(
+            "--seed",
+            format!("{names}: nothing in what is to be made is random; leave it out"),
+        ));
+    }
+    Ok(())
+}
+
+/// "(ii)" and "ii" are the same panel.
+fn label(only: &str) -> &str {
+    only.trim_start_matches('(').trim_end_matches(')')
+}
+
+/// The pictures and panels that were asked for, altered as asked for, and checked.
+fn select(mut figure: Figure, arguments: &FigureFlags) -> Result<Figure, CliError> {
+    if let Some(only) = &arguments.only {
+        let label = label(only);
+        let mut known: Vec<String> = figure.pictures.iter().flat_map(|p| &p.panels).map(|p| p.label.clone()).collect();
+        if !known.iter().any(|k| k == label) {
+            known.sort_by_key(|k| (k.len(), k.clone()));
+            known.dedup();
+            let known = if known.is_empty() { "none: it is made in one piece".into() } else { known.join(", ") };
+            return Err(CliError::NoSuchPanel { panel: only.clone(), figure: figure.id, known });
+        }
+        figure.pictures.retain(|p| p.panels.iter().any(|q| q.label == label));
+        figure.pictures.iter_mut().for_each(|p| p.keep_only(label));
+    }
+    let readings = arguments.reading.unwrap_or_default();
+    figure.pictures.retain(|p| readings.wants(p.reading));
+    let alterations =
+        Alterations { seed: arguments.seed, t_end: arguments.t_end, method: arguments.method.map(Into::into) };
+    for picture in &mut figure.pictures {
+        picture.alter(&alterations);
+        for panel in &picture.panels {
+            panel.run.validate()?;
+        }
+    }
+    Ok(figure)
+}
+
+fn is_random(run: &RunSpec) -> bool {
+    run.schedule.kick.is_some() || matches!(run.switch, SwitchSpec::Filippov { exit: ExitRule::Random { .. }, .. })
+}
+
+/// One spec alone, or several under their names.
+fn print_specs(figures: &[Figure]) -> Result<(), CliError> {
+    let specs: Vec<_> = figures
+        .iter()
+        .flat_map(|figure| &figure.pictures)
+        .flat_map(|picture| {
+            picture.panels.iter().map(move |panel| (format!("{}-{}", picture.name, panel.label), &panel.run))
+        })
+        .collect();
+    match specs.as_slice() {
+        [(_, only)] => print_json(only),
+        several => print_json(
+            &several
+                .iter()
+                .map(|(name, run)| (name.clone(), serde_json::to_value(run).expect("specs are plain data")))
+                .collect::<serde_json::Map<_, _>>(),
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::paper::figures;
+
+    #[test]
+    fn each_figure_helps_in_its_own_words() {
+        for figure in figures::all() {
+            let mut command = command(&figure);
+            command.clone().debug_assert();
+            let (short, long) = (command.render_help().to_string(), command.render_long_help().to_string());
+            let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+            for text in [&short, &long] {
+                assert!(words(text).contains(&format!("{}: {}", figure.id, figure.title)), "{text}");
+                assert!(
+                    text.contains(&format!("{} --out pictures", figure.id)) && words(text).contains(Exit::HELP),
+                    "{text}"
+                );
+            }
+        }
+    }
+}

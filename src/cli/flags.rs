@@ -1,0 +1,668 @@
+//! The flags that describe a run, and the table of which of them has an effect when.
+//!
+//! No flag is ever ignored silently: [`EFFECTS`] names for every flag the runs on which it has an effect, and on others it is refused. A
+//! test tries every flag on every kind of run.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+
+use super::CliError;
+use super::words::{KickLaw, Method, Reading, Relaxation};
+use crate::integrate;
+use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
+use crate::integrate::{Kick, Schedule, StepCap, Tolerance};
+use crate::job::spec::*;
+use crate::num::Decimal;
+use crate::num::decimal::DecimalError;
+use crate::paper;
+use crate::record::files::{read_text, read_text_from};
+use crate::system::diagnostic::nearest;
+use crate::system::{Definition, ParameterError, System, Transition, library};
+
+/// The flags that describe a run. What is not given has the default that its help names.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct RunFlags {
+    /// Piecewise-smooth system: a built-in one (caricature, caricature-as-printed, two-fold, wheel, relay-linear, relay-parabolic,
+    /// stick-slip) or a file that defines one (.toml, .json) [default: caricature].
+    #[arg(long, value_name = "NAME|FILE", help_heading = "System")]
+    pub system: Option<String>,
+    /// Give a parameter of the system another value; may be repeated.
+    #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true, help_heading = "System")]
+    pub set: Vec<String>,
+    /// What stands in for the discontinuity [default: smoothed].
+    #[arg(long, value_enum, help_heading = "System")]
+    pub switch: Option<Switch>,
+    /// Take alpha and beta from a reading of the paper [default: printed].
+    #[arg(long, value_enum, help_heading = "System")]
+    pub reading: Option<Reading>,
+    /// Strength of the caricature's drift [default: the reading's].
+    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    pub alpha: Option<f64>,
+    /// Strength of the caricature's attraction [default: the reading's].
+    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    pub beta: Option<f64>,
+    /// The caricature's v+ [default: -1.2].
+    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    pub v_plus: Option<f64>,
+    /// The caricature's v- [default: -1.4].
+    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    pub v_minus: Option<f64>,
+    /// Stiffness parameter [default: 0.001].
+    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    pub eps: Option<f64>,
+    /// Size of the transition function's perturbation (fig. 8) [default: none].
+    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    pub sigma: Option<f64>,
+    /// Relaxation time of the hysteretic switch [default: 10 eps].
+    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    pub eps_prime: Option<f64>,
+    /// Reading of eq. (10) [default: literal].
+    #[arg(long, value_enum, help_heading = "System")]
+    pub hysteresis: Option<Relaxation>,
+    /// Initial state, one number for each of the system's [default: the one that the system suggests].
+    #[arg(long, value_name = "X,Y,...", value_delimiter = ',', allow_hyphen_values = true, help_heading = "System")]
+    pub start: Option<Vec<f64>>,
+    /// Final time [default: 150].
+    #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
+    pub t_end: Option<f64>,
+    /// Integration method [default: lsoda; dopri5 with --switch filippov].
+    #[arg(long, value_enum, help_heading = "Method")]
+    pub method: Option<Method>,
+    /// Relative tolerance [default: 10^-7.97727, NDSolve's].
+    #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
+    pub rtol: Option<f64>,
+    /// Absolute tolerance [default: 10^-7.97727, NDSolve's].
+    #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
+    pub atol: Option<f64>,
+    /// Longest step [default: a tenth of the time between restarts or kicks, NDSolve's].
+    #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
+    pub max_step: Option<f64>,
+    /// Most steps before the run is given up [default: 400000000].
+    #[arg(long, allow_negative_numbers = true, help_heading = "Method")]
+    pub max_steps: Option<u64>,
+    /// Start the method afresh after each such interval [default: never].
+    #[arg(long, value_name = "INTERVAL", allow_hyphen_values = true, help_heading = "Schedule")]
+    pub restart: Option<f64>,
+    /// Perturb the state after each such interval [default: never].
+    #[arg(long, value_name = "INTERVAL", allow_hyphen_values = true, help_heading = "Schedule")]
+    pub kick_every: Option<f64>,
+    /// Size of a kick [default: eps].
+    #[arg(long, allow_hyphen_values = true, help_heading = "Schedule")]
+    pub kick_size: Option<f64>,
+    /// Law of a kick [default: sphere].
+    #[arg(long, value_enum, help_heading = "Schedule")]
+    pub kick_law: Option<KickLaw>,
+    /// How repelling sliding ends (with --switch filippov): at-once:SIDE, after-time:T:SIDE, after-arc:L:SIDE, with SIDE plus or
+    /// minus; random:exponential:MEAN or random:uniform:LONGEST (see --seed, --stream, --plus-probability); all.
+    #[arg(long, value_name = "RULE", allow_hyphen_values = true, help_heading = "Filippov motion")]
+    pub exit: Option<String>,
+    /// Probability of leaving to h > 0 under a random exit rule [default: 0.5].
+    #[arg(long, allow_hyphen_values = true, help_heading = "Filippov motion")]
+    pub plus_probability: Option<f64>,
+    /// Number of exit times of a funnel (--exit all); each is followed to both sides [default: 12].
+    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Filippov motion")]
+    pub funnel_times: Option<usize>,
+    /// Shortest time of repelling sliding in a funnel [default: 0.05].
+    #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Filippov motion")]
+    pub funnel_shortest: Option<f64>,
+    /// Longest time of repelling sliding in a funnel [default: 2].
+    #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Filippov motion")]
+    pub funnel_longest: Option<f64>,
+    /// Follow each future so long, or to its next two-fold [default: 50].
+    #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Filippov motion")]
+    pub funnel_horizon: Option<f64>,
+    /// Seed of the random numbers of kicks and random exits [default: 2013].
+    #[arg(long, allow_negative_numbers = true, help_heading = "Random numbers")]
+    pub seed: Option<u64>,
+    /// Stream of the random numbers: one per run [default: 0].
+    #[arg(long, allow_negative_numbers = true, help_heading = "Random numbers")]
+    pub stream: Option<u64>,
+    /// Record passages through a plane instead of the path, such as y=0.
+    #[arg(long, value_name = "COORDINATE=VALUE", help_heading = "Recording")]
+    pub section: Option<String>,
+    /// Largest distance between the path's polyline and the dense output [default: 0.001].
+    #[arg(long, allow_hyphen_values = true, help_heading = "Recording")]
+    pub chord: Option<f64>,
+    /// Take the whole run from a file made with --print-spec, or from standard input (-); other flags of the run are then refused.
+    #[arg(long, value_name = "FILE")]
+    pub spec: Option<PathBuf>,
+}
+
+/// A switch by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Switch {
+    /// Eq. (8).
+    #[default]
+    Smoothed,
+    /// Eq. (10).
+    Hysteretic,
+    /// The discontinuous system itself.
+    Filippov,
+}
+
+/// What a command makes of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// `twofold run`: the path, or passages if a section is given.
+    Any,
+    /// `twofold sweep`: passages in any case.
+    Passages,
+}
+
+/// A flag and the runs on which it has an effect.
+struct Effect {
+    /// The flag.
+    flag: &'static str,
+    /// Whether it is given.
+    given: fn(&RunFlags) -> bool,
+    /// Whether it has an effect.
+    works: fn(&RunFlags, Use) -> bool,
+    /// When it has one, and what to do.
+    why: &'static str,
+}
+
+impl RunFlags {
+    fn system_name(&self) -> &str {
+        self.system.as_deref().unwrap_or("caricature")
+    }
+    fn caricature(&self) -> bool {
+        matches!(self.system_name(), "caricature" | "caricature-as-printed")
+    }
+    /// Whether --set gives a parameter its value.
+    fn sets(&self, parameter: &str) -> bool {
+        self.set.iter().any(|text| text.split('=').next().map(str::trim) == Some(parameter))
+    }
+    fn switch(&self) -> Switch {
+        self.switch.unwrap_or_default()
+    }
+    fn filippov(&self) -> bool {
+        self.switch() == Switch::Filippov
+    }
+    fn exit_begins(&self, word: &str) -> bool {
+        self.filippov() && self.exit.as_deref().is_some_and(|e| e.split(':').next() == Some(word))
+    }
+    fn kicked(&self) -> bool {
+        !self.filippov() && self.kick_every.is_some()
+    }
+    fn random(&self) -> bool {
+        self.kicked() || self.exit_begins("random")
+    }
+}
+
+const OF_THE_CARICATURE: &str = "it belongs to the caricature, and --set NAME=VALUE comes after it; leave it out, and give parameters of other systems by --set";
+const OF_FUNNELS: &str =
+    "it describes the futures that --switch filippov --exit all follows; leave it out, or follow them";
+const OF_RANDOM: &str = "nothing in this run is random; leave it out, or give --kick-every or a random --exit";
+const NOT_FILIPPOV: &str =
+    "restarts and kicks belong to smoothed and hysteretic runs; leave it out, or choose another --switch";
+const OF_KICKS: &str = "there are no kicks; leave it out, or give --kick-every";
+
+/// The table. Every flag of [`RunFlags`] but --spec stands in it once.
+const EFFECTS: [Effect; 33] = {
+    const fn always(flag: &'static str, given: fn(&RunFlags) -> bool) -> Effect {
+        Effect { flag, given, works: |_, _| true, why: "" }
+    }
+    const fn when(
+        flag: &'static str,
+        given: fn(&RunFlags) -> bool,
+        works: fn(&RunFlags, Use) -> bool,
+        why: &'static str,
+    ) -> Effect {
+        Effect { flag, given, works, why }
+    }
+    [
+        always("--system", |f| f.system.is_some()),
+        always("--set", |f| !f.set.is_empty()),
+        always("--switch", |f| f.switch.is_some()),
+        when(
+            "--reading",
+            |f| f.reading.is_some(),
+            |f, _| {
+                let given = (f.alpha.is_some() || f.sets("alpha")) && (f.beta.is_some() || f.sets("beta"));
+                f.caricature() && !given
+            },
+            "a reading gives the caricature's alpha and beta; leave it out with other systems, or where both are given",
+        ),
+        when("--alpha", |f| f.alpha.is_some(), |f, _| f.caricature() && !f.sets("alpha"), OF_THE_CARICATURE),
+        when("--beta", |f| f.beta.is_some(), |f, _| f.caricature() && !f.sets("beta"), OF_THE_CARICATURE),
+        when("--v-plus", |f| f.v_plus.is_some(), |f, _| f.caricature() && !f.sets("v_plus"), OF_THE_CARICATURE),
+        when("--v-minus", |f| f.v_minus.is_some(), |f, _| f.caricature() && !f.sets("v_minus"), OF_THE_CARICATURE),
+        when(
+            "--eps",
+            |f| f.eps.is_some(),
+            |f, _| !f.filippov(),
+            "the discontinuous system has no eps; leave it out, or choose another --switch",
+        ),
+        when(
+            "--sigma",
+            |f| f.sigma.is_some(),
+            |f, _| f.switch() == Switch::Smoothed,
+            "it perturbs the smoothed switch; leave it out, or use --switch smoothed",
+        ),
+        when(
+            "--eps-prime",
+            |f| f.eps_prime.is_some(),
+            |f, _| f.switch() == Switch::Hysteretic,
+            "it is the relaxation time of the hysteretic switch; leave it out, or use --switch hysteretic",
+        ),
+        when(
+            "--hysteresis",
+            |f| f.hysteresis.is_some(),
+            |f, _| f.switch() == Switch::Hysteretic,
+            "it is a reading of the hysteretic switch; leave it out, or use --switch hysteretic",
+        ),
+        always("--start", |f| f.start.is_some()),
+        always("--t-end", |f| f.t_end.is_some()),
+        always("--method", |f| f.method.is_some()),
+        always("--rtol", |f| f.rtol.is_some()),
+        always("--atol", |f| f.atol.is_some()),
+        always("--max-step", |f| f.max_step.is_some()),
+        always("--max-steps", |f| f.max_steps.is_some()),
+        when("--restart", |f| f.restart.is_some(), |f, _| !f.filippov(), NOT_FILIPPOV),
+        when("--kick-every", |f| f.kick_every.is_some(), |f, _| !f.filippov(), NOT_FILIPPOV),
+        when("--kick-size", |f| f.kick_size.is_some(), |f, _| f.kicked(), OF_KICKS),
+        when("--kick-law", |f| f.kick_law.is_some(), |f, _| f.kicked(), OF_KICKS),
+        when(
+            "--exit",
+            |f| f.exit.is_some(),
+            |f, _| f.filippov(),
+            "smoothed and hysteretic motion leaves repelling sliding by itself; leave it out, or use --switch filippov",
+        ),
+        when(
+            "--plus-probability",
+            |f| f.plus_probability.is_some(),
+            |f, _| f.exit_begins("random"),
+            "it belongs to a random --exit; leave it out, or give one such as random:exponential:0.5",
+        ),
+        when("--funnel-times", |f| f.funnel_times.is_some(), |f, _| f.exit_begins("all"), OF_FUNNELS),
+        when("--funnel-shortest", |f| f.funnel_shortest.is_some(), |f, _| f.exit_begins("all"), OF_FUNNELS),
+        when("--funnel-longest", |f| f.funnel_longest.is_some(), |f, _| f.exit_begins("all"), OF_FUNNELS),
+        when("--funnel-horizon", |f| f.funnel_horizon.is_some(), |f, _| f.exit_begins("all"), OF_FUNNELS),
+        when("--seed", |f| f.seed.is_some(), |f, _| f.random(), OF_RANDOM),
+        when("--stream", |f| f.stream.is_some(), |f, _| f.random(), OF_RANDOM),
+        always("--section", |f| f.section.is_some()),
+        when(
+            "--chord",
+            |f| f.chord.is_some(),
+            |f, command| command == Use::Any && f.section.is_none() && !f.exit_begins("all"),
+            "it belongs to a recorded path; passages have none, and futures of a funnel are recorded at fixed points of each step",
+        ),
+    ]
+};
+
+/// A flag's value that is wrong in itself.
+#[derive(Debug, thiserror::Error)]
+enum Misuse {
+    #[error(
+        "at the two-fold the future is a set, and nothing is chosen silently: give --exit at-once:plus, after-time:0.3:minus, after-arc:0.2:plus, random:exponential:0.5, or all"
+    )]
+    NoExitRule,
+    #[error(
+        "--exit \"{0}\" is not a rule; give one such as at-once:plus, after-time:0.3:minus, after-arc:0.2:plus, random:exponential:0.5, random:uniform:1, or all"
+    )]
+    Exit(String),
+    #[error(
+        "--system {name}: there is no such built-in system{help}; built in are {known}; give a file's name for your own"
+    )]
+    NoSuchSystem { name: String, help: String, known: String },
+    #[error("--system {file}: {problem}")]
+    SystemFile { file: String, problem: String },
+    #[error("--set \"{text}\": {problem}")]
+    Set { text: String, problem: String },
+    #[error("{system} suggests no initial state; give one by --start, {states} numbers")]
+    NoStart { system: String, states: usize },
+    #[error("--start has {found} numbers; give {wanted}, one for each of {states}")]
+    Start { found: usize, wanted: usize, states: String },
+    #[error("--section \"{text}\": {problem}; give one of {known} and a number, such as {example}=0")]
+    Section { text: String, problem: &'static str, known: String, example: String },
+    #[error("--exit all follows many futures and records their paths; a sweep needs passages: give another rule")]
+    FunnelInSweep,
+    #[error("{file} is not a spec of one run: {reason}; make one with `--only PANEL --reading READING --print-spec`")]
+    Spec { file: String, reason: String },
+}
+
+impl From<Misuse> for CliError {
+    fn from(misuse: Misuse) -> Self {
+        CliError::Usage(misuse.to_string())
+    }
+}
+
+impl RunFlags {
+    /// The spec that the flags describe, checked. For [`Use::Passages`] a path becomes its passages through the plane where the second
+    /// coordinate is zero.
+    ///
+    /// # Errors
+    /// If a flag has no effect, or a value is wrong.
+    pub fn spec(&self, command: Use) -> Result<RunSpec, CliError> {
+        let mut spec = match &self.spec {
+            Some(file) => {
+                if let Some(extra) = EFFECTS.iter().find(|e| (e.given)(self)) {
+                    return Err(CliError::no_effect(
+                        extra.flag,
+                        "--spec gives the whole run; leave one of the two out, or change the file",
+                    ));
+                }
+                let (text, name) = if file.as_os_str() == "-" {
+                    (read_text_from(io::stdin().lock(), "standard input")?, "standard input".to_owned())
+                } else {
+                    (read_text(file)?, file.display().to_string())
+                };
+                serde_json::from_str(&text).map_err(|e| Misuse::Spec { file: name, reason: e.to_string() })?
+            }
+            None => {
+                if let Some(idle) = EFFECTS.iter().find(|e| (e.given)(self) && !(e.works)(self, command)) {
+                    return Err(CliError::no_effect(idle.flag, idle.why));
+                }
+                self.unchecked()?
+            }
+        };
+        if command == Use::Passages
+            && let Observation::Path { .. } = spec.observe
+        {
+            if let SwitchSpec::Filippov { funnel: Some(_), .. } = spec.switch {
+                return Err(Misuse::FunnelInSweep.into());
+            }
+            spec.observe = Observation::Section { coordinate: 1, value: 0.0 };
+        }
+        spec.validate()?;
+        Ok(spec)
+    }
+
+    fn unchecked(&self) -> Result<RunSpec, Misuse> {
+        let system = self.described_system()?;
+        let eps = self.eps.unwrap_or(1e-3);
+        let switch = match self.switch() {
+            Switch::Smoothed => SwitchSpec::Smoothed {
+                eps,
+                transition: self.sigma.map_or(Transition::Tanh, |sigma| Transition::PerturbedTanh { sigma }),
+            },
+            Switch::Hysteretic => SwitchSpec::Hysteretic {
+                eps,
+                eps_prime: self.eps_prime.unwrap_or(10.0 * eps),
+                relaxation: self.hysteresis.unwrap_or(Relaxation::Literal).into(),
+                phi0: 1.0,
+            },
+            Switch::Filippov => {
+                let exit = self.exit_rule()?;
+                let funnel = (exit == ExitRule::All).then_some(FunnelSpec {
+                    shortest: self.funnel_shortest.unwrap_or(0.05),
+                    longest: self.funnel_longest.unwrap_or(2.0),
+                    times: self.funnel_times.unwrap_or(12),
+                    horizon: self.funnel_horizon.unwrap_or(50.0),
+                    until_two_fold: true,
+                });
+                SwitchSpec::Filippov { exit, funnel }
+            }
+        };
+        let start = match &self.start {
+            None => {
+                let none = || Misuse::NoStart { system: self.system_name().to_owned(), states: system.dimension() };
+                system.definition().start().ok_or_else(none)?.to_vec()
+            }
+            Some(numbers) if numbers.len() != system.dimension() => {
+                let states = system.coordinates().join(", ");
+                return Err(Misuse::Start { found: numbers.len(), wanted: system.dimension(), states });
+            }
+            Some(numbers) => numbers.clone(),
+        };
+        let method = self.method.unwrap_or(if self.filippov() { Method::Dopri5 } else { Method::Lsoda });
+        let defaults = MethodSpec::ndsolve_defaults(integrate::Method::from(method));
+        let method = MethodSpec {
+            name: defaults.name,
+            tolerance: Tolerance {
+                rtol: self.rtol.unwrap_or(defaults.tolerance.rtol),
+                atol: self.atol.unwrap_or(defaults.tolerance.atol),
+            },
+            step_cap: self.max_step.map_or(defaults.step_cap, StepCap::Absolute),
+            max_steps: self.max_steps.unwrap_or(DEFAULT_MAX_STEPS),
+        };
+        let kick = self.kick_every.map(|every| Kick {
+            every,
+            size: self.kick_size.unwrap_or(eps),
+            law: self.kick_law.map(Into::into).unwrap_or_default(),
+            seed: self.seed(),
+            stream: self.stream.unwrap_or(0),
+        });
+        let observe = match &self.section {
+            None => Observation::Path { chord: self.chord.unwrap_or(1e-3) },
+            Some(text) => section(text, &system)?,
+        };
+        Ok(RunSpec {
+            system,
+            switch,
+            start,
+            t_end: self.t_end.unwrap_or(150.0),
+            method,
+            schedule: Schedule { restart_every: self.restart, kick },
+            observe,
+        })
+    }
+
+    /// The system that --system, --reading, --set and the caricature's own flags describe.
+    fn described_system(&self) -> Result<System, Misuse> {
+        let name = self.system_name();
+        let mut system = match System::builtin(name) {
+            Some(system) => system,
+            None => from_file(name)?,
+        };
+        if self.caricature() {
+            let reading = paper::Reading::from(self.reading.unwrap_or(Reading::Printed)).caricature();
+            let values = [
+                ("alpha", self.alpha.unwrap_or(reading.alpha)),
+                ("beta", self.beta.unwrap_or(reading.beta)),
+                ("v_plus", self.v_plus.unwrap_or(reading.v_plus)),
+                ("v_minus", self.v_minus.unwrap_or(reading.v_minus)),
+            ];
+            for (parameter, value) in values {
+                let refused =
+                    |e: ParameterError| Misuse::Set { text: format!("{parameter}={value}"), problem: e.to_string() };
+                system = system.with(parameter, value).map_err(refused)?;
+            }
+        }
+        for text in &self.set {
+            let refused = |problem: String| Misuse::Set { text: text.clone(), problem };
+            let Some((parameter, value)) = text.split_once('=') else {
+                return Err(refused("there is no \"=\"; give it as NAME=VALUE, such as alpha=0.2".into()));
+            };
+            let value: Decimal = value.trim().parse().map_err(|e: DecimalError| refused(e.to_string()))?;
+            system = system.with(parameter.trim(), value).map_err(|e| refused(e.to_string()))?;
+        }
+        Ok(system)
+    }
+
+    fn seed(&self) -> u64 {
+        self.seed.unwrap_or(2013)
+    }
+
+    /// Reads "after-time:0.3:minus".
+    fn exit_rule(&self) -> Result<ExitRule, Misuse> {
+        let text = self.exit.as_deref().ok_or(Misuse::NoExitRule)?;
+        let wrong = || Misuse::Exit(text.to_owned());
+        let side = |word: &str| match word {
+            "plus" => Ok(Side::Plus),
+            "minus" => Ok(Side::Minus),
+            _ => Err(wrong()),
+        };
+        let number = |word: &str| word.parse::<f64>().map_err(|_| wrong());
+        let random = |law| ExitRule::Random {
+            law,
+            plus_probability: self.plus_probability.unwrap_or(0.5),
+            seed: self.seed(),
+            stream: self.stream.unwrap_or(0),
+        };
+        Ok(match text.split(':').collect::<Vec<_>>().as_slice() {
+            ["at-once", s] => ExitRule::AtOnce { side: side(s)? },
+            ["after-time", t, s] => ExitRule::AfterTime { time: number(t)?, side: side(s)? },
+            ["after-arc", l, s] => ExitRule::AfterArc { arc: number(l)?, side: side(s)? },
+            ["random", "exponential", m] => random(SlidingLaw::Exponential { mean: number(m)? }),
+            ["random", "uniform", l] => random(SlidingLaw::Uniform { longest: number(l)? }),
+            ["all"] => ExitRule::All,
+            _ => return Err(wrong()),
+        })
+    }
+}
+
+/// A system from a file, TOML or JSON.
+fn from_file(name: &str) -> Result<System, Misuse> {
+    let path = Path::new(name);
+    let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    let is_file = json || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) || path.is_file();
+    if !is_file {
+        let known: Vec<&str> = library::names().collect();
+        let help = nearest(name, &known).map_or(String::new(), |near| format!(", did you mean {near}?"));
+        return Err(Misuse::NoSuchSystem { name: name.into(), help, known: known.join(", ") });
+    }
+    let problem = |problem: String| Misuse::SystemFile { file: name.into(), problem };
+    let text = read_text(path).map_err(|e| problem(e.to_string()))?;
+    if json {
+        serde_json::from_str(&text).map_err(|e| problem(e.to_string()))
+    } else {
+        Definition::from_toml(&text, name).map(System::new).map_err(|e| problem(e.to_string()))
+    }
+}
+
+/// Reads "y=0".
+fn section(text: &str, system: &System) -> Result<Observation, Misuse> {
+    let names = system.coordinates();
+    let misuse = |problem| Misuse::Section {
+        text: text.to_owned(),
+        problem,
+        known: names.join(", "),
+        example: names[names.len() - 1].into(),
+    };
+    let (name, value) = text.split_once('=').ok_or_else(|| misuse("there is no \"=\""))?;
+    let coordinate =
+        names.iter().position(|n| *n == name.trim()).ok_or_else(|| misuse("there is no such coordinate"))?;
+    let value = value.trim().parse().map_err(|_| misuse("what follows \"=\" is not a number"))?;
+    Ok(Observation::Section { coordinate, value })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::{Args, FromArgMatches};
+
+    fn parse(arguments: &[&str]) -> RunFlags {
+        let command = RunFlags::augment_args(clap::Command::new("x").no_binary_name(true));
+        RunFlags::from_arg_matches(&command.try_get_matches_from(arguments).unwrap_or_else(|e| panic!("{e}"))).unwrap()
+    }
+
+    /// Every flag with a value that no default has and that every run allows on which the flag has an effect; several, if
+    /// none differs from every default.
+    const SAMPLES: [(&str, &[&str]); 33] = [
+        ("--system", &["caricature", "wheel", "two-fold"]),
+        ("--set", &["alpha=0.3", "omega0=1.1"]),
+        ("--switch", &["smoothed", "hysteretic", "filippov"]),
+        ("--reading", &["reconstructed"]),
+        ("--alpha", &["0.01"]),
+        ("--beta", &["0.02"]),
+        ("--v-plus", &["-1.3"]),
+        ("--v-minus", &["-1.5"]),
+        ("--eps", &["0.002"]),
+        ("--sigma", &["0.1"]),
+        ("--eps-prime", &["0.03"]),
+        ("--hysteresis", &["single"]),
+        ("--start", &["0.1,0.1,0.1"]),
+        ("--t-end", &["7"]),
+        ("--method", &["radau5", "dopri5"]),
+        ("--rtol", &["1e-9"]),
+        ("--atol", &["1e-9"]),
+        ("--max-step", &["0.1"]),
+        ("--max-steps", &["1000"]),
+        ("--restart", &["2"]),
+        ("--kick-every", &["0.7"]),
+        ("--kick-size", &["0.004"]),
+        ("--kick-law", &["cube"]),
+        ("--exit", &["at-once:plus", "after-arc:0.2:minus"]),
+        ("--plus-probability", &["0.4"]),
+        ("--funnel-times", &["3"]),
+        ("--funnel-shortest", &["0.1"]),
+        ("--funnel-longest", &["1"]),
+        ("--funnel-horizon", &["9"]),
+        ("--seed", &["5"]),
+        ("--stream", &["6"]),
+        ("--section", &["x=0.1", "r=0.1"]),
+        ("--chord", &["0.01"]),
+    ];
+
+    /// One run of each kind.
+    fn kinds() -> Vec<Vec<&'static str>> {
+        let mut kinds = Vec::new();
+        for system in [vec![], vec!["--system", "wheel"], vec!["--alpha", "0.1", "--beta", "0.1"]] {
+            for switch in [
+                vec![],
+                vec!["--switch", "hysteretic"],
+                vec!["--kick-every", "0.3"],
+                vec!["--switch", "hysteretic", "--kick-every", "0.3"],
+                vec!["--switch", "filippov", "--exit", "after-time:0.3:minus"],
+                vec!["--switch", "filippov", "--exit", "random:exponential:0.5"],
+                vec!["--switch", "filippov", "--exit", "all"],
+            ] {
+                for recording in [vec![], vec!["--section"]] {
+                    let mut kind = [system.clone(), switch.clone(), recording.clone()].concat();
+                    if !recording.is_empty() {
+                        if kind.contains(&"all") {
+                            continue;
+                        }
+                        kind.push(if kind.contains(&"wheel") { "v=0" } else { "y=0" });
+                    }
+                    kinds.push(kind);
+                }
+            }
+        }
+        kinds
+    }
+
+    #[test]
+    fn the_table_holds_every_flag() {
+        let command = RunFlags::augment_args(clap::Command::new("x"));
+        let mut flags: Vec<String> =
+            command.get_arguments().filter_map(|a| a.get_long()).map(|l| format!("--{l}")).collect();
+        flags.retain(|f| f != "--spec");
+        assert_eq!(flags, EFFECTS.map(|e| e.flag));
+        assert_eq!(flags, SAMPLES.map(|s| s.0));
+    }
+
+    /// Every flag on every kind of run, under both commands: refused by name, or the question changes.
+    #[test]
+    fn no_flag_is_ignored_on_any_run() {
+        let (mut tried, mut refused) = (0, 0);
+        for command in [Use::Any, Use::Passages] {
+            for kind in kinds() {
+                let Ok(plain) = parse(&kind).spec(command) else {
+                    assert!(command == Use::Passages && kind.contains(&"all"), "{kind:?}");
+                    continue;
+                };
+                for (flag, values) in SAMPLES.iter().filter(|(flag, _)| !kind.contains(flag)) {
+                    let mut changed = false;
+                    let mut errors = Vec::new();
+                    for value in *values {
+                        match parse(&[&kind[..], &[flag, value]].concat()).spec(command) {
+                            Ok(spec) => changed |= spec != plain,
+                            // The wheel has its own coordinates, and a change of switch asks for other flags: each error names what
+                            // does not go together.
+                            Err(error) => errors.push(error.to_string()),
+                        }
+                    }
+                    tried += 1;
+                    refused += usize::from(!errors.is_empty());
+                    let named = |e: &String| e.contains(flag) || flag == &"--switch" && e.contains("--");
+                    assert!(changed || errors.len() == values.len(), "{kind:?} {flag}: accepted without effect");
+                    assert!(errors.iter().all(named), "{kind:?} {flag}: {errors:?}");
+                }
+            }
+        }
+        assert!(tried > 1500 && refused > 500, "{tried} pairs, {refused} refused");
+    }
+
+    /// With a spec from a file every other flag is refused, whatever it is.
+    #[test]
+    fn nothing_stands_beside_a_spec() {
+        for (flag, values) in SAMPLES {
+            let error = parse(&["--spec", "nowhere.json", flag, values[0]]).spec(Use::Any).unwrap_err().to_string();
+            assert!(error.contains(flag) && error.contains("--spec"), "{error}");
+        }
+    }
+}

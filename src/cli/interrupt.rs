@@ -1,0 +1,101 @@
+//! Ctrl-C and SIGTERM: leave within a second, with one line, without litter.
+//!
+//! Most programs here write every picture as soon as it is finished: for them a signal removes the temporary files and ends the
+//! process. A command whose result grows row by row can ask for grace ([`Grace`]): it is told, and has a moment to keep the
+//! rows that it has.
+
+use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
+
+use super::Exit;
+
+/// How many graces are asked for at present.
+static GRACES: AtomicUsize = AtomicUsize::new(0);
+/// The exit code of the signal that came; 0 before.
+static CAME: AtomicU8 = AtomicU8::new(0);
+
+/// While it lives, a signal is announced first ([`Grace::asked_to_stop`]); the process ends [`GRACE_MS`] later at the latest.
+pub struct Grace(());
+
+/// How long a computation may take to stop and to write what it has.
+pub const GRACE_MS: u64 = 800;
+
+impl Grace {
+    /// Asks for it.
+    #[allow(clippy::new_without_default)] // it is not a value but a state of the process
+    pub fn new() -> Self {
+        GRACES.fetch_add(1, Ordering::SeqCst);
+        Self(())
+    }
+
+    /// The exit code of the signal, if one came.
+    pub fn asked_to_stop(&self) -> Option<Exit> {
+        match CAME.load(Ordering::SeqCst) {
+            0 => None,
+            code if code == Exit::Terminated as u8 => Some(Exit::Terminated),
+            _ => Some(Exit::Interrupted),
+        }
+    }
+}
+
+impl Drop for Grace {
+    fn drop(&mut self) {
+        GRACES.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+/// Starts to listen. Where there are no such signals, or no thread can be had, they keep their ordinary effect.
+pub fn listen() {
+    #[cfg(unix)]
+    unix::listen();
+}
+
+#[cfg(unix)]
+mod unix {
+    use std::sync::atomic::Ordering;
+    use std::thread;
+    use std::time::Duration;
+
+    use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
+    use signal_hook::iterator::Signals;
+
+    use super::{CAME, Exit, GRACE_MS, GRACES};
+    use crate::cli::progress;
+    use crate::cli::speak::complain;
+    use crate::record;
+
+    pub fn listen() {
+        // The signals are taken over by the thread itself: where it cannot be started, they are not.
+        let _ = thread::Builder::new().name("signals".into()).spawn(|| {
+            // A file grown beyond its limit is then an error of that write, with a message, instead of a silent end.
+            if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM, SIGXFSZ]) {
+                wait(&mut signals);
+            }
+        });
+    }
+
+    fn wait(signals: &mut Signals) {
+        let exit_of = |signal| match signal {
+            SIGINT => Some(Exit::Interrupted),
+            SIGTERM => Some(Exit::Terminated),
+            _ => None,
+        };
+        let Some(exit) = signals.forever().find_map(exit_of) else { return };
+        CAME.store(exit as u8, Ordering::SeqCst);
+        if GRACES.load(Ordering::SeqCst) > 0 {
+            // The main thread ends the process when it has kept what it has. A second signal ends the waiting.
+            for _ in 0..GRACE_MS / 10 {
+                thread::sleep(Duration::from_millis(10));
+                if signals.pending().any(|s| exit_of(s).is_some()) {
+                    break;
+                }
+            }
+        }
+        record::files::abandon();
+        progress::clear();
+        complain(match exit {
+            Exit::Terminated => "terminated: files that were finished stay, the rest is gone",
+            _ => "interrupted: files that were finished stay, the rest is gone",
+        });
+        std::process::exit(i32::from(exit as u8));
+    }
+}

@@ -1,0 +1,102 @@
+//! The two streams of a terminal. What is written for people steers no terminal, whatever names it holds; a stream that nobody reads
+//! any more ends no computation.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use super::CliError;
+use crate::record;
+
+/// Prints text for people to standard output, and a newline.
+///
+/// # Errors
+/// If it cannot be written. A reader that went away (`| head`) is no error.
+pub fn print(text: &str) -> Result<(), CliError> {
+    print_bytes(format!("{}\n", harmless(text)).as_bytes())
+}
+
+/// Prints a value as indented JSON to standard output.
+///
+/// # Errors
+/// As [`print`].
+pub fn print_json<T: serde::Serialize>(value: &T) -> Result<(), CliError> {
+    let text = serde_json::to_string_pretty(value)
+        .expect("what is printed is plain data: string keys, no failing serialisers");
+    // In JSON controls stand only in strings. Those below a space are escaped already, the others may be.
+    let escaped: String = text
+        .chars()
+        .map(|c| if steers(c) && c != '\n' { format!("\\u{:04x}", u32::from(c)) } else { c.to_string() })
+        .collect();
+    print_bytes(format!("{escaped}\n").as_bytes())
+}
+
+/// Writes data to standard output.
+///
+/// # Errors
+/// As [`print`].
+pub fn print_bytes(bytes: &[u8]) -> Result<(), CliError> {
+    let mut out = io::stdout().lock();
+    match out.write_all(bytes).and_then(|()| out.flush()) {
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        other => Ok(other?),
+    }
+}
+
+/// One line for people on standard error. If nobody can read it, it is lost, and nothing else is.
+pub fn complain(text: &str) {
+    let _ = io::stderr().lock().write_all(format!("{}\n", harmless(text)).as_bytes());
+}
+
+/// Writes data to a file, or to standard output if `-` is named, or nothing.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn deliver(to: Option<&Path>, bytes: &[u8]) -> Result<(), CliError> {
+    match to {
+        Some(file) if !is_standard_output(file) => Ok(record::write(file, bytes)?),
+        _ => print_bytes(bytes),
+    }
+}
+
+/// Tries the place before anything is computed.
+///
+/// # Errors
+/// If [`deliver`] could not write there.
+pub fn try_delivery(to: Option<&Path>) -> Result<(), CliError> {
+    match to {
+        Some(file) if !is_standard_output(file) => Ok(record::files::try_place(file)?),
+        _ => Ok(()),
+    }
+}
+
+/// Whether a file's name means the stream that is open already, whatever that is connected to.
+pub fn is_standard_output(file: &Path) -> bool {
+    ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"].iter().any(|name| file == Path::new(name))
+}
+
+/// Text without characters that steer a terminal or turn the direction of writing. Lines stay lines.
+pub fn harmless(text: &str) -> String {
+    text.chars().map(|c| if steers(c) && c != '\n' { '\u{fffd}' } else { c }).collect()
+}
+
+fn steers(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_steers_a_terminal() {
+        let text = "a\u{1b}[2Jb\u{9b}2Jc\rd\u{7}e\u{202e}f\u{7f}g\nh é ε′";
+        let said = harmless(text);
+        assert_eq!(said, "a\u{fffd}[2Jb\u{fffd}2Jc\u{fffd}d\u{fffd}e\u{fffd}f\u{fffd}g\nh é ε′");
+    }
+
+    #[test]
+    fn standard_output_has_several_names() {
+        assert!(is_standard_output(Path::new("-")) && is_standard_output(Path::new("/dev/stdout")));
+        assert!(!is_standard_output(Path::new("./-")) && !is_standard_output(Path::new("stdout")));
+    }
+}

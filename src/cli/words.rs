@@ -1,0 +1,125 @@
+//! The words of the command line for values that other rooms define. Those rooms know no flags.
+
+use clap::ValueEnum;
+
+use crate::integrate;
+use crate::paper;
+use crate::system;
+
+/// Mirrors an enum of another room: same variants, documented for `--help`.
+macro_rules! mirror {
+    ($(#[$meta:meta])* $name:ident = $other:path { $($(#[doc = $doc:literal])* $variant:ident,)* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+        pub enum $name {
+            $($(#[doc = $doc])* $variant,)*
+        }
+
+        impl From<$name> for $other {
+            fn from(word: $name) -> Self {
+                use $other as Other;
+                match word {
+                    $($name::$variant => Other::$variant,)*
+                }
+            }
+        }
+
+        impl $name {
+            /// The word for a value. It is here so that a variant added elsewhere and forgotten here does not compile.
+            pub fn of(value: $other) -> Self {
+                use $other as Other;
+                match value {
+                    $(Other::$variant => $name::$variant,)*
+                }
+            }
+        }
+    };
+}
+
+mirror! {
+    /// An integration method.
+    Method = integrate::Method {
+        /// Adams and BDF with automatic switching: NDSolve's default of the paper's day.
+        Lsoda,
+        /// Dormand-Prince 5(4).
+        Dopri5,
+        /// Radau IIA of order 5.
+        Radau5,
+        /// Taylor series that resolve the layer, in f64.
+        Taylor,
+        /// The same in double-double arithmetic, about 32 digits.
+        TaylorExtended,
+    }
+}
+
+mirror! {
+    /// The law of a kick of size s.
+    KickLaw = integrate::KickLaw {
+        /// Length exactly s, direction uniform on the sphere.
+        Sphere,
+        /// Each component uniform on [-s, s).
+        Cube,
+        /// Each component normal with standard deviation s.
+        Normal,
+    }
+}
+
+mirror! {
+    /// How eq. (10)'s two divisions by eps' are read.
+    Relaxation = system::Relaxation {
+        /// As printed: psi divides by eps' once more.
+        Literal,
+        /// One division.
+        Single,
+    }
+}
+
+mirror! {
+    /// A reading of the paper's parameters.
+    Reading = paper::Reading {
+        /// As printed: alpha = 1e-3, beta = 1e-5.
+        Printed,
+        /// One digit changed: alpha = 1e-1, beta = 1e-5.
+        Reconstructed,
+    }
+}
+
+/// Which readings to make.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Readings {
+    /// As printed.
+    Printed,
+    /// With the digit changed.
+    Reconstructed,
+    /// Both.
+    #[default]
+    All,
+}
+
+impl Readings {
+    /// Whether a picture of this reading is wanted.
+    pub fn wants(self, reading: Option<paper::Reading>) -> bool {
+        match self {
+            Readings::All => true,
+            Readings::Printed => reading != Some(paper::Reading::Reconstructed),
+            Readings::Reconstructed => reading != Some(paper::Reading::Printed),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_the_names_that_files_use() {
+        for method in integrate::Method::ALL {
+            let word = Method::of(method);
+            assert_eq!(integrate::Method::from(word), method);
+            assert_eq!(word.to_possible_value().unwrap().get_name(), method.name());
+        }
+        for reading in paper::Reading::ALL {
+            assert_eq!(Reading::of(reading).to_possible_value().unwrap().get_name(), reading.word());
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! The markup of rich text, read in one place: for setting it in type, for HTML, and for plain text.
+//!
+//! `*x*` is italic; `^{...}` and `_{...}` raise and lower (one character needs no braces); a backslash takes the next character
+//! literally. A hyphen before a number or inside a superscript or subscript is a minus sign.
+
+/// What a text is made of, in order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Token {
+    /// A character.
+    Sign(char),
+    /// A minus sign, written as a hyphen.
+    Minus,
+    /// Italics begin or end.
+    Italic,
+    /// A superscript begins.
+    Raise,
+    /// A subscript begins.
+    Lower,
+    /// Braces open that belong to no script.
+    Group,
+    /// A superscript, subscript or group ends.
+    End,
+}
+
+/// What is wrong with a text's markup.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum MarkupError {
+    /// Braces do not match, or a script has nothing in it to raise or lower.
+    #[error("unbalanced braces; write \\{{ for a brace")]
+    Braces,
+    /// An italic passage is not closed.
+    #[error("an asterisk without its partner; write \\* for an asterisk")]
+    Italic,
+}
+
+/// Reads a text.
+///
+/// # Errors
+/// [`MarkupError`] if braces or asterisks do not match.
+pub fn parse(text: &str) -> Result<Vec<Token>, MarkupError> {
+    let characters: Vec<char> = text.chars().collect();
+    let at = |i: usize| characters.get(i).copied();
+    let mut tokens = Vec::with_capacity(characters.len());
+    let (mut depth, mut italic, mut next) = (0_usize, false, 0);
+    while let Some(c) = at(next) {
+        next += 1;
+        match c {
+            '\\' => {
+                tokens.push(Token::Sign(at(next).unwrap_or('\\')));
+                next += 1;
+            }
+            '*' => {
+                italic = !italic;
+                tokens.push(Token::Italic);
+            }
+            '^' | '_' => {
+                tokens.push(if c == '^' { Token::Raise } else { Token::Lower });
+                match at(next).ok_or(MarkupError::Braces)? {
+                    '{' => depth += 1,
+                    '-' => tokens.extend([Token::Minus, Token::End]),
+                    one => tokens.extend([Token::Sign(one), Token::End]),
+                }
+                next += 1;
+            }
+            '{' => {
+                depth += 1;
+                tokens.push(Token::Group);
+            }
+            '}' => {
+                depth = depth.checked_sub(1).ok_or(MarkupError::Braces)?;
+                tokens.push(Token::End);
+            }
+            '-' if depth > 0 || is_minus(next.checked_sub(2).and_then(at), at(next)) => tokens.push(Token::Minus),
+            other => tokens.push(Token::Sign(other)),
+        }
+    }
+    match (depth, italic) {
+        (0, false) => Ok(tokens),
+        (0, true) => Err(MarkupError::Italic),
+        _ => Err(MarkupError::Braces),
+    }
+}
+
+/// A hyphen is a minus sign before a digit, unless it joins words or numbers such as `2-10`; and between spaces.
+fn is_minus(before: Option<char>, after: Option<char>) -> bool {
+    let joins = before.is_some_and(char::is_alphanumeric);
+    (!joins && after.is_some_and(|c| c.is_ascii_digit() || c == '.' || c == '*'))
+        || (before == Some(' ') && after == Some(' '))
+}
+
+/// The text without its markup, for readers without typesetting: scripts keep their sign, minus signs stay hyphens. A text whose
+/// markup is faulty only loses asterisks and braces.
+pub fn plain(text: &str) -> String {
+    let Ok(tokens) = parse(text) else { return text.replace(['*', '{', '}'], "") };
+    let mut plain = String::with_capacity(text.len());
+    for token in tokens {
+        match token {
+            Token::Sign(c) => plain.push(c),
+            Token::Minus => plain.push('-'),
+            Token::Raise => plain.push('^'),
+            Token::Lower => plain.push('_'),
+            Token::Italic | Token::Group | Token::End => {}
+        }
+    }
+    plain
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hyphens_and_minus_signs() {
+        let minus = |text: &str| parse(text).unwrap().iter().filter(|t| **t == Token::Minus).count();
+        for (text, count) in [
+            ("-1.2", 1),
+            ("*v* = -1.2", 1),
+            ("2-10", 0),
+            ("two-fold", 0),
+            ("a - b", 1),
+            ("10^{-5}", 1),
+            ("x^-", 1),
+            ("\\-1", 0),
+        ] {
+            assert_eq!(minus(text), count, "{text}");
+        }
+    }
+
+    #[test]
+    fn scripts_end() {
+        use Token::{End, Italic, Lower, Minus, Raise, Sign};
+        assert_eq!(
+            parse("*v*_{+}10^{-5}").unwrap(),
+            [Italic, Sign('v'), Italic, Lower, Sign('+'), End, Sign('1'), Sign('0'), Raise, Minus, Sign('5'), End]
+        );
+        assert_eq!(parse("x^2").unwrap(), [Sign('x'), Raise, Sign('2'), End]);
+    }
+
+    #[test]
+    fn faults_are_named() {
+        for text in ["a_{b", "a}", "a^", "{"] {
+            assert_eq!(parse(text), Err(MarkupError::Braces), "{text}");
+        }
+        assert_eq!(parse("*a"), Err(MarkupError::Italic));
+    }
+
+    #[test]
+    fn plain_text() {
+        assert_eq!(plain("*ε* = 10^{-3}, -1.2, \\*"), "ε = 10^-3, -1.2, *");
+        assert_eq!(plain("*a"), "a");
+    }
+}
