@@ -88,7 +88,7 @@ fn turn(flow: &mut Flow<Interval, 3>, search: &Search, from: [Interval; 2]) -> R
     let [p, q] = others(plane.axis);
     let mut start = SVector::<Interval, 3>::from_element(Interval::from_f64(plane.value));
     (start[p], start[q]) = (from[0], from[1]);
-    let mut set = Set::new(start, true).placed_on(plane.axis, plane.value);
+    let mut set = Set::on_plane(start, plane.axis, plane.value, true);
     let mut crossings = Vec::new();
     for n in 0..search.crossings {
         let crossing = flow.next_crossing(&set, plane, search.longest)?;

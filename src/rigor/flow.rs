@@ -35,7 +35,7 @@ impl Settings {
     /// For [`Interval`]s.
     pub const PLAIN: Self = Self { order: 22, tolerance: 1e-17, longest_step: 1.0 };
     /// For [`Ball`](crate::num::Ball)s.
-    pub const EXTENDED: Self = Self { order: 34, tolerance: 1e-32, longest_step: 1.0 };
+    pub const EXTENDED: Self = Self { order: 24, tolerance: 1e-31, longest_step: 1.0 };
 }
 
 /// The shortest step tried.
@@ -128,12 +128,14 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
                 .iter()
                 .rev()
                 .fold(IVector::from_element(Interval::zero()), |s, c| IVector::from_fn(|i, _| s[i] * span + c.0[i]));
-            let stay: IVector<N> = reach.map(|x: Interval| x + Interval::symmetric(tolerance + 4.0 * f64::EPSILON * x.magnitude()));
+            let stay: IVector<N> =
+                reach.map(|x: Interval| x + Interval::symmetric(tolerance + 4.0 * f64::EPSILON * x.magnitude()));
             let ratio: f64 = if stay.iter().all(|x| x.is_bounded()) {
                 let (coefficient, derivative) = self.last_coefficient(&stay, h, set.has_derivative());
                 let span_power = (0..k).fold(span, |p, _| p * span);
-                let largest =
-                    coefficient.iter().fold(0.0, |m: f64, c| m.max((*c * Interval::from_f64(span_power.upper())).magnitude()));
+                let largest = coefficient
+                    .iter()
+                    .fold(0.0, |m: f64, c| m.max((*c * Interval::from_f64(span_power.upper())).magnitude()));
                 // The inclusion itself: polynomial plus remainder, in the interior of the box.
                 let inside = (0..N).all(|i| (reach[i] + span_power * coefficient[i]).interior(stay[i]));
                 let ratio = elementary::pow(tolerance / largest, power);
@@ -142,8 +144,7 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
                     self.next_step = h * (0.9 * ratio).clamp(0.5, 2.0);
                     let centre = set.centre();
                     self.centre.expand(centre.as_slice());
-                    let centre =
-                        (0..=k).map(|n| SVector::from_fn(|i, _| self.centre.component(i)[n])).collect();
+                    let centre = (0..=k).map(|n| SVector::from_fn(|i, _| self.centre.component(i)[n])).collect();
                     return Ok(Proved {
                         stay,
                         speed,
@@ -197,11 +198,8 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
             .fold(SVector::from_element(S::zero()), |s, c| SVector::from_fn(|i, _| s[i] * t + c[i]));
         // The series of the centre is exact but for its remainder, which is that of every solution in the set.
         let value = SVector::from_fn(|i, _| value[i] + S::from_interval(proved.remainder[i] * last));
-        let jacobian: IMatrix<N> = proved
-            .states
-            .iter()
-            .rev()
-            .fold(SMatrix::from_element(Interval::zero()), |s: IMatrix<N>, c| {
+        let jacobian: IMatrix<N> =
+            proved.states.iter().rev().fold(SMatrix::from_element(Interval::zero()), |s: IMatrix<N>, c| {
                 IMatrix::from_fn(|i, j| s[(i, j)] * step + c.1[(i, j)])
             });
         let full = match &proved.remainder_derivative {
@@ -214,9 +212,7 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
     /// A guess, not rigorous, at when within the step a coordinate of the centre takes a value.
     pub(super) fn guess_crossing(&self, proved: &Proved<S, N>, axis: usize, value: f64) -> Option<f64> {
         let c: Vec<f64> = proved.centre.iter().map(|c| c[axis].interval().midpoint()).collect();
-        let at = |t: f64| {
-            c.iter().rev().fold((0.0, 0.0), |(p, d), c| (p * t + c, d * t + p))
-        };
+        let at = |t: f64| c.iter().rev().fold((0.0, 0.0), |(p, d), c| (p * t + c, d * t + p));
         let (mut low, mut high) = (0.0, proved.longest);
         let below = at(low).0 < value;
         if (at(high).0 < value) == below {
@@ -225,7 +221,11 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
         let mut t = 0.5 * (low + high);
         for _ in 0..200 {
             let (p, d) = at(t);
-            if (p < value) == below { low = t } else { high = t }
+            if (p < value) == below {
+                low = t
+            } else {
+                high = t
+            }
             let newton = t - (p - value) / d;
             let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
             if next == t {

@@ -41,7 +41,9 @@ pub enum Error {
         near: Vec<Interval>,
     },
     /// The section is met at an angle that the set is too wide to decide.
-    #[error("at t = {time} the flow is not transversal to the section on all of {near:?}: use a narrower set or another section")]
+    #[error(
+        "at t = {time} the flow is not transversal to the section on all of {near:?}: use a narrower set or another section"
+    )]
     NotTransversal {
         /// Time reached.
         time: f64,
@@ -58,7 +60,9 @@ pub enum Error {
     #[error("a matrix of derivatives may be singular on this set: use a narrower one")]
     Singular,
     /// The inclusion that would prove existence does not hold.
-    #[error("no proof: the Newton image {image:?} is not inside {candidate:?}; start nearer, or from a box of another size")]
+    #[error(
+        "no proof: the Newton image {image:?} is not inside {candidate:?}; start nearer, or from a box of another size"
+    )]
     NotIncluded {
         /// The box started from.
         candidate: Vec<Interval>,

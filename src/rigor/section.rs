@@ -46,20 +46,6 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
     /// # Errors
     /// See [`Error`]; nothing is returned that is not proved.
     pub fn next_crossing(&mut self, set: &Set<S, N>, plane: Plane, latest: f64) -> Result<Crossing<S, N>, Error> {
-        self.next_crossing_seen(set, plane, latest, &mut |_| {})
-    }
-
-    /// [`Flow::next_crossing`], showing the boxes that all solutions stay in on the way.
-    ///
-    /// # Errors
-    /// As [`Flow::next_crossing`].
-    pub fn next_crossing_seen(
-        &mut self,
-        set: &Set<S, N>,
-        plane: Plane,
-        latest: f64,
-        seen: &mut dyn FnMut(&IVector<N>),
-    ) -> Result<Crossing<S, N>, Error> {
         let mut set = set.clone();
         let value = Interval::from_f64(plane.value);
         let wide = |set: &Set<S, N>| Error::NotTransversal {
@@ -76,7 +62,6 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
             longest = f64::INFINITY;
             let height = proved.stay[plane.axis] - value;
             if !height.contains(0.0) {
-                seen(&proved.stay);
                 set = self.advance(&set, &proved, proved.longest)?;
                 continue;
             }
@@ -97,7 +82,6 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
             }
             // Away from the plane, or towards it?
             if departing || start.is_positive() == upward {
-                seen(&proved.stay);
                 let after = self.advance(&set, &proved, proved.longest)?;
                 let height = after.hull()[plane.axis] - value;
                 if if upward { !height.is_positive() } else { !height.is_negative() } {
@@ -108,7 +92,6 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
             }
             match self.guess_crossing(&proved, plane.axis, plane.value) {
                 Some(h) => {
-                    seen(&proved.stay);
                     let near = self.advance(&set, &proved, h)?;
                     return self.project(&near, plane, upward);
                 }
@@ -123,7 +106,6 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
                         }
                         continue;
                     }
-                    seen(&proved.stay);
                     set = after;
                 }
             }
@@ -134,10 +116,8 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
     fn project(&mut self, set: &Set<S, N>, plane: Plane, upward: bool) -> Result<Crossing<S, N>, Error> {
         let axis = plane.axis;
         let hull = set.hull();
-        let wide = || Error::NotTransversal {
-            time: set.time().interval().midpoint(),
-            near: hull.iter().copied().collect(),
-        };
+        let wide =
+            || Error::NotTransversal { time: set.time().interval().midpoint(), near: hull.iter().copied().collect() };
         let height = hull[axis] - Interval::from_f64(plane.value);
         // A box that all solutions from the hull stay in until they have met the plane, forward or backward in time: by the
         // first-order inclusion hull + [-d, d] f(W) in W, with d long enough to reach the plane at the least speed on W.
@@ -152,7 +132,9 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
             let within = (Interval::from_f64(height.magnitude()) / Interval::from_f64(slowest)).upper() * 1.01;
             let span = Interval::symmetric(within);
             let reach: IVector<N> = IVector::from_fn(|i, _| hull[i] + span * speed[i]);
-            if (0..N).all(|i| reach[i].interior(stay[i])) && height.magnitude() < (speed[axis] * Interval::from_f64(within)).mignitude() {
+            if (0..N).all(|i| reach[i].interior(stay[i]))
+                && height.magnitude() < (speed[axis] * Interval::from_f64(within)).mignitude()
+            {
                 found = true;
                 break;
             }
@@ -179,9 +161,12 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
         let off = Interval::symmetric(growth.upper());
         let moved = linear::identity::<N>().map(|x| x + off);
         let slope: IVector<N> = IVector::from_fn(|i, _| speed[i] / speed[axis]);
-        let projection: IMatrix<N> = IMatrix::from_fn(|i, j| {
-            if i == axis { Interval::zero() } else { moved[(i, j)] - slope[i] * moved[(axis, j)] }
-        });
+        let projection: IMatrix<N> =
+            IMatrix::from_fn(
+                |i, j| {
+                    if i == axis { Interval::zero() } else { moved[(i, j)] - slope[i] * moved[(axis, j)] }
+                },
+            );
         let time = set.time() + S::from_interval(delay);
         let on = Some((axis, plane.value));
         let set = set.image(value, &projection, &projection, S::from_interval(delay), on)?;

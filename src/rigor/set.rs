@@ -53,12 +53,10 @@ impl<S: Enclosure, const N: usize> Set<S, N> {
         }
     }
 
-    /// The set with all states on the plane where a coordinate has a value (they are).
-    pub(super) fn placed_on(mut self, axis: usize, value: f64) -> Self {
-        self.on = Some((axis, value));
-        self.centre[axis] = S::from_f64(value);
-        self.initial[axis] = Interval::zero();
-        self
+    /// A box in the plane where a coordinate has a value, at t = 0; that coordinate of `states` is replaced.
+    pub fn on_plane(mut states: SVector<S, N>, axis: usize, value: f64, derivative: bool) -> Self {
+        states[axis] = S::from_f64(value);
+        Self { on: Some((axis, value)), ..Self::new(states, derivative) }
     }
 
     /// The coordinate that all states have exactly.
@@ -158,15 +156,6 @@ impl<S: Enclosure, const N: usize> Set<S, N> {
                 }
             }
         }
-        Ok(Self {
-            centre,
-            stretch,
-            initial: self.initial,
-            frame,
-            errors,
-            derivative,
-            time: self.time + elapsed,
-            on,
-        })
+        Ok(Self { centre, stretch, initial: self.initial, frame, errors, derivative, time: self.time + elapsed, on })
     }
 }
