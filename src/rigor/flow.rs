@@ -35,7 +35,7 @@ impl Settings {
     /// For [`Interval`]s.
     pub const PLAIN: Self = Self { order: 22, tolerance: 1e-17, longest_step: 1.0 };
     /// For [`Ball`](crate::num::Ball)s.
-    pub const EXTENDED: Self = Self { order: 24, tolerance: 1e-31, longest_step: 1.0 };
+    pub const EXTENDED: Self = Self { order: 30, tolerance: 1e-31, longest_step: 1.0 };
 }
 
 /// The shortest step tried.
