@@ -99,7 +99,8 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
                     // The centre does not get there in this step; others might.
                     let after = self.advance(&set, &proved, proved.longest)?;
                     let height = after.hull()[plane.axis] - value;
-                    if height.contains(0.0) {
+                    // All on the side they came from: the guess is no proof that they are.
+                    if height.contains(0.0) || height.is_positive() != start.is_positive() {
                         longest = 0.5 * proved.longest;
                         if longest < 1e-9 {
                             return Err(wide(&set));

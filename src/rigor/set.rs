@@ -146,9 +146,10 @@ impl<S: Enclosure, const N: usize> Set<S, N> {
             }
         };
         if let Some((axis, _)) = on {
-            // On the plane, a frame vector that is the plane's normal has no part in any state.
+            // All else lying in the plane, a frame vector that is the plane's normal has no part in any state.
+            let leaning = (0..N).filter(|j| frame[(axis, *j)] != 0.0).count();
             for j in 0..N {
-                if (0..N).all(|i| (i == axis) == (frame[(i, j)] != 0.0)) {
+                if leaning == 1 && (0..N).all(|i| (i == axis) == (frame[(i, j)] != 0.0)) {
                     errors[j] = Interval::zero();
                     if let Some(d) = &mut derivative {
                         d.errors.row_mut(j).fill(Interval::zero());
