@@ -57,6 +57,9 @@ impl Cycle {
     }
 }
 
+/// Newton's method gets to the arithmetic's end in this many steps from three digits.
+const NEWTON_STEPS: usize = 6;
+
 /// A turn from a box of the plane.
 struct Turn {
     value: [Interval; 2],
@@ -141,21 +144,30 @@ pub fn krawczyk(
 /// See [`Error`]; [`Error::NotIncluded`] if the inclusion does not hold.
 pub fn prove_cycle(tape: &Tape, settings: Settings, search: &Search) -> Result<Cycle, Error> {
     let mut flow = Flow::<Interval, 3>::new(tape, settings);
+    let preconditioner = |slope: [[Interval; 2]; 2]| {
+        let m = slope.map(|row| row.map(Interval::midpoint));
+        inverse([[m[0][0] - 1.0, m[0][1]], [m[1][0], m[1][1] - 1.0]]).ok_or(Error::Singular)
+    };
+    // Newton's method on points first, not rigorous: a better place for the box.
+    let mut near = search.near;
+    for _ in 0..NEWTON_STEPS {
+        let point = near.map(Interval::from_f64);
+        let at = turn(&mut flow, search, point)?;
+        let next = krawczyk(point, near, at.value, at.slope, preconditioner(at.slope)?).map(Interval::midpoint);
+        let moved = (0..2).fold(0.0, |m: f64, i| m.max((next[i] - near[i]).abs()));
+        near = next;
+        if moved < 1e-3 * search.radius {
+            break;
+        }
+    }
     let step = |flow: &mut Flow<Interval, 3>, x: [Interval; 2]| -> Result<_, Error> {
         let centre = x.map(Interval::midpoint);
         let over = turn(flow, search, x)?;
         let at = turn(flow, search, centre.map(Interval::from_f64))?;
-        let m = over.slope.map(|row| row.map(Interval::midpoint));
-        let y = inverse([[m[0][0] - 1.0, m[0][1]], [m[1][0], m[1][1] - 1.0]]).ok_or(Error::Singular)?;
+        let y = preconditioner(over.slope)?;
         let image = krawczyk(x, centre, at.value, over.slope, y);
         Ok((over, at, y, image))
     };
-    // Newton's method on points first, not rigorous: a better place for the box.
-    let mut near = search.near;
-    for _ in 0..4 {
-        let (_, _, _, image) = step(&mut flow, near.map(Interval::from_f64))?;
-        near = image.map(Interval::midpoint);
-    }
     let candidate = near.map(|c| Interval::between(c - search.radius, c + search.radius));
     let (over, at, preconditioner, image) = step(&mut flow, candidate)?;
     if !image[0].interior(candidate[0]) || !image[1].interior(candidate[1]) {
