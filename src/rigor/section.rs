@@ -27,6 +27,9 @@ pub struct Plane {
     pub value: f64,
 }
 
+/// With less time left than this, the time is up.
+const LEAST_LEFT: f64 = 1e-9;
+
 /// A crossing: all states of the set lie on the plane.
 #[derive(Clone, Debug)]
 pub struct Crossing<S, const N: usize> {
@@ -55,10 +58,10 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
         let mut longest = f64::INFINITY;
         loop {
             let now = set.time().interval().lower();
-            if now >= latest {
+            if latest - now < LEAST_LEFT {
                 return Err(Error::NoCrossing(latest));
             }
-            let proved = self.prove(&set, longest)?;
+            let proved = self.prove(&set, longest.min(latest - now))?;
             longest = f64::INFINITY;
             let height = proved.stay[plane.axis] - value;
             if !height.contains(0.0) {
