@@ -6,11 +6,7 @@ PROOFS  := printed-cycle coexistence sensitivity crossings
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help
-<<<<<<< HEAD
-.PHONY: help figures report check bless test elementary rigor-test browser-test lint bench torture ci clean
-=======
-.PHONY: help figures report check bless test elementary rigor-test proofs browser-test lint bench ci clean
->>>>>>> dd8ab3c (wip: theorems)
+.PHONY: help figures report check bless test elementary rigor-test proofs browser-test lint bench torture ci clean
 
 help: ## this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
