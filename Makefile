@@ -2,10 +2,11 @@
 
 CARGO   ?= cargo
 FIGURES := fig1 fig2 fig3 fig4 fig5 fig6 fig7 fig8 fig9 lottery workprecision digits convergence
+PROOFS  := printed-cycle coexistence sensitivity crossings
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help figures report check bless test elementary rigor-test browser-test lint bench torture ci clean
+.PHONY: help figures report check bless test elementary rigor-test proofs browser-test lint bench torture ci clean
 
 help: ## this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -32,6 +33,10 @@ rigor-test: ## millions of interval operations against exact integer arithmetic 
 
 elementary: ## tanh and exp against double-double arithmetic: 2^24 and 2^30 points each (half an hour)
 	@$(CARGO) test --release --locked --lib num::elementary -- --include-ignored --nocapture
+
+proofs: ## prove the theorems anew (proofs/README.md), write their certificates and check those (minutes)
+	@set -e; for p in $(PROOFS); do $(RUN) --package twofold-proofs --bin $$p; done
+	@python3 proofs/check.py
 
 browser-test: ## the report in a headless Chromium, if there is one (needs Node)
 	@$(CARGO) build --release --locked --bins

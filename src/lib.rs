@@ -10,6 +10,7 @@
 //! - [`system`]: the equations, one file each, no time stepping.
 //! - [`integrate`]: time stepping. One file a method; a step carries its interpolant; one driver loop; restarts and kicks
 //!   are a schedule around a run.
+//! - [`rigor`]: validated steps, sets, Poincaré maps, closed orbits: enclosures that are theorems. The theorems: `proofs/`.
 //! - [`analyse`]: what is made of steps: paths, Poincaré sections, exponents, closed orbits.
 //! - [`job`]: a question as data, its computation, its answer.
 //! - [`paper`]: what speaks of this paper: readings, claims, figures as data.
@@ -76,4 +77,5 @@ pub mod record;
 pub mod render;
 #[cfg(feature = "figures")]
 pub mod report;
+pub mod rigor;
 pub mod system;

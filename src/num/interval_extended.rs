@@ -187,8 +187,10 @@ impl Ball {
         let w = if self.midpoint.high() < 0.0 { -point } else { point };
         let e = (-(w + w)).thin_exp();
         let f = e + Self::one();
-        // The slope's own slope is at most 2 sech^2 |tanh| <= 1 in modulus.
-        (e / (f * f) * Self::from_f64(4.0)).widened(self.radius)
+        let slope = e / (f * f) * Self::from_f64(4.0);
+        // Its logarithm's slope is at most 2 in modulus: within d, it changes by at most exp(2 d) - 1 <= 2 d exp(2) of itself for d <= 1.
+        let relative = if self.radius <= 1.0 { 14.8 * self.radius } else { return Self::new(DoubleDouble::ZERO, 1.0) };
+        slope.widened(up(slope.size() + slope.radius) * relative)
     }
 
     /// sin(self + quarters pi/2).
