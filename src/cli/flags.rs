@@ -309,6 +309,8 @@ enum Misuse {
     NoSuchSystem { name: String, help: String, known: String },
     #[error("--system {file}: {problem}")]
     SystemFile { file: String, problem: String },
+    #[error("{flag}: {problem}")]
+    Own { flag: String, problem: String },
     #[error("--set \"{text}\": {problem}")]
     Set { text: String, problem: String },
     #[error("{system} suggests no initial state; give one by --start, {states} numbers")]
@@ -456,8 +458,8 @@ impl RunFlags {
                 ("v_minus", self.v_minus.unwrap_or(reading.v_minus)),
             ];
             for (parameter, value) in values {
-                let refused =
-                    |e: ParameterError| Misuse::Set { text: format!("{parameter}={value}"), problem: e.to_string() };
+                let flag = format!("--{}", parameter.replace('_', "-"));
+                let refused = |e: ParameterError| Misuse::Own { flag, problem: e.to_string() };
                 system = system.with(parameter, value).map_err(refused)?;
             }
         }
@@ -530,7 +532,7 @@ fn section(text: &str, system: &System) -> Result<Observation, Misuse> {
         text: text.to_owned(),
         problem,
         known: names.join(", "),
-        example: names[names.len() - 1].into(),
+        example: names[1.min(names.len() - 1)].into(),
     };
     let (name, value) = text.split_once('=').ok_or_else(|| misuse("there is no \"=\""))?;
     let coordinate =
