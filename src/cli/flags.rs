@@ -309,6 +309,8 @@ enum Misuse {
     NoSuchSystem { name: String, help: String, known: String },
     #[error("--system {file}: {problem}")]
     SystemFile { file: String, problem: String },
+    #[error("{flag}: {problem}")]
+    Parameter { flag: &'static str, problem: String },
     #[error("--set \"{text}\": {problem}")]
     Set { text: String, problem: String },
     #[error("{system} suggests no initial state; give one by --start, {states} numbers")]
@@ -450,14 +452,13 @@ impl RunFlags {
         if self.caricature() {
             let reading = paper::Reading::from(self.reading.unwrap_or(Reading::Printed)).caricature();
             let values = [
-                ("alpha", self.alpha.unwrap_or(reading.alpha)),
-                ("beta", self.beta.unwrap_or(reading.beta)),
-                ("v_plus", self.v_plus.unwrap_or(reading.v_plus)),
-                ("v_minus", self.v_minus.unwrap_or(reading.v_minus)),
+                ("--alpha", "alpha", self.alpha.unwrap_or(reading.alpha)),
+                ("--beta", "beta", self.beta.unwrap_or(reading.beta)),
+                ("--v-plus", "v_plus", self.v_plus.unwrap_or(reading.v_plus)),
+                ("--v-minus", "v_minus", self.v_minus.unwrap_or(reading.v_minus)),
             ];
-            for (parameter, value) in values {
-                let refused =
-                    |e: ParameterError| Misuse::Set { text: format!("{parameter}={value}"), problem: e.to_string() };
+            for (flag, parameter, value) in values {
+                let refused = |e: ParameterError| Misuse::Parameter { flag, problem: e.to_string() };
                 system = system.with(parameter, value).map_err(refused)?;
             }
         }
