@@ -100,7 +100,7 @@ fn wrong_numbers_are_named() {
         (vec!["--restart", "-20"], vec!["--restart"]),
         (vec!["--kick-every", "0"], vec!["--kick-every"]),
         (vec!["--kick-every", "0.3", "--kick-size", "-1"], vec!["--kick-size"]),
-        (vec!["--start", "1,2"], vec!["--start", "three"]),
+        (vec!["--start", "1,2"], vec!["--start", "give 3, one for each of x, y, z"]),
         (vec!["--start", "1,2,NaN"], vec!["--start"]),
         (vec!["--section", "q=0"], vec!["--section", "x, y, z", "y=0"]),
         (vec!["--section", "y"], vec!["--section", "y=0"]),

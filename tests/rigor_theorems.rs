@@ -1,4 +1,5 @@
 //! The theorems' machinery, on an equation whose answers are known and on the paper's. The theorems themselves are in proofs/ (`make proofs`).
+#![allow(clippy::disallowed_methods)] // std functions give expected values, compared with tolerances
 
 use nalgebra::SVector;
 use twofold::num::tape::Recorded;

@@ -310,7 +310,7 @@ enum Misuse {
     #[error("--system {file}: {problem}")]
     SystemFile { file: String, problem: String },
     #[error("{flag}: {problem}")]
-    Parameter { flag: &'static str, problem: String },
+    Own { flag: String, problem: String },
     #[error("--set \"{text}\": {problem}")]
     Set { text: String, problem: String },
     #[error("{system} suggests no initial state; give one by --start, {states} numbers")]
@@ -452,13 +452,14 @@ impl RunFlags {
         if self.caricature() {
             let reading = paper::Reading::from(self.reading.unwrap_or(Reading::Printed)).caricature();
             let values = [
-                ("--alpha", "alpha", self.alpha.unwrap_or(reading.alpha)),
-                ("--beta", "beta", self.beta.unwrap_or(reading.beta)),
-                ("--v-plus", "v_plus", self.v_plus.unwrap_or(reading.v_plus)),
-                ("--v-minus", "v_minus", self.v_minus.unwrap_or(reading.v_minus)),
+                ("alpha", self.alpha.unwrap_or(reading.alpha)),
+                ("beta", self.beta.unwrap_or(reading.beta)),
+                ("v_plus", self.v_plus.unwrap_or(reading.v_plus)),
+                ("v_minus", self.v_minus.unwrap_or(reading.v_minus)),
             ];
-            for (flag, parameter, value) in values {
-                let refused = |e: ParameterError| Misuse::Parameter { flag, problem: e.to_string() };
+            for (parameter, value) in values {
+                let flag = format!("--{}", parameter.replace('_', "-"));
+                let refused = |e: ParameterError| Misuse::Own { flag, problem: e.to_string() };
                 system = system.with(parameter, value).map_err(refused)?;
             }
         }
@@ -531,7 +532,7 @@ fn section(text: &str, system: &System) -> Result<Observation, Misuse> {
         text: text.to_owned(),
         problem,
         known: names.join(", "),
-        example: names[names.len() - 1].into(),
+        example: names[1.min(names.len() - 1)].into(),
     };
     let (name, value) = text.split_once('=').ok_or_else(|| misuse("there is no \"=\""))?;
     let coordinate =
