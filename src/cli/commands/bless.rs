@@ -1,6 +1,6 @@
 //! `twofold bless`: make today's figures the reference, with a reason that stays.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use serde_json::json;
@@ -11,6 +11,7 @@ use crate::cli::speak::print_json;
 use crate::cli::{CliError, Exit, in_pool, print};
 use crate::job::Desk;
 use crate::paper::pipeline::{compute, questions};
+use crate::paper::{figures, readme};
 use crate::record::manifest::VERSION;
 use crate::record::{self, Manifest};
 
@@ -54,6 +55,14 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             &json!({ "format": "twofold-bless", "version": 1, "outcome": outcome, "reason": reason, "changed": changed }),
         )
     };
+    // The tests are those of the checkout that holds the references.
+    let checkout = arguments.expected.join("..").join("Cargo.toml");
+    if !record::files::read_text(&checkout).is_ok_and(|text| text.contains("name = \"twofold-dynamics\"")) {
+        return Err(CliError::Usage(format!(
+            "{} is not in a checkout of twofold; a reference is made where its program and its tests are",
+            arguments.expected.display()
+        )));
+    }
     if !tests_pass()? {
         let why = "refused: a test that is not golden fails; a reference must not be made from a program that is wrong";
         say("refused", &[], why)?;
@@ -90,6 +99,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         }
         record::write(&path, &manifest.to_json())?;
     }
+    write_table(&arguments.expected)?;
     if changed.is_empty() {
         say("nothing", &[], "nothing changed")?;
         return Ok(Exit::Fine);
@@ -106,6 +116,23 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 
 const HEADER: &str = "# Why the reference pictures changed\n\nA line per `twofold bless`, oldest first: reason, then each picture \
                       with the first layer that changed.\n\n";
+
+/// Puts the verdicts into README, if there is one beside the references that has a place for them.
+fn write_table(expected: &Path) -> Result<(), CliError> {
+    let path = expected.join("..").join("README.md");
+    let Ok(written) = record::files::read_text(&path) else { return Ok(()) };
+    let manifests: Vec<Manifest> = figures::all()
+        .iter()
+        .filter_map(|f| {
+            let path = expected.join(f.id).join("expected.json");
+            Manifest::parse(&record::files::read_text(&path).ok()?, &path.display().to_string()).ok()
+        })
+        .collect();
+    if let Some(text) = readme::with_table(&written, &readme::table(&manifests)) {
+        record::write(&path, text.as_bytes())?;
+    }
+    Ok(())
+}
 
 /// Runs the test suite without the golden tests (which a new reference is about to change).
 fn tests_pass() -> Result<bool, CliError> {

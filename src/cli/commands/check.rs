@@ -9,6 +9,7 @@ use crate::cli::progress::Progress;
 use crate::cli::speak::print_json;
 use crate::cli::{CliError, Exit, in_pool, print};
 use crate::job::Desk;
+use crate::paper::figures;
 use crate::paper::pipeline::{PictureRecord, compute, questions};
 use crate::record::{self, Layer, Manifest};
 
@@ -25,9 +26,9 @@ pub struct Arguments {
     /// high SSIM.
     #[arg(long, value_name = "DIR|MANIFEST")]
     against: Option<PathBuf>,
-    /// Folder that holds figN/expected.json.
-    #[arg(long, value_name = "DIR", default_value = "figures", conflicts_with = "against")]
-    expected: PathBuf,
+    /// Folder that holds figN/expected.json [default: the references that this program was built with].
+    #[arg(long, value_name = "DIR", conflicts_with = "against")]
+    expected: Option<PathBuf>,
     /// Threads; 0 is one per core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
@@ -99,7 +100,10 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         .iter()
         .map(|figure| match &given {
             Some(manifest) => Ok(manifest.clone()),
-            None => read_manifest(&arguments.expected.join(figure.id).join("expected.json")),
+            None => match &arguments.expected {
+                Some(folder) => read_manifest(&folder.join(figure.id).join("expected.json")),
+                None => embedded(figure.id),
+            },
         })
         .collect();
     let progress = Progress::new(arguments.quiet);
@@ -156,6 +160,12 @@ fn compare(manifest: &Manifest, actual: &PictureRecord) -> State {
         None => State::Same,
         Some(difference) => State::Differs { layer: difference.layer, panels: difference.panels },
     }
+}
+
+/// The reference that this program was built with.
+fn embedded(id: &str) -> Result<Manifest, CliError> {
+    let text = figures::reference(id).ok_or_else(|| CliError::Usage(format!("no reference is committed for {id}")))?;
+    Ok(Manifest::parse(text, &format!("the built-in reference of {id}"))?)
 }
 
 fn read_manifest(path: &Path) -> Result<Manifest, CliError> {

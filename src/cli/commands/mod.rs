@@ -8,6 +8,7 @@ mod manual;
 mod published;
 mod report;
 mod run;
+mod store;
 mod sweep;
 
 use std::process::ExitCode;
@@ -35,6 +36,7 @@ enum Command {
     Bless(bless::Arguments),
     Report(report::Arguments),
     Inspect(inspect::Arguments),
+    Store(store::Arguments),
     Completions(manual::Completions),
     Man(manual::Man),
 }
@@ -54,6 +56,7 @@ pub fn main() -> ExitCode {
         Command::Bless(arguments) => bless::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::Store(arguments) => store::run(&arguments),
         Command::Completions(arguments) => manual::completions(&arguments, Arguments::command()),
         Command::Man(arguments) => manual::man(&arguments, Arguments::command()),
     };

@@ -9,6 +9,7 @@ use crate::cli::flags::{RunFlags, Use};
 use crate::cli::progress::Progress;
 use crate::cli::speak::{deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
+use crate::job::parquet::parquet;
 use crate::job::{Desk, JobError, Question, Run, Stop, encode};
 
 /// Compute one run: its path, or with --section its passages through a plane.
@@ -44,6 +45,8 @@ enum Format {
     Csv,
     /// Spec, statistics, columns and rows.
     Json,
+    /// Apache Parquet, with what a CSV file says in its first line as metadata.
+    Parquet,
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
@@ -63,6 +66,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let bytes = match arguments.format.unwrap_or(Format::Csv) {
         Format::Csv => encode::csv(&answer.tables[0], &about),
         Format::Json => encode::json(&answer, &about),
+        Format::Parquet => parquet(&answer.tables[0], &about),
     };
     let stopped = if answer.stop == Stop::Interrupted { progress.asked_to_stop() } else { None };
     let Some(exit) = stopped else {

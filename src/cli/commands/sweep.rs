@@ -13,7 +13,8 @@ use crate::cli::flags::{RunFlags, Use};
 use crate::cli::progress::Progress;
 use crate::cli::speak::{complain, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit, in_pool};
-use crate::job::spec::RunSpec;
+use crate::integrate::filippov::ExitRule;
+use crate::job::spec::{RunSpec, SwitchSpec};
 use crate::job::{Classification, Desk, JobError};
 
 /// The most runs of one sweep: their rows are kept in memory.
@@ -90,7 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
                 if progress.asked_to_stop().is_some() {
                     None
                 } else {
-                    one(&spec, f64::from(k) * arguments.shift, &progress)
+                    one(&spec, f64::from(k) * arguments.shift, k, &progress)
                 }
             })
             .collect()
@@ -129,9 +130,16 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 }
 
 /// One run, or nothing if it was interrupted.
-fn one(spec: &RunSpec, shift: f64, progress: &Progress) -> Option<Box<Row>> {
+fn one(spec: &RunSpec, shift: f64, k: u32, progress: &Progress) -> Option<Box<Row>> {
     let mut shifted = spec.clone();
     shifted.start[0] += shift;
+    // Chance of its own in every row: the same kicks from neighbouring starts would not be independent runs.
+    if let Some(kick) = &mut shifted.schedule.kick {
+        kick.stream += u64::from(k);
+    }
+    if let SwitchSpec::Filippov { exit: ExitRule::Random { stream, .. }, .. } = &mut shifted.switch {
+        *stream += u64::from(k);
+    }
     // A desk of its own: what it has computed is forgotten with it, however many runs there are.
     match Classification::of(shifted).ask(&Desk::new(None, progress)) {
         Err(JobError::Interrupted) => None,
