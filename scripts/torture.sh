@@ -91,7 +91,8 @@ done
 echo "SIGINT and SIGTERM while computing: $k sent, gone after $worst ms at most"
 
 # Limits that take seconds to reach. Each ends with code 3 and a line that says what to do.
-for flags in "--chord 1e-300" "--switch filippov --exit all --funnel-times 100000" "--restart 2e-9 --t-end 1"; do
+for flags in "--chord 1e-300 --t-end 1000" "--switch filippov --exit all --funnel-times 100000" "--restart 2e-9 --t-end 1"; do
+    rm -f "$work/none.csv"
     "$program" run $flags --quiet --out "$work/none.csv" 2> "$work/said"
     found=$?
     [ "$found" -eq 3 ] && [ "$(wc -l < "$work/said")" -eq 1 ] && [ ! -e "$work/none.csv" ] || complain "run $flags: $found"
