@@ -30,3 +30,121 @@ fn golden_embedded_references_are_the_files() {
         assert_eq!(figures::reference(figure.id), Some(text(&format!("figures/{}/expected.json", figure.id)).as_str()));
     }
 }
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    given: Vec<String>,
+    number: Vec<Number>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Number {
+    quotes: Vec<String>,
+    command: String,
+    test: Option<String>,
+}
+
+fn numbers() -> Numbers {
+    toml::from_str(&text("docs/numbers.toml")).unwrap()
+}
+
+/// README's findings, without the generated table.
+fn findings() -> String {
+    let readme = text("README.md");
+    let (_, findings) = readme.split_once("## What was found").unwrap();
+    let (findings, _) = findings.split_once("## Any run").unwrap();
+    let (before, rest) = findings.split_once(readme::BEGIN).unwrap();
+    let (_, after) = rest.split_once(readme::END).unwrap();
+    format!("{before}{after}")
+}
+
+#[test]
+fn every_number_of_the_findings_is_named_in_the_file_of_numbers() {
+    let Numbers { given, number } = numbers();
+    let mut left = findings();
+    for quote in number.iter().flat_map(|n| &n.quotes) {
+        assert!(
+            left.contains(quote.as_str()) || findings().contains(quote.as_str()),
+            "README does not say \"{quote}\""
+        );
+        left = left.replace(quote.as_str(), "");
+    }
+    // Longest first, so that a short one does not eat a part of a long one.
+    let mut given = given;
+    given.sort_by_key(|g| std::cmp::Reverse(g.len()));
+    for g in &given {
+        left = left.replace(g.as_str(), "");
+    }
+    // Links lead to files, whose names have numbers.
+    let prose: Vec<&str> = left.lines().filter(|l| !l.starts_with("![")).collect();
+    for line in prose {
+        let unnamed: Vec<&str> = line
+            .split(|c: char| !(c.is_ascii_digit() || ".,".contains(c)))
+            .map(|n| n.trim_matches(['.', ',']))
+            .filter(|n| n.bytes().any(|b| b.is_ascii_digit()))
+            .collect();
+        assert!(unnamed.is_empty(), "{unnamed:?} are in README but not in docs/numbers.toml: {line}");
+    }
+}
+
+#[test]
+fn the_commands_and_tests_behind_the_numbers_exist() {
+    let help = |arguments: &[&str]| {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_twofold")).args(arguments).output().unwrap();
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let makefile = text("Makefile");
+    for Number { quotes, command, test } in numbers().number {
+        assert!(!quotes.is_empty());
+        let words: Vec<&str> = command.split_whitespace().collect();
+        match words[..] {
+            ["make", target] => assert!(makefile.contains(&format!("\n{target}:")), "no target {target}"),
+            ["twofold", sub, ..] => {
+                assert!(help(&["--help"]).contains(&format!("\n  {sub}")), "no command {sub}");
+                let known = help(&[sub, "--help"]);
+                for flag in words.iter().filter(|w| w.starts_with("--")) {
+                    assert!(known.contains(flag), "{sub} has no flag {flag}");
+                }
+            }
+            _ => panic!("{command}: neither twofold nor make"),
+        }
+        if let Some(test) = test {
+            assert!(!text(&test).is_empty());
+        }
+    }
+}
+
+#[test]
+fn futures_come_back_as_often_as_readme_says() {
+    use twofold::integrate::filippov::EventKind;
+    use twofold::integrate::filippov::ExitRule;
+    use twofold::integrate::{Schedule, StepCap, Tolerance};
+    use twofold::job::recording::Data;
+    use twofold::job::simulate::simulate;
+    use twofold::job::spec::*;
+    use twofold::paper::Reading;
+    for (reading, back) in [(Reading::Reconstructed, 40), (Reading::Printed, 35)] {
+        let funnel = FunnelSpec { shortest: 0.1, longest: 3.0, times: 20, horizon: 300.0, until_two_fold: true };
+        let run = RunSpec {
+            system: reading.caricature().into(),
+            switch: SwitchSpec::Filippov { exit: ExitRule::All, funnel: Some(funnel) },
+            start: vec![0.2, 0.0, -1.0],
+            t_end: 100.0,
+            method: MethodSpec {
+                name: Method::Dopri5,
+                tolerance: Tolerance { rtol: 1e-12, atol: 1e-12 },
+                step_cap: StepCap::None,
+                max_steps: DEFAULT_MAX_STEPS,
+            },
+            schedule: Schedule::default(),
+            observe: Observation::Path { chord: 1e-3 },
+        };
+        let Data::Funnel { futures, .. } = simulate(&run, &()).unwrap().data else { panic!("a funnel was asked for") };
+        let comes_back = |f: &&twofold::job::recording::Future| {
+            f.motion.events.iter().any(|e| matches!(e.kind, EventKind::TwoFoldReached { .. }))
+        };
+        assert_eq!((futures.iter().filter(comes_back).count(), futures.len()), (back, 40), "{}", reading.word());
+    }
+}
