@@ -105,7 +105,7 @@ fn wrong_numbers_are_named() {
         (vec!["--section", "q=0"], vec!["--section", "x, y, z", "y=0"]),
         (vec!["--section", "y"], vec!["--section", "y=0"]),
         (vec!["--section", "y=zero"], vec!["--section", "number"]),
-        (vec!["--system", "wheel", "--alpha", "1"], vec!["--alpha", "wheel"]),
+        (vec!["--system", "wheel", "--alpha", "1"], vec!["--alpha", "belongs to the caricature", "--set"]),
         (vec!["--switch", "hysteretic", "--sigma", "0.1"], vec!["--sigma"]),
         (vec!["--exit", "nonsense", "--eps-prime", "5"], vec!["no effect", "--switch"]),
         (vec!["--switch", "filippov", "--exit", "all", "--eps", "1e-3"], vec!["--eps", "no effect"]),

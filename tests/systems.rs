@@ -196,7 +196,7 @@ fn a_file_on_the_command_line() {
     problem(&["--set", "gain"], &["there is no \"=\""]);
     problem(&["--set", "gain=two"], &["not a decimal number"]);
     problem(&["--start", "1,2,3"], &["--start has 3 numbers; give 2, one for each of x, v"]);
-    problem(&["--alpha", "0.1"], &["--alpha belongs to the caricature"]);
+    problem(&["--alpha", "0.1"], &["--alpha", "belongs to the caricature"]);
     problem(&["--section", "y=0"], &["no such coordinate", "x, v"]);
     fs::write(file, good.replace("gain*v", "gian*v")).unwrap();
     problem(&[], &["unknown name `gian`", "my.toml:3:10", "    ^^^^", "did you mean `gain`?"]);

@@ -19,9 +19,9 @@ pub struct Arguments {
     /// Folder with the figures; the JSON files are written to it.
     #[arg(long, value_name = "DIR", default_value = "target/figures")]
     figures: PathBuf,
-    /// Folder that holds figN/expected.json.
-    #[arg(long, value_name = "DIR", default_value = "figures")]
-    expected: PathBuf,
+    /// Folder that holds figN/expected.json [default: figures, or away from a checkout the hashes that this program was built with].
+    #[arg(long, value_name = "DIR")]
+    expected: Option<PathBuf>,
     /// The page; index.html in the folder with the figures if not given. Elsewhere it names the files instead of linking to them.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -35,7 +35,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let made = read_tree(folder, &|_| true)
         .map_err(|e| CliError::Usage(format!("{e}; run `make figures` first, or name another --figures")))?
         .files;
-    let report = assemble(&made, &references(&arguments.expected)?);
+    let report = assemble(&made, &references(arguments.expected.as_deref())?);
     if report.figures.is_empty() {
         return Err(CliError::Usage(format!(
             "{}: no figure's pictures are in this folder; run `make figures` first, or name another --figures",
@@ -72,9 +72,10 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 }
 
 /// The committed manifests and pictures; none if the folder is not there.
-pub fn references(folder: &Path) -> Result<Vec<FileBytes>, CliError> {
+pub fn references(given: Option<&Path>) -> Result<Vec<FileBytes>, CliError> {
+    let folder = given.unwrap_or(Path::new("figures"));
     // Away from a checkout, those that this program was built with: hashes only, no pictures.
-    if !folder.exists() {
+    if given.is_none() && !folder.exists() {
         let embedded = |f: &Figure| {
             let text = figures::reference(f.id)?;
             Some(FileBytes { path: format!("{}/expected.json", f.id), bytes: text.as_bytes().to_vec() })
