@@ -15,7 +15,7 @@ fn main() {
     let alpha = 1e-3;
     let search = Search {
         plane: SECTION,
-        near: [17.0573441424817657, -0.0154171778038766773],
+        near: [17.057344142481766, -0.015417177803876677],
         radius: 4e-9,
         crossings: 2,
         longest: 40.0,

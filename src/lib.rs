@@ -5,9 +5,9 @@
 //!
 //! # The house
 //!
-//! - [`num`]: arithmetic that results depend on. Elementary functions with the same bits everywhere, the scalar trait
-//!   over which equations are written, dual numbers, random numbers.
-//! - [`system`]: the equations, one file each, no time stepping.
+//! - [`num`]: arithmetic that results depend on. Elementary functions with the same bits everywhere, the scalar traits
+//!   over which equations are written, tapes of recorded equations, dual numbers, series, intervals, random numbers.
+//! - [`system`]: piecewise-smooth systems as data, their transforms, compiled fast paths; no time stepping.
 //! - [`integrate`]: time stepping. One file a method; a step carries its interpolant; one driver loop; restarts and kicks
 //!   are a schedule around a run.
 //! - [`rigor`]: validated steps, sets, Poincaré maps, closed orbits: enclosures that are theorems. The theorems: `proofs/`.
@@ -19,13 +19,14 @@
 //! - [`render`]: the only user of plotters: one drawing, three formats.
 //! - [`record`]: the only user of files: hashes, manifests, all-or-nothing writes.
 //!
-//! A figure goes spec -> [`paper::pipeline`] -> [`mod@job::simulate`] -> [`paper::drawing`] -> [`mod@render`] -> [`record`].
+//! A question and its answer: system + question -> [`job`] -> key -> store or computation -> answer (columns, facts, statistics, stop
+//! reason) -> view -> drawing -> bytes -> hash. A verdict is a job whose input is an answer; a figure is a view of answers.
 //!
 //! # Walls
 //!
-//! `tests/architecture.rs` holds them up: models know nothing of integration, integration nothing of observation; the
-//! renderer knows no model; only `record` touches files; only `num` names a math library; nothing but a progress display
-//! reads a clock; parallelism is over independent runs, collected in order.
+//! `tests/architecture.rs` holds them up: a room imports only rooms below it; only `paper` and what stands above it knows the paper; only `cli` knows
+//! flags and terminals; only `record` touches files; only `num` names a math library; only `render` names plotters; nothing but a progress display
+//! reads a clock; parallelism is over independent jobs, collected in order.
 //!
 //! # Why isn't there ...?
 //!
@@ -39,10 +40,10 @@
 //! # In five lines
 //!
 //! ```
-//! use twofold::job::{simulate::simulate, spec::*};
-//! use twofold::paper::Reading;
+//! use twofold::job::{Desk, Run, spec::*};
+//! use twofold::system::Caricature;
 //! let run = RunSpec {
-//!     system: Reading::Reconstructed.caricature().into(),
+//!     system: Caricature::with_reinjection(1e-1, 1e-5).into(),
 //!     switch: SwitchSpec::tanh(1e-3),
 //!     start: vec![0.2, 0.0, -1.0],
 //!     t_end: 20.0,
@@ -50,9 +51,9 @@
 //!     schedule: Default::default(),
 //!     observe: Observation::Section { coordinate: 1, value: 0.0 },
 //! };
-//! let recording = simulate(&run, &())?;
-//! assert!(recording.data.len() >= 3);
-//! # Ok::<(), twofold::job::simulate::RunError>(())
+//! let answer = Desk::quiet().ask(&Run(run))?;
+//! assert!(answer.table("section").is_some_and(|section| section.len() >= 3));
+//! # Ok::<(), twofold::job::JobError>(())
 //! ```
 #![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
 

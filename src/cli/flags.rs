@@ -1,6 +1,6 @@
 //! The flags that describe a run, and the table of which of them has an effect when.
 //!
-//! No flag is ever ignored silently: [`EFFECTS`] names for every flag the runs on which it has an effect, and on others it is refused. A
+//! No flag is ever ignored silently: `EFFECTS` names for every flag the runs on which it has an effect, and on others it is refused. A
 //! test tries every flag on every kind of run.
 
 use std::io;

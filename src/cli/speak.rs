@@ -18,7 +18,7 @@ pub fn print(text: &str) -> Result<(), CliError> {
 /// Prints a value as indented JSON to standard output.
 ///
 /// # Errors
-/// As [`print`].
+/// As [`print()`].
 pub fn print_json<T: serde::Serialize>(value: &T) -> Result<(), CliError> {
     let text = serde_json::to_string_pretty(value)
         .expect("what is printed is plain data: string keys, no failing serialisers");
@@ -33,7 +33,7 @@ pub fn print_json<T: serde::Serialize>(value: &T) -> Result<(), CliError> {
 /// Writes data to standard output.
 ///
 /// # Errors
-/// As [`print`].
+/// As [`print()`].
 pub fn print_bytes(bytes: &[u8]) -> Result<(), CliError> {
     let mut out = io::stdout().lock();
     match out.write_all(bytes).and_then(|()| out.flush()) {

@@ -1,6 +1,6 @@
 //! Answers as bytes, and back.
 //!
-//! [`bits`] is what is hashed and what the store keeps; [`csv`] and [`json`] are for people and other programs. All three are views
+//! [`bits`] is what is hashed and what the store keeps; [`csv()`] and [`json()`] are for people and other programs. All three are views
 //! of the same [`Table`]s, and all three are read back by this file, with units and metadata: a table that comes back is equal to the one
 //! that went out, to the last bit.
 

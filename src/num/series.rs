@@ -473,7 +473,7 @@ mod tests {
 
     #[test]
     fn logarithm_arc_tangent_error_function() {
-        let sign = |j: usize| if j % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = |j: usize| if j.is_multiple_of(2) { 1.0 } else { -1.0 };
         // x' = ln y, y' = 1 from y = 1: y ln y - y + 1; coefficients of t^j for j > 1: (-1)^j/(j (j - 1))
         first_is(&expand(20, [0.0, 1.0], |x| vec![x[1].ln(), Recorded::one()]), |j| match j {
             0 | 1 => 0.0,

@@ -411,8 +411,7 @@ impl<'a> Replay<'a> {
     fn node(&mut self, wanted: Node) -> Recorded {
         // Depth first without recursion: a node is written when its arguments have been.
         let mut open = vec![wanted];
-        loop {
-            let Some(&node) = open.last() else { break };
+        while let Some(&node) = open.last() {
             if self.values[node].is_none() {
                 let operation = self.tape.operations[node];
                 // The left argument first, as the equation was written.

@@ -60,10 +60,10 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     }
 }
 
-/// Tries whether [`write`] can write to `path`, and leaves everything as it is: for use before a long computation.
+/// Tries whether [`write()`] can write to `path`, and leaves everything as it is: for use before a long computation.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn try_place(path: &Path) -> Result<(), FileError> {
     match place(path).map_err(FileError::new("write", path))? {
         // Opening a pipe would wait for its reader.

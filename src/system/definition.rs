@@ -23,6 +23,9 @@
 //! Expressions are described in [`expression`](super::expression). Parameters are decimal numbers; digits beyond double precision, given
 //! as a string, are used by extended precision.
 
+// A diagnostic is made once, when a file is read; boxing it would show in every signature and save nothing.
+#![allow(clippy::result_large_err)]
+
 use std::collections::BTreeMap;
 use std::ops::Range;
 

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! **Order of operations decides bits**, so it is part of the format: exactly the operations that are written are done, in this
-//! order, each rounded once. Powers are products in the order of [`Elementary::power`](crate::num::Elementary::power), `abs(a)` is
+//! order, each rounded once. Powers are products in the order of [`Elementary::power`], `abs(a)` is
 //! a times its sign, `tan(a)` is sin(a)/cos(a). Terms without state variables are computed once, in double precision.
 
 use std::fmt;

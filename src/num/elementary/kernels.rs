@@ -117,7 +117,7 @@ pub(crate) fn tanh<T: Pointwise>(x: T) -> T {
 /// (Tang 1989). The power of two is applied in two factors, so that results may be subnormal or overflow.
 #[inline(always)]
 pub(crate) fn exp<T: Pointwise>(x: T) -> T {
-    const ONE_OVER_LN_2: f64 = 1.442_695_040_888_963_4;
+    const ONE_OVER_LN_2: f64 = std::f64::consts::LOG2_E;
     // ln 2 = L1 + L2: L1 has 40 bits, so that k L1 is exact for |k| <= 2048.
     const L1: f64 = 0.693_147_180_559_663;
     const L2: f64 = 2.823_529_056_303_157_7e-13;
