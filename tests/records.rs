@@ -42,6 +42,7 @@ fn bits<S: Bits, const N: usize>(x: SVector<S, N>) -> Vec<Vec<u64>> {
 }
 
 /// The point in every arithmetic: plain, extended, and each with derivatives.
+#[allow(clippy::type_complexity)] // said once, here
 fn everywhere(x: [f64; 3], check: &mut dyn FnMut(&dyn Fn(&mut dyn Checker))) {
     let plain = SVector::from(x);
     let extended = plain.map(|v| DoubleDouble::new(v, v * 3e-17));
