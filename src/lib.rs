@@ -61,6 +61,9 @@
 #[cfg(feature = "figures")]
 extern crate self as twofold;
 
+/// The linear algebra in public signatures: states are `nalgebra::SVector`.
+pub use nalgebra;
+
 pub mod analyse;
 #[cfg(feature = "cli")]
 pub mod cli;

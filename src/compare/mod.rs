@@ -3,6 +3,17 @@
 //! Hashes say *whether* two pictures differ; this says *how*. A picture of ours is mostly white, and what matters may be two dots:
 //! means over the whole picture would call a picture with both dots in the wrong place nearly perfect. So every mean is
 //! accompanied by the worst place.
+//!
+//! ```
+//! use twofold::compare::compare;
+//! use twofold::render::Pixels;
+//! let white = Pixels { width: 16, height: 16, rgba: vec![255; 4 * 16 * 16] };
+//! let mut dotted = white.clone();
+//! dotted.rgba[..3].fill(0);
+//! assert_eq!(compare(&white, &white)?.changed_pixels, 0);
+//! assert_eq!(compare(&white, &dotted)?.changed_pixels, 1);
+//! # Ok::<(), twofold::compare::SizesDiffer>(())
+//! ```
 
 use serde::Serialize;
 

@@ -3,6 +3,27 @@
 //! A method is a [`Stepper`]: it makes one accepted [`Step`] at a time, and every step carries its interpolant (dense
 //! output). The one driver loop, [`drive`], runs a stepper over a [`Course`] (an end time, a [`Schedule`] of restarts and kicks, bounds on steps) and hands each
 //! step to an [`Observer`]. What is made of the steps (a path, a section) is not decided here.
+//!
+//! ```
+//! use nalgebra::{SVector, vector};
+//! use twofold::integrate::{Course, Dopri5, Ignore, StopReason, Tolerance, drive};
+//! use twofold::num::Elementary;
+//! use twofold::system::VectorField;
+//!
+//! /// x'' = -x.
+//! struct Oscillator;
+//! impl VectorField<2> for Oscillator {
+//!     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+//!         vector![x[1], -x[0]]
+//!     }
+//! }
+//!
+//! let mut method = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
+//! let end = drive(&Oscillator, vector![1.0, 0.0], &Course::to(1.0), &mut method, &mut Ignore, &())?;
+//! assert_eq!(end.stop, StopReason::EndTime);
+//! assert!((end.x[0] - 0.540_302_305_868).abs() < 1e-8); // cos 1
+//! # Ok::<(), twofold::integrate::Failure>(())
+//! ```
 
 pub mod dopri5;
 pub mod driver;

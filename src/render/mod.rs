@@ -5,6 +5,16 @@
 //! so the three are the same picture. All text is set from fonts embedded in the library (`font`, `rich_text`). How things look is said in
 //! [`style`] alone.
 //!
+//! ```
+//! use twofold::render::sheet::{Axis, ColumnWidth, DotStyle, PlanePanel};
+//! use twofold::render::{Sheet, render};
+//! let chart = PlanePanel::new(Axis::linear("*x*", 0.0, 1.0), Axis::linear("*y*", 0.0, 1.0))
+//!     .dots(vec![[0.2, 0.3], [0.7, 0.8]], DotStyle::late());
+//! let rendered = render(&Sheet::new(ColumnWidth::Double, 1, "Two points").panel("(a)", "", chart))?;
+//! assert!(rendered.png.starts_with(b"\x89PNG") && rendered.pdf.starts_with(b"%PDF"));
+//! # Ok::<(), twofold::render::RenderError>(())
+//! ```
+//!
 //! Everything here is a pure function of the sheet: no file, clock, locale or machine property enters, and no platform logarithm or
 //! trigonometric function decides where ink lies.
 
