@@ -10,7 +10,7 @@
 //!
 //! // The passages of a smoothed two-fold through y = 0.
 //! let field = Smoothed { system: Caricature::with_reinjection(1e-1, 1e-5), transition: Transition::Tanh, eps: 1e-2 };
-//! let mut section = SectionRecorder::new(1, 0.0);
+//! let mut section = SectionRecorder::<3>::new(1, 0.0);
 //! let mut method = Dopri5::new(Tolerance { rtol: 1e-8, atol: 1e-8 });
 //! let _ = drive(&field, vector![0.2, 0.0, -1.0], &Course::to(20.0), &mut method, &mut section, &())?;
 //! assert!(section.crossings().windows(2).all(|pair| pair[0].t < pair[1].t && pair[0].direction != pair[1].direction));
