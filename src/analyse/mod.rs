@@ -3,17 +3,27 @@
 //! Everything here looks at accepted steps and their interpolants from outside; no solver knows that it is observed.
 //!
 //! ```
-//! use nalgebra::vector;
-//! use twofold::analyse::SectionRecorder;
+//! use nalgebra::{SVector, vector};
+//! use twofold::analyse::{Direction, SectionRecorder};
 //! use twofold::integrate::{Course, Dopri5, Tolerance, drive};
-//! use twofold::system::{Caricature, Smoothed, Transition};
+//! use twofold::num::Elementary;
+//! use twofold::system::VectorField;
 //!
-//! // The passages of a smoothed two-fold through y = 0.
-//! let field = Smoothed { system: Caricature::with_reinjection(1e-1, 1e-5), transition: Transition::Tanh, eps: 1e-2 };
-//! let mut section = SectionRecorder::<3>::new(1, 0.0);
-//! let mut method = Dopri5::new(Tolerance { rtol: 1e-8, atol: 1e-8 });
-//! let _ = drive(&field, vector![0.2, 0.0, -1.0], &Course::to(20.0), &mut method, &mut section, &())?;
-//! assert!(section.crossings().windows(2).all(|pair| pair[0].t < pair[1].t && pair[0].direction != pair[1].direction));
+//! /// x'' = -x.
+//! struct Oscillator;
+//! impl VectorField<2> for Oscillator {
+//!     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+//!         vector![x[1], -x[0]]
+//!     }
+//! }
+//!
+//! // Its passages through x = 0: downwards at pi/2, upwards at 3 pi/2.
+//! let mut section = SectionRecorder::<2>::new(0, 0.0);
+//! let mut method = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
+//! let _ = drive(&Oscillator, vector![1.0, 0.0], &Course::to(6.0), &mut method, &mut section, &())?;
+//! let [down, up] = section.crossings() else { panic!("two passages") };
+//! assert_eq!((down.direction, up.direction), (Direction::Down, Direction::Up));
+//! assert!((up.t - 4.712_388_98).abs() < 1e-7);
 //! # Ok::<(), twofold::integrate::Failure>(())
 //! ```
 
