@@ -1,8 +1,8 @@
 //! Figures as data.
 //!
 //! A [`Figure`] is a list of pictures, a picture a list of panels, a panel a question ([`RunSpec`]). The way of every
-//! figure is the same: specs -> [`pipeline`] (independent runs side by side, collected in order) -> [`simulate`](mod@crate::job::simulate) (pure)
-//! -> [`drawing`] -> bytes -> files. The figures themselves stand in `figures/figN/main.rs`: every number of the
+//! figure is the same: questions -> [`pipeline`] (asked of a [`Desk`](crate::job::Desk) side by side, each computed once) -> answers
+//! -> [`drawing`] -> bytes -> files. The figures themselves stand in `figures/NAME/figure.rs`: every number of the
 //! paper's caption, and nothing else.
 
 pub mod claim;
