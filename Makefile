@@ -7,7 +7,7 @@ PROOFS  := printed-cycle coexistence sensitivity crossings
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help figures report check bless test elementary rigor-test proofs browser-test lint bench torture ci clean
+.PHONY: help figures report check bless test elementary rigor-test census proofs browser-test lint bench torture ci clean
 
 help: ## this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -34,6 +34,18 @@ rigor-test: ## millions of interval operations against exact integer arithmetic 
 
 elementary: ## tanh and exp against double-double arithmetic: 2^24 and 2^30 points each (half an hour)
 	@$(CARGO) test --release --locked --lib num::elementary -- --include-ignored --nocapture
+
+# The census' sweeps: what all have in common, and 300 starts within 1e-9 of the paper's.
+CENSUS := sweep --t-end 2e5 --threads $(or $(THREADS),0) --resume --recheck 6
+STARTS := --over shift.x=-5e-10..5e-10 --over shift.y=-5e-10..5e-10 --over shift.z=-5e-10..5e-10
+READINGS := --over params.alpha=1e-3,0.1
+IN := --out figures/census
+census: ## go on with the census and the audit (hours; stop it with Ctrl-C, and go on later): figures/census, figures/audit, figures/basin
+	@$(CARGO) build --release --locked --bin twofold
+	@$(RUN) --bin twofold -- $(CENSUS) $(READINGS) --over interval=20,40,100 $(STARTS) --random 300 $(IN)/fig7.parquet
+	@$(RUN) --bin twofold -- $(CENSUS) $(READINGS) --restart 100 --over sigma=0.01,0.1,0.13 $(STARTS) --random 300 $(IN)/fig8.parquet
+	@$(RUN) --bin twofold -- $(CENSUS) $(READINGS) --restart 100 --over method=dopri5,radau5 $(STARTS) --random 100 $(IN)/methods.parquet
+	@$(RUN) --bin twofold -- $(CENSUS) $(READINGS) --restart 100 --method dopri5 --over tolerance=1e-6,1e-8,1e-10,1e-12 $(STARTS) --random 100 $(IN)/tolerances.parquet
 
 proofs: ## prove the theorems anew (proofs/README.md), write their certificates and check those (minutes)
 	@set -e; for p in $(PROOFS); do $(RUN) --package twofold-proofs --bin $$p; done

@@ -12,6 +12,7 @@ use super::spec::{Observation, RunSpec, SwitchSpec};
 use crate::analyse::attractor::{self, Evidence, SectionPoint, Thresholds, Verdict, classify};
 use crate::analyse::lyapunov::{self, Exponent};
 use crate::analyse::{Crossing, Direction};
+use crate::integrate::filippov::ExitRule;
 use crate::integrate::{Schedule, Watch};
 
 /// What a run settles on, judged from its section: with the largest exponent where motion is not captured by a cycle, and beside its noise-free
@@ -78,22 +79,30 @@ const LENGTHS: Lengths = Lengths { settling: 1000.0, structure_points: 2000, hys
 
 impl Classification {
     fn evidence(&self, desk: &Desk<'_>) -> Result<Evidence, JobError> {
+        let recording = Recording::of_answer(&self.run, &*desk.ask(&Run(self.run.clone()))?)?;
+        self.evidence_of(desk, recording)
+    }
+
+    /// The evidence that a recording of the run gives.
+    pub(super) fn evidence_of(&self, desk: &Desk<'_>, recording: Recording) -> Result<Evidence, JobError> {
         let run = &self.run;
-        let (recording, section) = section(desk, run)?;
+        let (recording, section) = section_of(run, recording)?;
+        let random_exits = matches!(run.switch, SwitchSpec::Filippov { exit: ExitRule::Random { .. }, .. });
         let mut question = attractor::Question {
             t_end: Some(run.t_end),
             shown_from: 0.5 * run.t_end,
-            kicked: run.schedule.kick.is_some(),
+            kicked: run.schedule.kick.is_some() || random_exits,
             lyapunov: None,
             reference: None,
         };
         if question.kicked {
-            let reference = self.noise_free_structure(desk)?;
-            question.reference = Some(&reference);
+            // Without its chance a random exit rule is no rule: there is nothing to compare with.
+            let reference = if random_exits { None } else { Some(self.noise_free_structure(desk)?) };
+            question.reference = reference.as_deref();
             return Ok(classify(&section, &question, &self.thresholds));
         }
         let evidence = classify(&section, &question, &self.thresholds);
-        if let Verdict::Chaotic { .. } = evidence.verdict {
+        if let Verdict::Chaotic { .. } | Verdict::Undecided { .. } = evidence.verdict {
             question.lyapunov = self.exponent(desk, recording.x)?;
             return Ok(classify(&section, &question, &self.thresholds));
         }
@@ -122,7 +131,8 @@ impl Classification {
     fn noise_free_structure(&self, desk: &Desk<'_>) -> Result<Vec<SectionPoint>, JobError> {
         let run = &self.run;
         let twin = RunSpec { schedule: Schedule { kick: None, ..run.schedule }, ..run.clone() };
-        let (_, section) = section(desk, &twin)?;
+        let recording = Recording::of_answer(&twin, &*desk.ask(&Run(twin.clone()))?)?;
+        let (_, section) = section_of(&twin, recording)?;
         let question = attractor::Question {
             t_end: Some(run.t_end),
             shown_from: 0.5 * run.t_end,
@@ -143,14 +153,14 @@ impl Classification {
     }
 }
 
-/// The run's recording and its section as the classifier takes it.
-fn section(desk: &Desk<'_>, run: &RunSpec) -> Result<(Recording, Vec<SectionPoint>), JobError> {
+/// A run's recording, and its section as the classifier takes it.
+fn section_of(run: &RunSpec, recording: Recording) -> Result<(Recording, Vec<SectionPoint>), JobError> {
     if run.system.dimension() != 3 {
         return Err(JobError::Other(
             "a run is classified from the plane of a section, so its system must have three states".into(),
         ));
     }
-    let recording = Recording::of_answer(run, &*desk.ask(&Run(run.clone()))?)?.whole()?;
+    let recording = recording.whole()?;
     let Data::Section(crossings) = &recording.data else {
         return Err(JobError::Other("a run is classified from its section; record one with --section".into()));
     };

@@ -5,7 +5,9 @@
 //! -> [`drawing`] -> bytes -> files. The figures themselves stand in `figures/NAME/figure.rs`: every number of the
 //! paper's caption, and nothing else.
 
+pub mod census;
 pub mod claim;
+pub mod claims;
 pub mod drawing;
 pub mod figures;
 pub mod pipeline;

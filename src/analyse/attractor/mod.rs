@@ -9,7 +9,8 @@
 //!    rate of approach. A spread-out end must also pass the 0-1 test (Gottwald & Melbourne 2009).
 //! 3. Otherwise it is irregular or a ring that does not surround its mean: the 0-1 test, the divergence of nearest neighbours
 //!    (Rosenstein et al. 1993) and, when given, the largest exponent from the variational equation
-//!    ([`lyapunov`](super::lyapunov)) decide by majority.
+//!    ([`lyapunov`](super::lyapunov)) decide by majority; a tie, or an exponent consistent with zero where the points look irregular, is
+//!    [`Verdict::Undecided`].
 //!
 //! Every limit is in [`Thresholds`].
 //!
@@ -177,22 +178,24 @@ fn deterministic(split: &Split, question: &Question<'_>, th: &Thresholds, eviden
     if evidence.divergence.is_some_and(|d| d.skill < th.skill) {
         return Verdict::Noisy { share_of_structure: None, around: None };
     }
+    let exponent = question.lyapunov.map(|l| l.value > th.exponent_significance * l.standard_error);
     let votes = [
         evidence.zero_one.map(|k| k > th.zero_one),
         evidence.divergence.map(|d| d.per_return > th.divergence),
-        question.lyapunov.map(|l| l.value > th.exponent_significance * l.standard_error),
+        exponent,
     ];
     let yes = votes.iter().filter(|v| **v == Some(true)).count();
     let no = votes.iter().filter(|v| **v == Some(false)).count();
     if yes + no == 0 {
-        return Verdict::TooFew { points: points.len() };
-    }
-    // A tie goes to chaos: regular motion that is not a ring around its mean is the rarer case.
-    if yes >= no {
+        Verdict::TooFew { points: points.len() }
+    } else if yes > no && exponent != Some(false) {
         Verdict::Chaotic { lyapunov: question.lyapunov, bands: occupancy::bands(&points[points.len() / 2..], th) }
-    } else {
+    } else if no > yes {
         let whole = Captured { from: 0, blocks: 0, settled: None };
         Verdict::QuasiPeriodic(describe(&turns, &whole, split, th))
+    } else {
+        // A tie, or points that look irregular beside an exponent that is not above zero: neither is claimed.
+        Verdict::Undecided { lyapunov: question.lyapunov }
     }
 }
 

@@ -69,6 +69,11 @@ pub enum Verdict {
         /// Number of separate pieces visited in turn.
         bands: usize,
     },
+    /// What tells regular from irregular motion contradicts itself, or the largest exponent is consistent with zero.
+    Undecided {
+        /// The largest exponent given with the question, with its error.
+        lyapunov: Option<Exponent>,
+    },
     /// Random.
     Noisy {
         /// How much of the reference's fine structure is left, in [0, 1]: see [`Overlap`](super::Overlap), which holds the
@@ -97,6 +102,7 @@ impl Verdict {
             Self::Spiralling(_) => "spiralling",
             Self::QuasiPeriodic(_) => "quasi-periodic",
             Self::Chaotic { .. } => "chaotic",
+            Self::Undecided { .. } => "undecided",
             Self::Noisy { .. } => "noisy",
             Self::Escaped { .. } => "escaped",
             Self::TooFew { .. } => "too-few",
@@ -146,6 +152,10 @@ impl std::fmt::Display for Verdict {
                 write!(f, "chaotic, largest exponent {:.4} +- {:.4}", l.value, l.standard_error)
             }
             Self::Chaotic { lyapunov: None, .. } => write!(f, "chaotic"),
+            Self::Undecided { lyapunov: Some(l) } => {
+                write!(f, "undecided, largest exponent {:.4} +- {:.4}", l.value, l.standard_error)
+            }
+            Self::Undecided { lyapunov: None } => write!(f, "undecided"),
             Self::Noisy { share_of_structure, around } => {
                 write!(f, "noisy")?;
                 if let Some(c) = around {
