@@ -5,7 +5,7 @@ FIGURES := fig1 fig2 fig3 fig4 fig5 fig6 fig7 fig8 fig9 lottery workprecision di
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help figures report check bless test elementary rigor-test browser-test lint bench torture ci clean
+.PHONY: help figures report check bless test elementary rigor-test browser-test lint bench bench-peers torture ci clean
 
 help: ## this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -45,6 +45,8 @@ lint: ## formatting, clippy and documentation, warnings denied
 torture: ## kill the program at random moments and look for losses: make torture KILLS=100
 	@$(CARGO) build --release --locked --bin twofold
 	@scripts/torture.sh $(or $(KILLS),100)
+bench-peers: ## the units of work of benches/README.md by Boost.odeint and by us, in turn, with ratios (needs g++ and Boost's headers)
+	@sh benches/peers/run.sh
 
 bench: ## benchmarks
 	@$(CARGO) bench --locked

@@ -13,7 +13,7 @@ pub(crate) mod kernels;
 
 /// Hyperbolic tangent. Odd to the bit; exactly +-1 from 19.1 on; NaN gives NaN.
 ///
-/// Error at most 0.54 units in the last place, measured on 2^30 points (`make elementary`).
+/// Largest error found: 0.531 units in the last place, on 2^24 points (`make elementary`, which can also go to 2^30).
 #[inline]
 pub fn tanh(x: f64) -> f64 {
     // The kernel gives the same; this only saves its work, and outside the layer there is no other.
@@ -28,7 +28,8 @@ fn tanh_inside(x: f64) -> f64 {
 
 /// Exponential, base e.
 ///
-/// Error at most 0.70 units in the last place where the result is a normal number, measured on 2^30 points (`make elementary`); at most one in a subnormal one.
+/// Largest error found: EXPERR units in the last place where the result is a normal number, on 2^24 points (`make elementary`, which
+/// can also go to 2^30); at most one in a subnormal one.
 #[inline]
 pub fn exp(x: f64) -> f64 {
     kernels::exp(x)
