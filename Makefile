@@ -45,6 +45,7 @@ lint: ## formatting, clippy and documentation, warnings denied
 torture: ## kill the program at random moments and look for losses: make torture KILLS=100
 	@$(CARGO) build --release --locked --bin twofold
 	@scripts/torture.sh $(or $(KILLS),100)
+
 bench-peers: ## the units of work of benches/README.md by Boost.odeint and by us, in turn, with ratios (needs g++ and Boost's headers)
 	@sh benches/peers/run.sh
 

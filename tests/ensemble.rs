@@ -2,7 +2,7 @@
 
 use nalgebra::{SVector, vector};
 use twofold::integrate::ensemble::{End, Settings, ensemble, in_lanes};
-use twofold::integrate::{Course, Dopri5, Failure, Ignore, Schedule, StepCap, Tolerance, drive};
+use twofold::integrate::{Course, Dopri5, Failure, Ignore, StepCap, Tolerance, drive};
 use twofold::system::{Caricature, Smoothed, Transition};
 
 fn field() -> Smoothed<Caricature> {
@@ -26,10 +26,9 @@ fn starts() -> Vec<SVector<f64, 3>> {
 
 fn alone(x0: SVector<f64, 3>, settings: &Settings) -> Result<End<3>, Failure> {
     let course = Course {
-        t_end: settings.t_end,
-        schedule: Schedule::default(),
         step_cap: StepCap::Absolute(settings.max_step),
         max_steps: settings.max_steps,
+        ..Course::to(settings.t_end)
     };
     let end = drive(&field(), x0, &course, &mut Dopri5::new(settings.tolerance), &mut Ignore, &())?.within_budget()?;
     Ok(End { x: end.x, statistics: end.statistics })

