@@ -216,6 +216,9 @@ impl fmt::Display for Axis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}=", self.coordinate)?;
         match &self.values {
+            Values::Numbers(v) if matches!(self.coordinate, Coordinate::Seed | Coordinate::Stream) => {
+                f.write_str(&v.iter().map(|x| format!("{x:.0}")).collect::<Vec<_>>().join(","))
+            }
             Values::Numbers(v) => f.write_str(&v.iter().map(|x| format!("{x:?}")).collect::<Vec<_>>().join(",")),
             Values::Names(v) => f.write_str(&v.join(",")),
             Values::Whole { from, to } => write!(f, "{from}..{to}"),
