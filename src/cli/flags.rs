@@ -342,12 +342,15 @@ impl RunFlags {
         let named = |name: &str| parameter(name).then(|| format!("params.{name}"));
         let starts = axes.iter().filter(|axis| matches!(axis.coordinate, Coordinate::Start(_))).count();
         let all_started = || self.start.as_ref().is_some_and(|s| s.len() == starts).then(|| "start.NAME".to_owned());
+        // A reading is of use where it gives a number in which readings differ.
         let both = || {
-            let gives = |flag: bool, name: &str| flag || self.sets(name) || parameter(name);
-            (gives(self.alpha.is_some(), "alpha")
-                && gives(self.beta.is_some(), "beta")
-                && (parameter("alpha") || parameter("beta")))
-            .then(|| "params.alpha and params.beta".to_owned())
+            let values = paper::Reading::ALL.map(|r| [r.caricature().alpha, r.caricature().beta]);
+            let gives = |i: usize, flag: bool, name: &str| {
+                flag || self.sets(name) || parameter(name) || values.iter().all(|v| v[i] == values[0][i])
+            };
+            let replaced = parameter("alpha") || parameter("beta");
+            (replaced && gives(0, self.alpha.is_some(), "alpha") && gives(1, self.beta.is_some(), "beta"))
+                .then(|| "params.alpha and params.beta".to_owned())
         };
         let set = || {
             let names = self.set.iter().filter_map(|text| text.split('=').next());
