@@ -76,9 +76,8 @@ pub enum Verdict {
     },
     /// Random.
     Noisy {
-        /// How much of the reference's fine structure is left, in [0, 1]: see [`Overlap`](super::Overlap), which holds the
-        /// value before it was cut to that range. Absent without a reference.
-        share_of_structure: Option<f64>,
+        /// How much emptier than the sea the islands of noise-free runs still are; absent where there is nothing to compare with.
+        contrast: Option<super::Contrast>,
         /// The closed orbit around which the noise holds the run in small clouds, if it does.
         around: Option<Cycle>,
     },
@@ -156,13 +155,20 @@ impl std::fmt::Display for Verdict {
                 write!(f, "undecided, largest exponent {:.4} +- {:.4}", l.value, l.standard_error)
             }
             Self::Undecided { lyapunov: None } => write!(f, "undecided"),
-            Self::Noisy { share_of_structure, around } => {
+            Self::Noisy { contrast, around } => {
                 write!(f, "noisy")?;
                 if let Some(c) = around {
                     write!(f, ", in clouds of radius {:.1e} around period {}", c.radius, c.period)?;
                 }
-                match share_of_structure {
-                    Some(s) => write!(f, ", {:.0} % of the structure left", 100.0 * s),
+                match contrast {
+                    Some(c) => {
+                        let [value, low, high, free] =
+                            [c.value, c.interval[0], c.interval[1], c.free[0]].map(|v| 100.0 * v);
+                        write!(
+                            f,
+                            ", islands {value:.0} % [{low:.0}, {high:.0}] emptier than the sea, {free:.0} % or more without noise"
+                        )
+                    }
                     None => Ok(()),
                 }
             }
@@ -200,8 +206,6 @@ pub struct Evidence {
     pub divergence: Option<super::Divergence>,
     /// The largest exponent given with the question.
     pub lyapunov: Option<Exponent>,
-    /// Comparison with the reference given with the question.
-    pub overlap: Option<super::Overlap>,
     /// The limits used.
     pub thresholds: Thresholds,
 }
