@@ -5,12 +5,11 @@ use serde_json::{Value, json};
 
 use super::far;
 use crate::analyse::attractor::{Evidence, Verdict};
-use crate::integrate::{StopReason, Watch};
-use crate::job::answer::Answer;
+use crate::integrate::Watch;
+use crate::job::answer::{Answer, Stop};
 use crate::job::classification::Classification;
 use crate::job::desk::Desk;
 use crate::job::question::{JobError, Question};
-use crate::job::recording::Recording;
 use crate::job::run::Run;
 use crate::job::simulate::simulate_until;
 use crate::job::spec::SwitchSpec;
@@ -54,7 +53,7 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    fn of(evidence: &Evidence, recording: &Recording) -> Self {
+    fn of(evidence: &Evidence, answer: &Answer) -> Result<Self, JobError> {
         let cycle = evidence.verdict.cycle();
         let approach = cycle.and_then(|c| c.approach);
         let word = match &evidence.verdict {
@@ -67,7 +66,7 @@ impl Outcome {
             Verdict::Noisy { around: Some(c), .. } => format!("noisy-around-period-{}", c.period),
             other => other.name().to_owned(),
         };
-        Self {
+        Ok(Self {
             word,
             period: cycle.map_or(0, |c| c.period as u64),
             captured_at: cycle.map(|c| c.captured_at),
@@ -79,16 +78,17 @@ impl Outcome {
             exponent: evidence.lyapunov.map(|l| l.value),
             exponent_error: evidence.lyapunov.map(|l| l.standard_error),
             crossings: evidence.crossings as u64,
-            end: recording.t,
-            steps: recording.statistics.steps,
-        }
+            end: answer.fact("t")?,
+            steps: steps(answer),
+        })
     }
 
-    fn far(recording: &Recording) -> Self {
-        Self {
+    fn far(answer: &Answer) -> Result<Self, JobError> {
+        let end: f64 = answer.fact("t")?;
+        Ok(Self {
             word: "far".into(),
             period: 0,
-            captured_at: Some(recording.t),
+            captured_at: Some(end),
             settled_at: None,
             radius: None,
             rate: None,
@@ -96,11 +96,15 @@ impl Outcome {
             turn: None,
             exponent: None,
             exponent_error: None,
-            crossings: recording.data.len() as u64,
-            end: recording.t,
-            steps: recording.statistics.steps,
-        }
+            crossings: answer.rows() as u64,
+            end,
+            steps: steps(answer),
+        })
     }
+}
+
+fn steps(answer: &Answer) -> u64 {
+    answer.statistics.as_ref().map_or(0, |s| s.steps)
 }
 
 impl Question for Fate {
@@ -127,19 +131,21 @@ impl Question for Fate {
     fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
         let run = &self.0.run;
         let is_far = far::corner(run).map(|c| move |x: &[f64]| x[1] > c && x[2] > c);
-        let recording = match (&is_far, run.switch) {
+        let answer = match (&is_far, run.switch) {
             // Filippov motion has no layer to be stiff in: it gets to its end.
             (Some(is_far), SwitchSpec::Smoothed { .. } | SwitchSpec::Hysteretic { .. }) => {
-                simulate_until(run, is_far, watch)?
+                simulate_until(run, is_far, watch)?.to_answer(run)
             }
-            _ => Recording::of_answer(run, &Run(run.clone()).compute(desk, watch)?)?,
+            _ => Run(run.clone()).compute(desk, watch)?,
+        };
+        if answer.stop == Stop::Interrupted {
+            return Err(JobError::Interrupted);
         }
-        .whole()?;
-        let outcome = if recording.stop == StopReason::Observer || is_far.is_some_and(|far| far(&recording.x)) {
-            Outcome::far(&recording)
+        let state: Vec<f64> = answer.fact("state")?;
+        let outcome = if is_far.is_some_and(|far| far(&state)) {
+            Outcome::far(&answer)?
         } else {
-            let evidence = self.0.evidence_of(desk, recording.clone())?;
-            Outcome::of(&evidence, &recording)
+            Outcome::of(&self.0.evidence_of(desk, &answer)?, &answer)?
         };
         Ok(Answer::of_tables(Vec::new()).with_fact("outcome", &outcome))
     }
