@@ -23,13 +23,12 @@ pub fn panels() -> PyResult<String> {
     let mut list = Vec::new();
     for figure in figures::all() {
         for picture in &figure.pictures {
-            let reference =
-                manifests.iter().find(|m| m.figure == figure.id).and_then(|m| m.picture(&picture.name));
+            let reference = manifests.iter().find(|m| m.figure == figure.id).and_then(|m| m.picture(&picture.name));
             for panel in &picture.panels {
                 let entry = reference.and_then(|p| p.panels.iter().find(|e| e.label == panel.label));
-                let verdict = entry.and_then(|e| e.verdict.as_ref()).map(|v| {
-                    json!({ "claim": v.claim, "found": v.found, "agrees": v.agrees })
-                });
+                let verdict = entry
+                    .and_then(|e| e.verdict.as_ref())
+                    .map(|v| json!({ "claim": v.claim, "found": v.found, "agrees": v.agrees }));
                 let value: Value = json!({
                     "figure": figure.id,
                     "title": figure.title,

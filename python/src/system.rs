@@ -62,7 +62,9 @@ impl Definition {
                 })?
             } else {
                 let number = value.extract::<f64>();
-                number.map_err(|_| PyTypeError::new_err(format!("{name}: give a number, or its digits as a string")))?.into()
+                number
+                    .map_err(|_| PyTypeError::new_err(format!("{name}: give a number, or its digits as a string")))?
+                    .into()
             };
             values.push((name.as_str(), value));
         }

@@ -5,6 +5,21 @@ from typing import Any, Callable, Dict, Final, List, Optional, Sequence, Tuple, 
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "classify",
+    "run",
+    "sweep",
+    "written",
+    "panels",
+    "verdict_table",
+    "Definition",
+    "builtin_names",
+    "VERSION",
+    "NUMERICS",
+    "DEFAULT_TOLERANCE",
+    "DEFAULT_MAX_STEPS",
+]
+
 VERSION: Final[str]
 NUMERICS: Final[str]
 DEFAULT_TOLERANCE: Final[float]

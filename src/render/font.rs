@@ -239,7 +239,9 @@ mod tests {
 
     #[test]
     fn every_glyph_can_be_drawn() {
-        for (face, least) in [(FontFace::Regular, 2000), (FontFace::Italic, 2000), (FontFace::Bold, 2000), (FontFace::BoldItalic, 1500)] {
+        for (face, least) in
+            [(FontFace::Regular, 2000), (FontFace::Italic, 2000), (FontFace::Bold, 2000), (FontFace::BoldItalic, 1500)]
+        {
             let mut drawn = 0;
             for (id, outline) in loaded(face).outlines.iter() {
                 let mut collector = Collector { scale: 1.0, last: [0.0; 2], strokes: Vec::new() };
