@@ -28,8 +28,10 @@
 //! ```
 
 pub mod attractor;
+pub mod branch;
 pub mod digits;
 pub mod divider;
+pub mod filippov_return;
 pub mod floquet;
 pub mod growth;
 pub mod limit;
@@ -42,6 +44,6 @@ pub mod tangent;
 
 pub mod work_precision;
 
-pub use motion::{Motion, MotionRecorder};
-pub use path::{PathRecorder, Sample};
+pub use motion::{Motion, MotionRecorder, TimedMotion};
+pub use path::{PathRecorder, Sample, TimesRecorder};
 pub use section::{Crossing, Direction, SectionRecorder};

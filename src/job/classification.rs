@@ -162,7 +162,7 @@ fn section(desk: &Desk<'_>, run: &RunSpec) -> Result<(Recording, Vec<SectionPoin
 pub fn points(run: &RunSpec, crossings: &[Crossing]) -> Vec<SectionPoint> {
     let coordinate = match run.observe {
         Observation::Section { coordinate, .. } => coordinate,
-        Observation::Path { .. } => 1,
+        Observation::Path { .. } | Observation::Times { .. } => 1,
     };
     let kept: Vec<usize> = (0..3).filter(|i| *i != coordinate).collect();
     crossings

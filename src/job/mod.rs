@@ -9,6 +9,7 @@
 //! | [`Run`] | what happens from a start: a path, a section, a Filippov motion, a funnel of futures |
 //! | [`Classification`] | what a run settles on |
 //! | [`LargestExponent`] | how fast neighbours part |
+//! | [`ClosedOrbit`] | where an orbit closes up, its stability, and its branch along a parameter |
 //! | [`PathComparison`] | how alike two paths are |
 //! | [`MethodDigits`] | how many digits of an orbit methods get right |
 //! | [`DisturbanceGrowth`] | what a visit to a two-fold makes of a small disturbance |
@@ -44,11 +45,13 @@ pub mod encode;
 pub mod exponent;
 pub mod growth;
 pub mod limit;
+pub mod orbit;
 #[cfg(feature = "parquet")]
 pub mod parquet;
 pub mod question;
 pub mod recording;
 pub mod run;
+pub mod scan;
 pub mod simulate;
 pub mod spec;
 pub mod store;
@@ -62,6 +65,7 @@ pub use digits::MethodDigits;
 pub use exponent::LargestExponent;
 pub use growth::DisturbanceGrowth;
 pub use limit::{AfterVisit, SmoothingLimit};
+pub use orbit::ClosedOrbit;
 pub use question::{AnyQuestion, JobError, Question};
 pub use recording::{Data, Recording};
 pub use run::Run;

@@ -6,12 +6,15 @@ use super::answer::{Answer, Stop};
 use super::question::JobError;
 use super::recording::{Data, Future, Recording};
 use super::spec::{FunnelSpec, MethodSpec, Observation, RunSpec, SpecError, SwitchSpec};
+use super::table::Table;
 use crate::analyse::path::MOST_POINTS;
-use crate::analyse::{Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder};
+use crate::analyse::{Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder, TimedMotion, TimesRecorder};
 use crate::integrate::filippov::{
     self, AllModes, ExitRule, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent, SlidingFlow,
 };
-use crate::integrate::{Course, Flow, Observer, Step, Stepper, StopReason, Summary, Watch, WithStepper, drive};
+use crate::integrate::{
+    Course, Flow, Observer, Statistics, Step, Stepper, StopReason, Summary, Watch, WithStepper, drive,
+};
 use crate::system::{Bound, Compiled, Field, Hysteretic, PiecewiseSmooth, Smoothed, VectorField};
 
 /// Computes a run of a system with three states.
@@ -24,7 +27,7 @@ pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, JobError
     if spec.system.dimension() != 3 {
         return Err(too_many_states(spec, "three states are looked at here"));
     }
-    let recording = three_states(spec, watch)?;
+    let recording = three_states(spec, &mut None, watch)?;
     if recording.stop == StopReason::Observer {
         return Err(full(recording.t));
     }
@@ -39,17 +42,173 @@ pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, JobError
 pub fn answer(spec: &RunSpec, watch: &dyn Watch) -> Result<Answer, JobError> {
     spec.validate()?;
     let answer = match spec.system.dimension() {
-        1 => record::<1, 2>(spec, watch)?.to_answer(spec),
-        2 => record::<2, 3>(spec, watch)?.to_answer(spec),
-        3 => three_states(spec, watch)?.to_answer(spec),
-        4 => record::<4, 5>(spec, watch)?.to_answer(spec),
-        5 => record::<5, 6>(spec, watch)?.to_answer(spec),
-        6 => record::<6, 7>(spec, watch)?.to_answer(spec),
-        7 => record::<7, 8>(spec, watch)?.to_answer(spec),
-        8 => record::<8, 9>(spec, watch)?.to_answer(spec),
-        _ => return Err(too_many_states(spec, "runs are computed with up to eight states")),
+        1 => record::<1, 2>(spec, &mut None, watch)?.to_answer(spec),
+        2 => record::<2, 3>(spec, &mut None, watch)?.to_answer(spec),
+        3 => three_states(spec, &mut None, watch)?.to_answer(spec),
+        4 => record::<4, 5>(spec, &mut None, watch)?.to_answer(spec),
+        5 => record::<5, 6>(spec, &mut None, watch)?.to_answer(spec),
+        6 => record::<6, 7>(spec, &mut None, watch)?.to_answer(spec),
+        7 => record::<7, 8>(spec, &mut None, watch)?.to_answer(spec),
+        8 => record::<8, 9>(spec, &mut None, watch)?.to_answer(spec),
+        _ => return Err(too_many_states(spec, UP_TO_EIGHT)),
     };
     if answer.stop == Stop::Found { Err(full(answer.fact("t")?)) } else { Ok(answer) }
+}
+
+const UP_TO_EIGHT: &str = "runs are computed with up to eight states";
+
+/// How a streamed run ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Streamed {
+    /// Final time.
+    pub t: f64,
+    /// Rows given away.
+    pub rows: u64,
+    /// Work done.
+    pub statistics: Statistics,
+    /// Why it ended; [`Stop::Found`] where `rows` wanted no more.
+    pub stop: Stop,
+}
+
+/// Computes a run and gives its first table away in parts, in order and without gaps: together they are the table of [`answer`]. Memory
+/// stays flat however long the run is. `rows` says whether it wants more.
+///
+/// # Errors
+///
+/// If the spec is wrong or a funnel (whose members are computed one after the other), or the orbit cannot be followed.
+pub fn stream(spec: &RunSpec, rows: &mut dyn FnMut(&Table) -> bool, watch: &dyn Watch) -> Result<Streamed, JobError> {
+    spec.validate()?;
+    if let SwitchSpec::Filippov { funnel: Some(_), .. } = spec.switch {
+        return Err(JobError::Other("a funnel is not given away in parts".into()));
+    }
+    match spec.system.dimension() {
+        1 => streamed(spec, rows, |sink| record::<1, 2>(spec, sink, watch)),
+        2 => streamed(spec, rows, |sink| record::<2, 3>(spec, sink, watch)),
+        3 => streamed(spec, rows, |sink| three_states(spec, sink, watch)),
+        4 => streamed(spec, rows, |sink| record::<4, 5>(spec, sink, watch)),
+        5 => streamed(spec, rows, |sink| record::<5, 6>(spec, sink, watch)),
+        6 => streamed(spec, rows, |sink| record::<6, 7>(spec, sink, watch)),
+        7 => streamed(spec, rows, |sink| record::<7, 8>(spec, sink, watch)),
+        8 => streamed(spec, rows, |sink| record::<8, 9>(spec, sink, watch)),
+        _ => Err(too_many_states(spec, UP_TO_EIGHT)),
+    }
+}
+
+/// Takes parts of a recording away while it grows; says whether more is wanted. Without one everything is kept.
+type Sink<'a, const D: usize> = Option<&'a mut dyn FnMut(Data<D>) -> bool>;
+
+fn streamed<const D: usize>(
+    spec: &RunSpec,
+    rows: &mut dyn FnMut(&Table) -> bool,
+    run: impl FnOnce(&mut Sink<'_, D>) -> Result<Recording<D>, JobError>,
+) -> Result<Streamed, JobError> {
+    let (mut first_piece, mut count) = (0, 0);
+    let mut give = |data: Data<D>| {
+        let more = Recording::part(spec, &data, first_piece).is_none_or(|table| {
+            count += table.len() as u64;
+            rows(&table)
+        });
+        if let Data::Motion(motion) = &data {
+            // The last piece goes on.
+            first_piece += motion.pieces.len().saturating_sub(1);
+        }
+        more
+    };
+    let end = run(&mut Some(&mut give))?;
+    let wanted = give(end.data);
+    let stop = if wanted { end.stop.into() } else { Stop::Found };
+    Ok(Streamed { t: end.t, rows: count, statistics: end.statistics, stop })
+}
+
+/// Points that are kept before they are given away.
+const PART: usize = 8192;
+
+/// A recorder whose points are given away.
+struct Draining<'a, 'b, R, const D: usize> {
+    recorder: R,
+    sink: &'a mut Sink<'b, D>,
+}
+
+/// Something that records and can forget.
+trait Recorder<const D: usize> {
+    fn kept(&self) -> usize;
+    fn take(&mut self) -> Data<D>;
+}
+
+impl<const D: usize> Recorder<D> for PathRecorder<D> {
+    fn kept(&self) -> usize {
+        self.len()
+    }
+    fn take(&mut self) -> Data<D> {
+        Data::Path(PathRecorder::take(self))
+    }
+}
+
+impl<const D: usize> Recorder<D> for TimesRecorder<D> {
+    fn kept(&self) -> usize {
+        self.len()
+    }
+    fn take(&mut self) -> Data<D> {
+        Data::Path(TimesRecorder::take(self))
+    }
+}
+
+impl<const D: usize> Recorder<D> for SectionRecorder<D> {
+    fn kept(&self) -> usize {
+        self.crossings().len()
+    }
+    fn take(&mut self) -> Data<D> {
+        Data::Section(SectionRecorder::take(self))
+    }
+}
+
+impl<const D: usize> Recorder<D> for MotionRecorder<D> {
+    fn kept(&self) -> usize {
+        MotionRecorder::kept(self)
+    }
+    fn take(&mut self) -> Data<D> {
+        Data::Motion(MotionRecorder::take(self))
+    }
+}
+
+impl<const D: usize> Recorder<D> for TimedMotion<D> {
+    fn kept(&self) -> usize {
+        TimedMotion::kept(self)
+    }
+    fn take(&mut self) -> Data<D> {
+        Data::Motion(TimedMotion::take(self))
+    }
+}
+
+impl<R: Recorder<D>, const D: usize> Draining<'_, '_, R, D> {
+    fn drained(&mut self, flow: Flow) -> Flow {
+        if let Some(sink) = self.sink.as_mut()
+            && self.recorder.kept() >= PART
+        {
+            return if sink(self.recorder.take()) { Flow::Continue } else { Flow::Stop };
+        }
+        flow
+    }
+}
+
+impl<R: Recorder<D> + Observer<N>, const D: usize, const N: usize> Observer<N> for Draining<'_, '_, R, D> {
+    fn step(&mut self, step: &Step<'_, N>) -> Flow {
+        let flow = self.recorder.step(step);
+        self.drained(flow)
+    }
+    fn kick(&mut self, t: f64, before: &SVector<f64, N>, after: &SVector<f64, N>) {
+        self.recorder.kick(t, before, after);
+    }
+}
+
+impl<R: Recorder<D> + FilippovObserver<D>, const D: usize> FilippovObserver<D> for Draining<'_, '_, R, D> {
+    fn step(&mut self, mode: Mode, step: &Step<'_, D>) -> Flow {
+        let flow = self.recorder.step(mode, step);
+        self.drained(flow)
+    }
+    fn event(&mut self, event: &ModeEvent<D>) -> Flow {
+        self.recorder.event(event)
+    }
 }
 
 /// The only observers here are recorders, which stop a run when they are full.
@@ -63,28 +222,32 @@ fn too_many_states(spec: &RunSpec, rule: &'static str) -> JobError {
 }
 
 /// Three states: by the compiled equations where there are some, which give the same bits as the recorded ones and give them sooner.
-fn three_states(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, JobError> {
+fn three_states(spec: &RunSpec, sink: &mut Sink<'_, 3>, watch: &dyn Watch) -> Result<Recording, JobError> {
     let x0 = start::<3>(spec);
     match (spec.system.compiled(), spec.switch) {
         (Some(Compiled::Caricature(system)), SwitchSpec::Smoothed { eps, transition }) => {
-            observe(spec, &Smoothed { system, transition, eps }, x0, watch)
+            observe(spec, &Smoothed { system, transition, eps }, x0, sink, watch)
         }
         (Some(Compiled::Caricature(system)), SwitchSpec::Hysteretic { eps, eps_prime, relaxation, phi0 }) => {
             let field = Hysteretic { system, eps, eps_prime, relaxation };
-            observe(spec, &field, vector![x0[0], x0[1], x0[2], phi0], watch)
+            observe(spec, &field, vector![x0[0], x0[1], x0[2], phi0], sink, watch)
         }
         (Some(Compiled::Caricature(system)), SwitchSpec::Filippov { exit, funnel }) => {
-            discontinuous(spec, &system, x0, exit, funnel, watch)
+            discontinuous(spec, &system, x0, exit, funnel, sink, watch)
         }
         (Some(Compiled::Wheel(system)), SwitchSpec::Smoothed { eps, transition }) => {
-            observe(spec, &Smoothed { system, transition, eps }, x0, watch)
+            observe(spec, &Smoothed { system, transition, eps }, x0, sink, watch)
         }
-        _ => record::<3, 4>(spec, watch),
+        _ => record::<3, 4>(spec, sink, watch),
     }
 }
 
 /// `D` states, by the recorded equations; `M` is `D + 1`.
-fn record<const D: usize, const M: usize>(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording<D>, JobError>
+fn record<const D: usize, const M: usize>(
+    spec: &RunSpec,
+    sink: &mut Sink<'_, D>,
+    watch: &dyn Watch,
+) -> Result<Recording<D>, JobError>
 where
     for<'a> SlidingFlow<'a, Bound<D>, D>: VectorField<M>,
 {
@@ -92,15 +255,15 @@ where
     match spec.switch {
         SwitchSpec::Smoothed { eps, transition } => {
             let field = Field::smoothed(&spec.system, transition, eps).bind::<D>()?;
-            observe(spec, &field, x0, watch)
+            observe(spec, &field, x0, sink, watch)
         }
         SwitchSpec::Hysteretic { eps, eps_prime, relaxation, phi0 } => {
             let field = Field::hysteretic(&spec.system, eps, eps_prime, relaxation).bind::<M>()?;
             let x0 = SVector::<f64, M>::from_fn(|i, _| if i < D { x0[i] } else { phi0 });
-            observe(spec, &field, x0, watch)
+            observe(spec, &field, x0, sink, watch)
         }
         SwitchSpec::Filippov { exit, funnel } => {
-            discontinuous(spec, &spec.system.bind::<D>()?, x0, exit, funnel, watch)
+            discontinuous(spec, &spec.system.bind::<D>()?, x0, exit, funnel, sink, watch)
         }
     }
 }
@@ -116,6 +279,7 @@ fn discontinuous<P: PiecewiseSmooth<D>, const D: usize, const M: usize>(
     x0: SVector<f64, D>,
     exit: ExitRule,
     funnel: Option<FunnelSpec>,
+    sink: &mut Sink<'_, D>,
     watch: &dyn Watch,
 ) -> Result<Recording<D>, JobError>
 where
@@ -140,16 +304,21 @@ where
         stop: summary.stop,
     };
     match (spec.observe, funnel) {
-        (Observation::Path { .. }, Some(funnel)) => futures(spec, system, x0, &settings, &funnel),
+        (_, Some(funnel)) => futures(spec, system, x0, &settings, &funnel),
         (Observation::Path { chord }, None) => {
-            let mut recorder = MotionRecorder::new(chord);
-            let end = run(&mut recorder)?;
-            Ok(recording(Data::Motion(recorder.into_motion()), end))
+            let mut draining = Draining { recorder: MotionRecorder::new(chord), sink };
+            let end = run(&mut draining)?;
+            Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
         }
-        (Observation::Section { coordinate, value }, _) => {
-            let mut recorder = SectionRecorder::new(coordinate, value);
-            let end = run(&mut AllModes(&mut recorder))?;
-            Ok(recording(Data::Section(recorder.into_crossings()), end))
+        (Observation::Times { every }, None) => {
+            let mut draining = Draining { recorder: TimedMotion::new(&x0, every), sink };
+            let end = run(&mut draining)?;
+            Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
+        }
+        (Observation::Section { coordinate, value }, None) => {
+            let mut draining = Draining { recorder: SectionRecorder::new(coordinate, value), sink };
+            let end = run(&mut AllModes(&mut draining))?;
+            Ok(recording(Data::Section(draining.recorder.into_crossings()), end))
         }
     }
 }
@@ -230,16 +399,21 @@ fn observe<F: VectorField<N>, const D: usize, const N: usize>(
     spec: &RunSpec,
     field: &F,
     x0: SVector<f64, N>,
+    sink: &mut Sink<'_, D>,
     watch: &dyn Watch,
 ) -> Result<Recording<D>, JobError> {
     let (summary, data) = match spec.observe {
         Observation::Path { chord } => {
-            let mut recorder = PathRecorder::<D>::new(&x0, chord);
-            (integrate(spec, field, x0, D, &mut recorder, watch)?, Data::Path(recorder.into_samples()))
+            let mut draining = Draining { recorder: PathRecorder::<D>::new(&x0, chord), sink };
+            (integrate(spec, field, x0, D, &mut draining, watch)?, Data::Path(draining.recorder.into_samples()))
+        }
+        Observation::Times { every } => {
+            let mut draining = Draining { recorder: TimesRecorder::<D>::new(&x0, every), sink };
+            (integrate(spec, field, x0, D, &mut draining, watch)?, Data::Path(draining.recorder.into_samples()))
         }
         Observation::Section { coordinate, value } => {
-            let mut recorder = SectionRecorder::<D>::new(coordinate, value);
-            (integrate(spec, field, x0, D, &mut recorder, watch)?, Data::Section(recorder.into_crossings()))
+            let mut draining = Draining { recorder: SectionRecorder::<D>::new(coordinate, value), sink };
+            (integrate(spec, field, x0, D, &mut draining, watch)?, Data::Section(draining.recorder.into_crossings()))
         }
     };
     Ok(Recording {

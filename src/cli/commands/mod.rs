@@ -4,7 +4,11 @@ mod bless;
 mod check;
 mod figure;
 mod inspect;
+mod lyapunov;
 mod manual;
+mod new;
+mod orbit;
+mod plot;
 mod published;
 mod report;
 mod run;
@@ -30,6 +34,10 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Run(Box<run::Arguments>),
+    Plot(Box<plot::Arguments>),
+    Orbit(Box<orbit::Arguments>),
+    Lyapunov(Box<lyapunov::Arguments>),
+    New(new::Arguments),
     Figure(Box<figure::Arguments>),
     Sweep(Box<sweep::Arguments>),
     Check(check::Arguments),
@@ -50,6 +58,10 @@ pub fn main() -> ExitCode {
     };
     let result = match arguments.command {
         Command::Run(arguments) => run::run(&arguments),
+        Command::Plot(arguments) => plot::run(&arguments),
+        Command::Orbit(arguments) => orbit::run(&arguments),
+        Command::Lyapunov(arguments) => lyapunov::run(&arguments),
+        Command::New(arguments) => new::run(&arguments),
         Command::Figure(arguments) => figure::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
