@@ -7,7 +7,7 @@ PROOFS  := printed-cycle coexistence sensitivity crossings
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help figures gallery report check bless test elementary rigor-test proofs browser-test lint bench torture ci clean
+.PHONY: help figures gallery report check bless test elementary rigor-test proofs browser-test lint bench bench-peers torture ci clean
 
 help: ## this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -55,6 +55,9 @@ lint: ## formatting, clippy and documentation, warnings denied
 torture: ## kill the program at random moments and look for losses: make torture KILLS=100
 	@$(CARGO) build --release --locked --bin twofold
 	@scripts/torture.sh $(or $(KILLS),100)
+
+bench-peers: ## the units of work of benches/README.md by Boost.odeint and by us, in turn, with ratios (needs g++ and Boost's headers)
+	@sh benches/peers/run.sh
 
 bench: ## benchmarks
 	@$(CARGO) bench --locked

@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use nalgebra::{SVector, vector};
 use twofold::analyse::SectionRecorder;
+use twofold::integrate::ensemble::{Settings, ensemble, in_lanes};
 use twofold::integrate::{
     Course, Dopri5, Failure, Ignore, Lsoda, Radau5, Schedule, StepCap, Stepper, Taylor, Tolerance, drive,
 };
@@ -56,6 +57,18 @@ fn w2<M: Stepper<3>>(field: &Field, make: impl Fn() -> M) -> Done {
     Ok(done)
 }
 
+/// W2 in lanes: `dispatched` with the instruction set chosen at run time, else what the program was compiled for.
+fn w2_in_lanes(field: &Field, dispatched: bool) -> Done {
+    let starts: Vec<_> = (0..1000).map(|k| vector![0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0, 0.0, -1.0]).collect();
+    let settings = Settings { tolerance: TOLERANCE, t_end: 2000.0, max_step: 10.0, max_steps: u64::MAX };
+    let ends =
+        if dispatched { ensemble(field, &starts, &settings) } else { in_lanes::<_, 3, 8>(field, &starts, &settings) };
+    ends.into_iter().try_fold((0, 0, vector![0.0, 0.0, 0.0]), |done, end| {
+        let end = end?;
+        Ok((done.0 + end.statistics.steps, 0, end.x))
+    })
+}
+
 fn once(unit: &str, set: &str, method: &str) -> Option<Done> {
     let field = field(set);
     Some(match (unit, method) {
@@ -64,6 +77,8 @@ fn once(unit: &str, set: &str, method: &str) -> Option<Done> {
         ("W1", "radau5") => w1(&field, Radau5::new(TOLERANCE)),
         ("W1", "taylor") => w1(&field, Taylor::new(TOLERANCE)),
         ("W2", "dopri5") => w2(&field, || Dopri5::new(TOLERANCE)),
+        ("W2", "dopri5-lanes") => w2_in_lanes(&field, true),
+        ("W2", "dopri5-lanes-portable") => w2_in_lanes(&field, false),
         ("W2", "lsoda") => w2(&field, || Lsoda::new(TOLERANCE)),
         _ => return None,
     })

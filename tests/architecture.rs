@@ -45,9 +45,11 @@ const ROOMS: [(&str, &[&str]); 13] = [
 ];
 
 /// Who may name a library, by rooms (`bin` is src/bin, `figures` the figures).
-const LIBRARIES: [(&str, &[&str]); 10] = [
+const LIBRARIES: [(&str, &[&str]); 11] = [
     ("libm", &["num"]),
     ("pxfm", &["num"]),
+    // Only the runs in lanes choose an instruction set; nothing else may look at the processor.
+    ("pulp", &["integrate"]),
     ("rand", &["num"]),
     ("rand_chacha", &["num"]),
     ("plotters", &["render"]),

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 
 use super::CliError;
-use super::words::{KickLaw, Method, Reading, Relaxation};
+use super::words::{KickLaw, Method, Reading, Relaxation, Transition};
 use crate::integrate;
 use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use crate::integrate::{Kick, Schedule, StepCap, Tolerance};
@@ -19,7 +19,7 @@ use crate::num::decimal::DecimalError;
 use crate::paper;
 use crate::record::files::{read_text, read_text_from};
 use crate::system::diagnostic::nearest;
-use crate::system::{Definition, ParameterError, System, Transition, library};
+use crate::system::{self, Definition, ParameterError, System, library};
 
 /// The flags that describe a run. What is not given has the default that its help names.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -52,7 +52,10 @@ pub struct RunFlags {
     /// Stiffness parameter [default: 0.001].
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub eps: Option<f64>,
-    /// Size of the transition function's perturbation (fig. 8) [default: none].
+    /// How the smoothed switch goes over from one side to the other [default: tanh].
+    #[arg(long, value_enum, help_heading = "System")]
+    pub transition: Option<Transition>,
+    /// Size of the tanh transition's perturbation (fig. 8) [default: none].
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub sigma: Option<f64>,
     /// Relaxation time of the hysteretic switch [default: 10 eps].
@@ -221,7 +224,7 @@ const OF_ORBITS: &str = "a closed orbit's steps are chosen by its tolerance alon
 const OF_KICKS: &str = "there are no kicks; leave it out, or give --kick-every";
 
 /// The table. Every flag of [`RunFlags`] but --spec stands in it once.
-const EFFECTS: [Effect; 34] = {
+const EFFECTS: [Effect; 35] = {
     const fn always(flag: &'static str, given: fn(&RunFlags) -> bool) -> Effect {
         Effect { flag, given, works: |_, _| true, why: "" }
     }
@@ -257,10 +260,16 @@ const EFFECTS: [Effect; 34] = {
             "the discontinuous system has no eps; leave it out, or choose another --switch",
         ),
         when(
+            "--transition",
+            |f| f.transition.is_some(),
+            |f, _| f.switch() == Switch::Smoothed,
+            "it shapes the smoothed switch; leave it out, or use --switch smoothed",
+        ),
+        when(
             "--sigma",
             |f| f.sigma.is_some(),
-            |f, _| f.switch() == Switch::Smoothed,
-            "it perturbs the smoothed switch; leave it out, or use --switch smoothed",
+            |f, _| f.switch() == Switch::Smoothed && matches!(f.transition, None | Some(Transition::Tanh)),
+            "it perturbs the smoothed switch's tanh; leave it out, or use --switch smoothed and --transition tanh",
         ),
         when(
             "--eps-prime",
@@ -447,7 +456,13 @@ impl RunFlags {
         let switch = match self.switch() {
             Switch::Smoothed => SwitchSpec::Smoothed {
                 eps,
-                transition: self.sigma.map_or(Transition::Tanh, |sigma| Transition::PerturbedTanh { sigma }),
+                transition: match (self.transition.unwrap_or(Transition::Tanh), self.sigma) {
+                    (Transition::Tanh, Some(sigma)) => system::Transition::PerturbedTanh { sigma },
+                    (Transition::Tanh, None) => system::Transition::Tanh,
+                    (Transition::Arctan, _) => system::Transition::Arctan,
+                    (Transition::Algebraic, _) => system::Transition::Algebraic,
+                    (Transition::Erf, _) => system::Transition::Erf,
+                },
             },
             Switch::Hysteretic => SwitchSpec::Hysteretic {
                 eps,
@@ -644,7 +659,7 @@ mod tests {
 
     /// Every flag with a value that no default has and that every run allows on which the flag has an effect; several, if
     /// none differs from every default.
-    const SAMPLES: [(&str, &[&str]); 34] = [
+    const SAMPLES: [(&str, &[&str]); 35] = [
         ("--system", &["wheel", "two-fold"]),
         ("--set", &["alpha=0.3", "omega0=1.1"]),
         ("--switch", &["smoothed", "hysteretic", "filippov"]),
@@ -654,6 +669,7 @@ mod tests {
         ("--v-plus", &["-1.3"]),
         ("--v-minus", &["-1.5"]),
         ("--eps", &["0.002"]),
+        ("--transition", &["arctan"]),
         ("--sigma", &["0.1"]),
         ("--eps-prime", &["0.03"]),
         ("--hysteresis", &["single"]),

@@ -9,7 +9,7 @@ use crate::num::elementary::{rough_exp2, rough_log2, sqrt};
 use crate::system::VectorField;
 
 /// Dormand & Prince (1980), table 2.
-mod tableau {
+pub(super) mod tableau {
     pub const A21: f64 = 1.0 / 5.0;
     pub const A31: f64 = 3.0 / 40.0;
     pub const A32: f64 = 9.0 / 40.0;
@@ -50,7 +50,7 @@ use tableau::*;
 
 /// Step control, Hairer et al. (1993), sec. IV.2 (PI control after Gustafsson 1991): h_new = h safety err^-alpha err_old^beta. Errors are
 /// kept squared, as the norm's sum gives them, and their powers are made of one logarithm a step.
-mod control {
+pub(super) mod control {
     pub const SAFETY: f64 = 0.9;
     pub const BETA: f64 = 0.04;
     pub const ALPHA: f64 = 0.2 - BETA * 0.75;

@@ -27,6 +27,7 @@
 
 pub mod dopri5;
 pub mod driver;
+pub mod ensemble;
 pub mod filippov;
 mod linear;
 pub mod lsoda;

@@ -2,16 +2,15 @@
 
 use serde_json::{Value, json};
 
-use super::answer::Answer;
+use super::answer::{Answer, Stop};
 use super::desk::Desk;
 use super::exponent::LargestExponent;
 use super::question::{JobError, Question};
-use super::recording::{Data, Recording};
 use super::run::Run;
 use super::spec::{Observation, RunSpec, SwitchSpec};
+use crate::analyse::Direction;
 use crate::analyse::attractor::{self, Evidence, SectionPoint, Thresholds, Verdict, classify};
 use crate::analyse::lyapunov::{self, Exponent};
-use crate::analyse::{Crossing, Direction};
 use crate::integrate::{Schedule, Watch};
 
 /// What a run settles on, judged from its section: with the largest exponent where motion is not captured by a cycle, and beside its noise-free
@@ -79,7 +78,7 @@ const LENGTHS: Lengths = Lengths { settling: 1000.0, structure_points: 2000, hys
 impl Classification {
     fn evidence(&self, desk: &Desk<'_>) -> Result<Evidence, JobError> {
         let run = &self.run;
-        let (recording, section) = section(desk, run)?;
+        let (end, section) = section(desk, run)?;
         let mut question = attractor::Question {
             t_end: Some(run.t_end),
             shown_from: 0.5 * run.t_end,
@@ -94,26 +93,21 @@ impl Classification {
         }
         let evidence = classify(&section, &question, &self.thresholds);
         if let Verdict::Chaotic { .. } = evidence.verdict {
-            question.lyapunov = self.exponent(desk, recording.x)?;
+            question.lyapunov = self.exponent(desk, end)?;
             return Ok(classify(&section, &question, &self.thresholds));
         }
         Ok(evidence)
     }
 
     /// The largest exponent of the run's system, from its final state; `None` if that orbit could not be followed.
-    fn exponent(&self, desk: &Desk<'_>, start: [f64; 3]) -> Result<Option<Exponent>, JobError> {
+    fn exponent(&self, desk: &Desk<'_>, start: Vec<f64>) -> Result<Option<Exponent>, JobError> {
         let settings = match self.run.switch {
             SwitchSpec::Hysteretic { .. } => {
                 lyapunov::Settings { duration: LENGTHS.hysteretic_average, ..lyapunov::Settings::default() }
             }
             _ => lyapunov::Settings::default(),
         };
-        let question = LargestExponent {
-            system: self.run.system.clone(),
-            switch: self.run.switch,
-            start: start.to_vec(),
-            settings,
-        };
+        let question = LargestExponent { system: self.run.system.clone(), switch: self.run.switch, start, settings };
         Ok(desk.ask(&question)?.fact("exponent").ok())
     }
 
@@ -143,30 +137,84 @@ impl Classification {
     }
 }
 
-/// The run's recording and its section as the classifier takes it.
-fn section(desk: &Desk<'_>, run: &RunSpec) -> Result<(Recording, Vec<SectionPoint>), JobError> {
-    if run.system.dimension() != 3 {
-        return Err(JobError::Other(
-            "a run is classified from the plane of a section, so its system must have three states".into(),
-        ));
-    }
-    let recording = Recording::of_answer(run, &*desk.ask(&Run(run.clone()))?)?.whole()?;
-    let Data::Section(crossings) = &recording.data else {
-        return Err(JobError::Other("a run is classified from its section; record one with --section".into()));
+/// Where the run ended, and its section as the classifier takes it: in the plane of the first two coordinates that the section leaves free. With
+/// two states there is one, and the other is 0; with more than three this is a projection, in which different points may fall together but
+/// one orbit's period, its approach and its irregularity are seen as they are.
+fn section(desk: &Desk<'_>, run: &RunSpec) -> Result<(Vec<f64>, Vec<SectionPoint>), JobError> {
+    let refused = |why: &str| JobError::Other(why.into());
+    let Observation::Section { coordinate, .. } = run.observe else {
+        return Err(refused("a run is classified from its section; record one with --section"));
     };
-    let points = points(run, crossings);
-    Ok((recording, points))
+    let answer = desk.ask(&Run(run.clone()))?;
+    if answer.stop == Stop::Interrupted {
+        return Err(JobError::Interrupted);
+    }
+    let names = run.system.coordinates();
+    let mut free = names.iter().enumerate().filter(|(i, _)| *i != coordinate).map(|(_, name)| *name);
+    let Some(first) = free.next() else {
+        return Err(refused(
+            "a run is classified from where it meets a section, so its system must have at least two states",
+        ));
+    };
+    let table = answer.table("section").ok_or_else(|| refused("the run has no table of its section"))?;
+    let (u, v) = (table.numbers(first), free.next().map(|second| table.numbers(second)));
+    let directions = table.words("direction").map(|word| word == Direction::Up.word());
+    let points = table.numbers("t").iter().zip(u).zip(directions).enumerate();
+    let points =
+        points.map(|(row, ((t, u), upward))| SectionPoint { t: *t, u: [*u, v.map_or(0.0, |v| v[row])], upward });
+    Ok((answer.fact("state")?, points.collect()))
 }
 
-/// The section's points in the plane of the two coordinates that are not fixed by it.
-pub fn points(run: &RunSpec, crossings: &[Crossing]) -> Vec<SectionPoint> {
-    let coordinate = match run.observe {
-        Observation::Section { coordinate, .. } => coordinate,
-        Observation::Path { .. } | Observation::Times { .. } => 1,
-    };
-    let kept: Vec<usize> = (0..3).filter(|i| *i != coordinate).collect();
-    crossings
-        .iter()
-        .map(|c| SectionPoint { t: c.t, u: [c.x[kept[0]], c.x[kept[1]]], upward: c.direction == Direction::Up })
-        .collect()
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::{StepCap, Tolerance};
+    use crate::job::spec::{DEFAULT_MAX_STEPS, Method, MethodSpec};
+    use crate::system::{Definition, System};
+
+    /// Van der Pol's oscillator at mu = 1, alone and with states that follow it or die out: period 6.663286859, amplitude 2.00861986 (Urabe 1958).
+    fn evidence(states: &str, field: &str, start: Vec<f64>) -> Result<Evidence, JobError> {
+        let text = format!("states = {states}\nh = \"y\"\nplus = {field}\nminus = {field}\n");
+        let run = RunSpec {
+            system: System::new(Definition::from_toml(&text, "oscillator.toml").unwrap()),
+            switch: SwitchSpec::tanh(1e-2),
+            start,
+            t_end: 2000.0,
+            method: MethodSpec {
+                name: Method::Dopri5,
+                tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
+                step_cap: StepCap::None,
+                max_steps: DEFAULT_MAX_STEPS,
+            },
+            schedule: Schedule::default(),
+            observe: Observation::Section { coordinate: 1, value: 0.0 },
+        };
+        Classification::of(run).ask(&Desk::quiet())
+    }
+
+    #[test]
+    fn a_limit_cycle_is_recognised_in_two_states_and_in_five() {
+        let two = evidence("[\"x\", \"y\"]", "[\"y\", \"(1 - x*x)*y - x\"]", vec![0.1, 0.0]).unwrap();
+        let five = evidence(
+            "[\"a\", \"y\", \"x\", \"b\", \"c\"]",
+            "[\"-a\", \"(1 - x*x)*y - x\", \"y\", \"x - b\", \"y - 2*c\"]",
+            vec![1.0, 0.0, 0.1, 0.0, 0.0],
+        )
+        .unwrap();
+        for (evidence, amplitude) in [(two, 0), (five, 1)] {
+            let cycle = evidence.verdict.cycle().unwrap_or_else(|| panic!("{}", evidence.summary));
+            assert!(matches!(evidence.verdict, Verdict::Periodic(_)), "{}", evidence.summary);
+            assert_eq!(cycle.period, 1);
+            assert!((cycle.duration - 6.663_286_859).abs() < 1e-5, "{}", cycle.duration);
+            let sizes = cycle.points.iter().map(|p| p.u[amplitude].abs());
+            // In five states the plane is (a, x).
+            sizes.for_each(|size| assert!((size - 2.008_619_86).abs() < 1e-6, "{size}"));
+        }
+    }
+
+    #[test]
+    fn one_state_has_no_section_to_judge() {
+        let error = evidence("[\"y\"]", "[\"-y\"]", vec![1.0]).unwrap_err();
+        assert!(error.to_string().contains("at least two states"), "{error}");
+    }
 }

@@ -307,8 +307,11 @@ impl Map<'_> {
     fn smooth<const N: usize, const M: usize>(&self, field: &Field, u: &[f64]) -> Result<Returned, JobError> {
         let tangent = field.variational(N).bind::<M>()?;
         let u = SVector::<f64, N>::from_column_slice(u);
-        floquet::return_map::<N, M, _>(&tangent, self.question.plane, self.returns, &u, &self.settings())
-            .map_err(|e| JobError::Other(e.to_string()))
+        let found = floquet::return_map::<N, M, _>(&tangent, self.question.plane, self.returns, &u, &self.settings());
+        found.map_err(|error| match error {
+            floquet::Error::Integration(failure) => JobError::Other(without_tangents(failure, N).to_string()),
+            other => JobError::Other(other.to_string()),
+        })
     }
 
     /// Of the discontinuous system.
@@ -367,6 +370,17 @@ impl Map<'_> {
             n => Err(JobError::Other(format!("no closed orbits with {n} states"))),
         }
     }
+}
+
+/// A failure that speaks of the orbit alone, not of the tangent vectors beside it.
+fn without_tangents(mut failure: Failure, states: usize) -> Failure {
+    match &mut failure {
+        Failure::NotFinite { state, .. }
+        | Failure::StepUnderflow { state, .. }
+        | Failure::TooManySteps { state, .. }
+        | Failure::NotConverged { state, .. } => state.truncate(states),
+    }
+    failure
 }
 
 impl ReturnMap for Map<'_> {
