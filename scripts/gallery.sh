@@ -15,7 +15,7 @@ filippov="--switch filippov --exit at-once:plus"
 {
     plot caricature --reading reconstructed --t-end 60 --camera -50,20
     plot caricature-as-printed --reading reconstructed --t-end 60 --camera -50,20
-    plot two-fold --switch filippov --exit after-time:1:plus --start 0,0.4,0.4 --t-end 1.8 --camera -50,20
+    plot two-fold --switch filippov --exit after-time:0.6:plus --start 0.1,0.1,0.5 --t-end 4 --camera -50,20
     plot wheel --t-end 20 --camera -115,18
     plot relay-linear $filippov --t-end 12
     plot relay-parabolic $filippov --t-end 3.9

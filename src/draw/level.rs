@@ -198,13 +198,28 @@ impl<'a> Level<'a> {
             let positive = |p: &[f64; 3]| lie(&self.full(p))[derivative] > 0.0;
             parts = parts.iter().flat_map(|part| divided(part, positive)).collect();
         }
-        for part in parts {
+        // Where f+ and f- agree on the surface their Lie derivatives change sign together but for rounding, and leave slivers.
+        let whole = area(&corners);
+        for part in parts.into_iter().filter(|part| area(part) > SLIVER * whole) {
             let n = part.len() as f64;
             let centre: [f64; 3] = std::array::from_fn(|i| part.iter().map(|p| p[i]).sum::<f64>() / n);
             patches.push(Patch { colour: colour(self.region(&centre)), corners: part });
         }
     }
 }
+
+/// Twice the area of a flat polygon, squared.
+fn area(corners: &[[f64; 3]]) -> f64 {
+    let mut sum = SVector::<f64, 3>::zeros();
+    let from = |k: usize| SVector::from(corners[k]) - SVector::from(corners[0]);
+    for k in 1..corners.len().saturating_sub(1) {
+        sum += from(k).cross(&from(k + 1));
+    }
+    sum.norm_squared()
+}
+
+/// Parts of a triangle below this share of its area, squared, are not drawn.
+const SLIVER: f64 = 1e-12;
 
 /// Where a condition changes between two places, by bisection: nothing need be smooth. The same place from either end.
 fn change<const K: usize>(a: [f64; K], b: [f64; K], condition: impl Fn(&[f64; K]) -> bool) -> [f64; K] {
@@ -333,6 +348,15 @@ mod tests {
         // An inscribed polyhedron has a little less: about (cell/radius)^2.
         let share = area / (2.0 * std::f64::consts::TAU);
         assert!((0.985..1.0).contains(&share), "{share}");
+    }
+
+    #[test]
+    fn fields_that_agree_leave_no_slivers() {
+        let text = "states = ['x', 'y', 'z']\nh = 'x^2 - 1'\nplus = ['3*(y - 0.1*x) - 0.3*z', '1', '1']\nminus = ['3*y - 0.3*(x + z)', '1', '1']";
+        let system = System::new(Definition::from_toml(text, "f").unwrap());
+        let level = Level::new(&system, &[0, 1, 2], &[]).unwrap();
+        let patches = level.patches(&[(-1.7, 1.6), (-1.0, 1.1), (-1.2, 1.3)]);
+        assert!(patches.len() > 1000 && patches.iter().all(|p| p.colour == style::CROSSING));
     }
 
     #[test]

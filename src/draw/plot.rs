@@ -284,7 +284,12 @@ fn title(system: &System, state: usize) -> String {
 
 fn range(lines: &[Line], state: usize) -> (f64, f64) {
     let axis = Axis::covering("", lines.iter().flat_map(|l| l.x[state].iter().copied()));
-    (axis.lower, axis.upper)
+    if axis.upper > axis.lower {
+        return (axis.lower, axis.upper);
+    }
+    // A state that stays what it is: as wide as such an axis is drawn.
+    let half = (0.05 * axis.lower.abs()).max(0.5);
+    (axis.lower - half, axis.lower + half)
 }
 
 fn series(mut sheet: Sheet, run: &RunSpec, lines: &[Line], shown: &[usize]) -> Sheet {
