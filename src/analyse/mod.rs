@@ -29,6 +29,7 @@
 
 pub mod attractor;
 pub mod branch;
+pub mod counts;
 pub mod digits;
 pub mod divider;
 pub mod filippov_return;

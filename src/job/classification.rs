@@ -11,6 +11,7 @@ use super::spec::{Observation, RunSpec, SwitchSpec};
 use crate::analyse::Direction;
 use crate::analyse::attractor::{self, Evidence, SectionPoint, Thresholds, Verdict, classify};
 use crate::analyse::lyapunov::{self, Exponent};
+use crate::integrate::filippov::ExitRule;
 use crate::integrate::{Schedule, Watch};
 
 /// What a run settles on, judged from its section: with the largest exponent where motion is not captured by a cycle, and beside its noise-free
@@ -67,32 +68,52 @@ impl Question for Classification {
 struct Lengths {
     /// Time after which the first transient is over and a chaotic run is on its structure.
     settling: f64,
-    /// Fewest points that make a structure to compare with.
+    /// Fewest points of a noise-free run that make a structure to compare with.
     structure_points: usize,
+    /// Noise-free runs that are made to compare with ...
+    free_runs: usize,
+    /// ... how far apart they start ...
+    free_shift: f64,
+    /// ... and how long they are.
+    free_length: f64,
     /// Time over which a hysteretic system's exponent is averaged: stiff for the explicit method of the variational equation.
     hysteretic_average: f64,
 }
 
-const LENGTHS: Lengths = Lengths { settling: 1000.0, structure_points: 2000, hysteretic_average: 2_000.0 };
+const LENGTHS: Lengths = Lengths {
+    settling: 1000.0,
+    structure_points: 2000,
+    free_runs: 8,
+    free_shift: 1e-9,
+    free_length: 5e4,
+    hysteretic_average: 2_000.0,
+};
 
 impl Classification {
     fn evidence(&self, desk: &Desk<'_>) -> Result<Evidence, JobError> {
+        self.evidence_of(desk, &*desk.ask(&Run(self.run.clone()))?)
+    }
+
+    /// The evidence that an answer to the run's question gives.
+    pub(super) fn evidence_of(&self, desk: &Desk<'_>, answer: &Answer) -> Result<Evidence, JobError> {
         let run = &self.run;
-        let (end, section) = section(desk, run)?;
+        let (end, section) = section(run, answer)?;
+        let random_exits = matches!(run.switch, SwitchSpec::Filippov { exit: ExitRule::Random { .. }, .. });
         let mut question = attractor::Question {
             t_end: Some(run.t_end),
             shown_from: 0.5 * run.t_end,
-            kicked: run.schedule.kick.is_some(),
+            kicked: run.schedule.kick.is_some() || random_exits,
             lyapunov: None,
             reference: None,
         };
         if question.kicked {
-            let reference = self.noise_free_structure(desk)?;
-            question.reference = Some(&reference);
+            // Without its chance a random exit rule is no rule: there is nothing to compare with.
+            let reference = if random_exits { None } else { Some(self.noise_free_structure(desk)?) };
+            question.reference = reference.as_deref();
             return Ok(classify(&section, &question, &self.thresholds));
         }
         let evidence = classify(&section, &question, &self.thresholds);
-        if let Verdict::Chaotic { .. } = evidence.verdict {
+        if let Verdict::Chaotic { .. } | Verdict::Undecided { .. } = evidence.verdict {
             question.lyapunov = self.exponent(desk, end)?;
             return Ok(classify(&section, &question, &self.thresholds));
         }
@@ -111,41 +132,44 @@ impl Classification {
         Ok(desk.ask(&question)?.fact("exponent").ok())
     }
 
-    /// The structure that noise can wash out: the section of the same run without kicks, as long as it was not captured by a closed orbit.
-    /// If it was captured at once, what is left is the closed orbit's dots.
-    fn noise_free_structure(&self, desk: &Desk<'_>) -> Result<Vec<SectionPoint>, JobError> {
+    /// The structure that noise can wash out: sections of the same run without kicks, from starts a little apart, each as long as it was not
+    /// captured by a closed orbit.
+    fn noise_free_structure(&self, desk: &Desk<'_>) -> Result<Vec<Vec<SectionPoint>>, JobError> {
         let run = &self.run;
-        let twin = RunSpec { schedule: Schedule { kick: None, ..run.schedule }, ..run.clone() };
-        let (_, section) = section(desk, &twin)?;
-        let question = attractor::Question {
-            t_end: Some(run.t_end),
-            shown_from: 0.5 * run.t_end,
-            ..attractor::Question::default()
-        };
-        let verdict = classify(&section, &question, &self.thresholds).verdict;
-        let captured = verdict.cycle().map_or(f64::INFINITY, |c| c.captured_at);
-        let (mut loose, late): (Vec<SectionPoint>, Vec<SectionPoint>) = (
-            section.iter().filter(|p| p.t > LENGTHS.settling && p.t < captured).copied().collect(),
-            section.iter().filter(|p| p.t > 0.5 * run.t_end).copied().collect(),
-        );
-        if loose.len() < LENGTHS.structure_points {
-            loose = late;
+        let mut free = Vec::new();
+        for k in 0..LENGTHS.free_runs {
+            let mut twin = RunSpec {
+                schedule: Schedule { kick: None, ..run.schedule },
+                t_end: run.t_end.min(LENGTHS.free_length),
+                ..run.clone()
+            };
+            twin.start[0] += k as f64 * LENGTHS.free_shift;
+            let (_, section) = section(&twin, &*desk.ask(&Run(twin.clone()))?)?;
+            let question = attractor::Question {
+                t_end: Some(twin.t_end),
+                shown_from: 0.5 * twin.t_end,
+                ..attractor::Question::default()
+            };
+            let verdict = classify(&section, &question, &self.thresholds).verdict;
+            let captured = verdict.cycle().map_or(f64::INFINITY, |c| c.captured_at);
+            let loose: Vec<SectionPoint> =
+                section.into_iter().filter(|p| p.t > LENGTHS.settling && p.t < captured).collect();
+            if loose.len() >= LENGTHS.structure_points {
+                free.push(loose);
+            }
         }
-        // The classifier compares what is shown; the whole structure is to be compared.
-        loose.iter_mut().for_each(|p| p.t = run.t_end);
-        Ok(loose)
+        Ok(free)
     }
 }
 
 /// Where the run ended, and its section as the classifier takes it: in the plane of the first two coordinates that the section leaves free. With
 /// two states there is one, and the other is 0; with more than three this is a projection, in which different points may fall together but
 /// one orbit's period, its approach and its irregularity are seen as they are.
-fn section(desk: &Desk<'_>, run: &RunSpec) -> Result<(Vec<f64>, Vec<SectionPoint>), JobError> {
+fn section(run: &RunSpec, answer: &Answer) -> Result<(Vec<f64>, Vec<SectionPoint>), JobError> {
     let refused = |why: &str| JobError::Other(why.into());
     let Observation::Section { coordinate, .. } = run.observe else {
         return Err(refused("a run is classified from its section; record one with --section"));
     };
-    let answer = desk.ask(&Run(run.clone()))?;
     if answer.stop == Stop::Interrupted {
         return Err(JobError::Interrupted);
     }

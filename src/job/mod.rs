@@ -8,6 +8,7 @@
 //! |---|---|
 //! | [`Run`] | what happens from a start: a path, a section, a Filippov motion, a funnel of futures |
 //! | [`Classification`] | what a run settles on |
+//! | [`Fate`](sweep::Fate) | the same, or that the run leaves for good: a cell of a [`Sweep`](sweep::Sweep) |
 //! | [`LargestExponent`] | how fast neighbours part |
 //! | [`ClosedOrbit`] | where an orbit closes up, its stability, and its branch along a parameter |
 //! | [`PathComparison`] | how alike two paths are |
@@ -55,6 +56,7 @@ pub mod scan;
 pub mod simulate;
 pub mod spec;
 pub mod store;
+pub mod sweep;
 pub mod table;
 
 pub use answer::{Answer, Stop};

@@ -27,8 +27,29 @@ pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, JobError
     if spec.system.dimension() != 3 {
         return Err(too_many_states(spec, "three states are looked at here"));
     }
-    let recording = three_states(spec, &mut None, watch)?;
+    let recording = three_states(spec, &mut Aside::default(), watch)?;
     if recording.stop == StopReason::Observer {
+        return Err(full(recording.t));
+    }
+    Ok(recording)
+}
+
+/// Says of a state whether a run that has come there may end.
+pub type Until<'a> = &'a dyn Fn(&[f64]) -> bool;
+
+/// Computes the section of a smoothed or hysteretic run of a system with three states, and ends it at the first step's end of which `until`
+/// holds: the recording then stops with [`StopReason::Observer`], and is otherwise that of [`simulate`].
+///
+/// # Errors
+///
+/// As [`simulate`].
+pub fn simulate_until(spec: &RunSpec, until: Until<'_>, watch: &dyn Watch) -> Result<Recording, JobError> {
+    spec.validate()?;
+    if spec.system.dimension() != 3 {
+        return Err(too_many_states(spec, "three states are looked at here"));
+    }
+    let recording = three_states(spec, &mut Aside { sink: None, until: Some(until) }, watch)?;
+    if recording.stop == StopReason::Observer && recording.data.len() >= MOST_POINTS {
         return Err(full(recording.t));
     }
     Ok(recording)
@@ -42,14 +63,14 @@ pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, JobError
 pub fn answer(spec: &RunSpec, watch: &dyn Watch) -> Result<Answer, JobError> {
     spec.validate()?;
     let answer = match spec.system.dimension() {
-        1 => record::<1, 2>(spec, &mut None, watch)?.to_answer(spec),
-        2 => record::<2, 3>(spec, &mut None, watch)?.to_answer(spec),
-        3 => three_states(spec, &mut None, watch)?.to_answer(spec),
-        4 => record::<4, 5>(spec, &mut None, watch)?.to_answer(spec),
-        5 => record::<5, 6>(spec, &mut None, watch)?.to_answer(spec),
-        6 => record::<6, 7>(spec, &mut None, watch)?.to_answer(spec),
-        7 => record::<7, 8>(spec, &mut None, watch)?.to_answer(spec),
-        8 => record::<8, 9>(spec, &mut None, watch)?.to_answer(spec),
+        1 => record::<1, 2>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        2 => record::<2, 3>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        3 => three_states(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        4 => record::<4, 5>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        5 => record::<5, 6>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        6 => record::<6, 7>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        7 => record::<7, 8>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        8 => record::<8, 9>(spec, &mut Aside::default(), watch)?.to_answer(spec),
         _ => return Err(too_many_states(spec, UP_TO_EIGHT)),
     };
     if answer.stop == Stop::Found { Err(full(answer.fact("t")?)) } else { Ok(answer) }
@@ -82,25 +103,39 @@ pub fn stream(spec: &RunSpec, rows: &mut dyn FnMut(&Table) -> bool, watch: &dyn 
         return Err(JobError::Other("a funnel is not given away in parts".into()));
     }
     match spec.system.dimension() {
-        1 => streamed(spec, rows, |sink| record::<1, 2>(spec, sink, watch)),
-        2 => streamed(spec, rows, |sink| record::<2, 3>(spec, sink, watch)),
-        3 => streamed(spec, rows, |sink| three_states(spec, sink, watch)),
-        4 => streamed(spec, rows, |sink| record::<4, 5>(spec, sink, watch)),
-        5 => streamed(spec, rows, |sink| record::<5, 6>(spec, sink, watch)),
-        6 => streamed(spec, rows, |sink| record::<6, 7>(spec, sink, watch)),
-        7 => streamed(spec, rows, |sink| record::<7, 8>(spec, sink, watch)),
-        8 => streamed(spec, rows, |sink| record::<8, 9>(spec, sink, watch)),
+        1 => streamed(spec, rows, |aside| record::<1, 2>(spec, aside, watch)),
+        2 => streamed(spec, rows, |aside| record::<2, 3>(spec, aside, watch)),
+        3 => streamed(spec, rows, |aside| three_states(spec, aside, watch)),
+        4 => streamed(spec, rows, |aside| record::<4, 5>(spec, aside, watch)),
+        5 => streamed(spec, rows, |aside| record::<5, 6>(spec, aside, watch)),
+        6 => streamed(spec, rows, |aside| record::<6, 7>(spec, aside, watch)),
+        7 => streamed(spec, rows, |aside| record::<7, 8>(spec, aside, watch)),
+        8 => streamed(spec, rows, |aside| record::<8, 9>(spec, aside, watch)),
         _ => Err(too_many_states(spec, UP_TO_EIGHT)),
     }
 }
 
-/// Takes parts of a recording away while it grows; says whether more is wanted. Without one everything is kept.
-type Sink<'a, const D: usize> = Option<&'a mut dyn FnMut(Data<D>) -> bool>;
+/// Receives parts of a recording; says whether more is wanted.
+type Sink<'a, const D: usize> = &'a mut dyn FnMut(Data<D>) -> bool;
+
+/// What looks on while a recording grows.
+struct Aside<'a, const D: usize> {
+    /// Takes parts of it away; without one everything is kept.
+    sink: Option<Sink<'a, D>>,
+    /// Ends a smoothed or hysteretic run.
+    until: Option<Until<'a>>,
+}
+
+impl<const D: usize> Default for Aside<'_, D> {
+    fn default() -> Self {
+        Self { sink: None, until: None }
+    }
+}
 
 fn streamed<const D: usize>(
     spec: &RunSpec,
     rows: &mut dyn FnMut(&Table) -> bool,
-    run: impl FnOnce(&mut Sink<'_, D>) -> Result<Recording<D>, JobError>,
+    run: impl FnOnce(&mut Aside<'_, D>) -> Result<Recording<D>, JobError>,
 ) -> Result<Streamed, JobError> {
     let (mut first_piece, mut count) = (0, 0);
     let mut give = |data: Data<D>| {
@@ -114,7 +149,7 @@ fn streamed<const D: usize>(
         }
         more
     };
-    let end = run(&mut Some(&mut give))?;
+    let end = run(&mut Aside { sink: Some(&mut give), until: None })?;
     let wanted = give(end.data);
     let stop = if wanted { end.stop.into() } else { Stop::Found };
     Ok(Streamed { t: end.t, rows: count, statistics: end.statistics, stop })
@@ -126,7 +161,7 @@ const PART: usize = 8192;
 /// A recorder whose points are given away.
 struct Draining<'a, 'b, R, const D: usize> {
     recorder: R,
-    sink: &'a mut Sink<'b, D>,
+    aside: &'a mut Aside<'b, D>,
 }
 
 /// Something that records and can forget.
@@ -182,7 +217,7 @@ impl<const D: usize> Recorder<D> for TimedMotion<D> {
 
 impl<R: Recorder<D>, const D: usize> Draining<'_, '_, R, D> {
     fn drained(&mut self, flow: Flow) -> Flow {
-        if let Some(sink) = self.sink.as_mut()
+        if let Some(sink) = self.aside.sink.as_mut()
             && self.recorder.kept() >= PART
         {
             return if sink(self.recorder.take()) { Flow::Continue } else { Flow::Stop };
@@ -194,7 +229,11 @@ impl<R: Recorder<D>, const D: usize> Draining<'_, '_, R, D> {
 impl<R: Recorder<D> + Observer<N>, const D: usize, const N: usize> Observer<N> for Draining<'_, '_, R, D> {
     fn step(&mut self, step: &Step<'_, N>) -> Flow {
         let flow = self.recorder.step(step);
-        self.drained(flow)
+        let flow = self.drained(flow);
+        match self.aside.until {
+            Some(until) if until(&step.x1.as_slice()[..D.min(N)]) => Flow::Stop,
+            _ => flow,
+        }
     }
     fn kick(&mut self, t: f64, before: &SVector<f64, N>, after: &SVector<f64, N>) {
         self.recorder.kick(t, before, after);
@@ -222,30 +261,30 @@ fn too_many_states(spec: &RunSpec, rule: &'static str) -> JobError {
 }
 
 /// Three states: by the compiled equations where there are some, which give the same bits as the recorded ones and give them sooner.
-fn three_states(spec: &RunSpec, sink: &mut Sink<'_, 3>, watch: &dyn Watch) -> Result<Recording, JobError> {
+fn three_states(spec: &RunSpec, aside: &mut Aside<'_, 3>, watch: &dyn Watch) -> Result<Recording, JobError> {
     let x0 = start::<3>(spec);
     match (spec.system.compiled(), spec.switch) {
         (Some(Compiled::Caricature(system)), SwitchSpec::Smoothed { eps, transition }) => {
-            observe(spec, &Smoothed { system, transition, eps }, x0, sink, watch)
+            observe(spec, &Smoothed { system, transition, eps }, x0, aside, watch)
         }
         (Some(Compiled::Caricature(system)), SwitchSpec::Hysteretic { eps, eps_prime, relaxation, phi0 }) => {
             let field = Hysteretic { system, eps, eps_prime, relaxation };
-            observe(spec, &field, vector![x0[0], x0[1], x0[2], phi0], sink, watch)
+            observe(spec, &field, vector![x0[0], x0[1], x0[2], phi0], aside, watch)
         }
         (Some(Compiled::Caricature(system)), SwitchSpec::Filippov { exit, funnel }) => {
-            discontinuous(spec, &system, x0, exit, funnel, sink, watch)
+            discontinuous(spec, &system, x0, exit, funnel, aside, watch)
         }
         (Some(Compiled::Wheel(system)), SwitchSpec::Smoothed { eps, transition }) => {
-            observe(spec, &Smoothed { system, transition, eps }, x0, sink, watch)
+            observe(spec, &Smoothed { system, transition, eps }, x0, aside, watch)
         }
-        _ => record::<3, 4>(spec, sink, watch),
+        _ => record::<3, 4>(spec, aside, watch),
     }
 }
 
 /// `D` states, by the recorded equations; `M` is `D + 1`.
 fn record<const D: usize, const M: usize>(
     spec: &RunSpec,
-    sink: &mut Sink<'_, D>,
+    aside: &mut Aside<'_, D>,
     watch: &dyn Watch,
 ) -> Result<Recording<D>, JobError>
 where
@@ -255,15 +294,15 @@ where
     match spec.switch {
         SwitchSpec::Smoothed { eps, transition } => {
             let field = Field::smoothed(&spec.system, transition, eps).bind::<D>()?;
-            observe(spec, &field, x0, sink, watch)
+            observe(spec, &field, x0, aside, watch)
         }
         SwitchSpec::Hysteretic { eps, eps_prime, relaxation, phi0 } => {
             let field = Field::hysteretic(&spec.system, eps, eps_prime, relaxation).bind::<M>()?;
             let x0 = SVector::<f64, M>::from_fn(|i, _| if i < D { x0[i] } else { phi0 });
-            observe(spec, &field, x0, sink, watch)
+            observe(spec, &field, x0, aside, watch)
         }
         SwitchSpec::Filippov { exit, funnel } => {
-            discontinuous(spec, &spec.system.bind::<D>()?, x0, exit, funnel, sink, watch)
+            discontinuous(spec, &spec.system.bind::<D>()?, x0, exit, funnel, aside, watch)
         }
     }
 }
@@ -279,7 +318,7 @@ fn discontinuous<P: PiecewiseSmooth<D>, const D: usize, const M: usize>(
     x0: SVector<f64, D>,
     exit: ExitRule,
     funnel: Option<FunnelSpec>,
-    sink: &mut Sink<'_, D>,
+    aside: &mut Aside<'_, D>,
     watch: &dyn Watch,
 ) -> Result<Recording<D>, JobError>
 where
@@ -306,17 +345,17 @@ where
     match (spec.observe, funnel) {
         (_, Some(funnel)) => futures(spec, system, x0, &settings, &funnel),
         (Observation::Path { chord }, None) => {
-            let mut draining = Draining { recorder: MotionRecorder::new(chord), sink };
+            let mut draining = Draining { recorder: MotionRecorder::new(chord), aside };
             let end = run(&mut draining)?;
             Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
         }
         (Observation::Times { every }, None) => {
-            let mut draining = Draining { recorder: TimedMotion::new(&x0, every), sink };
+            let mut draining = Draining { recorder: TimedMotion::new(&x0, every), aside };
             let end = run(&mut draining)?;
             Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
         }
         (Observation::Section { coordinate, value }, None) => {
-            let mut draining = Draining { recorder: SectionRecorder::new(coordinate, value), sink };
+            let mut draining = Draining { recorder: SectionRecorder::new(coordinate, value), aside };
             let end = run(&mut AllModes(&mut draining))?;
             Ok(recording(Data::Section(draining.recorder.into_crossings()), end))
         }
@@ -399,20 +438,20 @@ fn observe<F: VectorField<N>, const D: usize, const N: usize>(
     spec: &RunSpec,
     field: &F,
     x0: SVector<f64, N>,
-    sink: &mut Sink<'_, D>,
+    aside: &mut Aside<'_, D>,
     watch: &dyn Watch,
 ) -> Result<Recording<D>, JobError> {
     let (summary, data) = match spec.observe {
         Observation::Path { chord } => {
-            let mut draining = Draining { recorder: PathRecorder::<D>::new(&x0, chord), sink };
+            let mut draining = Draining { recorder: PathRecorder::<D>::new(&x0, chord), aside };
             (integrate(spec, field, x0, D, &mut draining, watch)?, Data::Path(draining.recorder.into_samples()))
         }
         Observation::Times { every } => {
-            let mut draining = Draining { recorder: TimesRecorder::<D>::new(&x0, every), sink };
+            let mut draining = Draining { recorder: TimesRecorder::<D>::new(&x0, every), aside };
             (integrate(spec, field, x0, D, &mut draining, watch)?, Data::Path(draining.recorder.into_samples()))
         }
         Observation::Section { coordinate, value } => {
-            let mut draining = Draining { recorder: SectionRecorder::<D>::new(coordinate, value), sink };
+            let mut draining = Draining { recorder: SectionRecorder::<D>::new(coordinate, value), aside };
             (integrate(spec, field, x0, D, &mut draining, watch)?, Data::Section(draining.recorder.into_crossings()))
         }
     };

@@ -17,7 +17,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod census;
 pub mod claim;
+pub mod claims;
 pub mod drawing;
 pub mod figures;
 pub mod pipeline;

@@ -12,6 +12,7 @@ mod plot;
 mod published;
 mod report;
 mod run;
+mod scan;
 mod store;
 mod sweep;
 
@@ -37,6 +38,7 @@ enum Command {
     Plot(Box<plot::Arguments>),
     Orbit(Box<orbit::Arguments>),
     Lyapunov(Box<lyapunov::Arguments>),
+    Scan(Box<scan::Arguments>),
     New(new::Arguments),
     Figure(Box<figure::Arguments>),
     Sweep(Box<sweep::Arguments>),
@@ -61,6 +63,7 @@ pub fn main() -> ExitCode {
         Command::Plot(arguments) => plot::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Lyapunov(arguments) => lyapunov::run(&arguments),
+        Command::Scan(arguments) => scan::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
         Command::Figure(arguments) => figure::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),
