@@ -28,9 +28,11 @@
 //! ```
 
 pub mod attractor;
+pub mod branch;
 pub mod counts;
 pub mod digits;
 pub mod divider;
+pub mod filippov_return;
 pub mod floquet;
 pub mod growth;
 pub mod limit;
@@ -43,6 +45,6 @@ pub mod tangent;
 
 pub mod work_precision;
 
-pub use motion::{Motion, MotionRecorder};
-pub use path::{PathRecorder, Sample};
+pub use motion::{Motion, MotionRecorder, TimedMotion};
+pub use path::{PathRecorder, Sample, TimesRecorder};
 pub use section::{Crossing, Direction, SectionRecorder};

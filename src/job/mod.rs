@@ -10,6 +10,7 @@
 //! | [`Classification`] | what a run settles on |
 //! | [`Fate`](sweep::Fate) | the same, or that the run leaves for good: a cell of a [`Sweep`](sweep::Sweep) |
 //! | [`LargestExponent`] | how fast neighbours part |
+//! | [`ClosedOrbit`] | where an orbit closes up, its stability, and its branch along a parameter |
 //! | [`PathComparison`] | how alike two paths are |
 //! | [`MethodDigits`] | how many digits of an orbit methods get right |
 //! | [`DisturbanceGrowth`] | what a visit to a two-fold makes of a small disturbance |
@@ -45,11 +46,13 @@ pub mod encode;
 pub mod exponent;
 pub mod growth;
 pub mod limit;
+pub mod orbit;
 #[cfg(feature = "parquet")]
 pub mod parquet;
 pub mod question;
 pub mod recording;
 pub mod run;
+pub mod scan;
 pub mod simulate;
 pub mod spec;
 pub mod store;
@@ -64,6 +67,7 @@ pub use digits::MethodDigits;
 pub use exponent::LargestExponent;
 pub use growth::DisturbanceGrowth;
 pub use limit::{AfterVisit, SmoothingLimit};
+pub use orbit::ClosedOrbit;
 pub use question::{AnyQuestion, JobError, Question};
 pub use recording::{Data, Recording};
 pub use run::Run;

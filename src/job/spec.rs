@@ -131,6 +131,11 @@ pub enum Observation {
         /// Largest distance, in the state's units.
         chord: f64,
     },
+    /// The path at the multiples of an interval.
+    Times {
+        /// The interval.
+        every: f64,
+    },
     /// Passages through the plane `coordinate = value`.
     Section {
         /// Index of the coordinate.
@@ -209,11 +214,9 @@ impl RunSpec {
         for value in &self.start {
             finite("start", *value)?;
         }
-        for (name, value) in self.system.parameters() {
-            if !value.value().is_finite() {
-                let value = format!("with {name} = {}", value.value());
-                return Err(SpecError { field: "system", value, rule: "parameters are finite numbers" });
-            }
+        if let Err(wrong) = self.system.check() {
+            let value = format!("one in which {wrong}");
+            return Err(SpecError { field: "system", value, rule: "the equations make no sense with it" });
         }
         if let Some(name) = states.iter().find(|s| COLUMNS.contains(s)) {
             let value = format!("one with a state called {name}");
@@ -250,8 +253,14 @@ impl RunSpec {
                     if funnel.times == 0 || funnel.times > 100_000 {
                         return error("funnel-times", funnel.times as f64, "give a number from 1 to 100000");
                     }
-                    if let Observation::Section { .. } = self.observe {
-                        return wrong("a funnel is recorded as paths; leave out --section");
+                    match self.observe {
+                        Observation::Path { .. } => {}
+                        Observation::Section { .. } => {
+                            return wrong("a funnel is recorded as paths; leave out --section");
+                        }
+                        Observation::Times { .. } => {
+                            return wrong("a funnel is recorded at fixed points of each step; leave out --every");
+                        }
                     }
                 }
                 if self.method.name != Method::Dopri5 {
@@ -309,6 +318,13 @@ impl RunSpec {
         }
         match self.observe {
             Observation::Path { chord } => positive("chord", chord),
+            Observation::Times { every } => {
+                positive("every", every)?;
+                if self.t_end / every > 1e15 {
+                    return error("every", every, "f64 cannot count so many moments; give a longer interval");
+                }
+                Ok(())
+            }
             Observation::Section { coordinate, value } => {
                 if coordinate >= states.len() {
                     return error("section", coordinate as f64, "that is not the number of a state; they count from 0");

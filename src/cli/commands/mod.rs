@@ -4,10 +4,15 @@ mod bless;
 mod check;
 mod figure;
 mod inspect;
+mod lyapunov;
 mod manual;
+mod new;
+mod orbit;
+mod plot;
 mod published;
 mod report;
 mod run;
+mod scan;
 mod store;
 mod sweep;
 
@@ -30,6 +35,11 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Run(Box<run::Arguments>),
+    Plot(Box<plot::Arguments>),
+    Orbit(Box<orbit::Arguments>),
+    Lyapunov(Box<lyapunov::Arguments>),
+    Scan(Box<scan::Arguments>),
+    New(new::Arguments),
     Figure(Box<figure::Arguments>),
     Sweep(Box<sweep::Arguments>),
     Check(check::Arguments),
@@ -50,6 +60,11 @@ pub fn main() -> ExitCode {
     };
     let result = match arguments.command {
         Command::Run(arguments) => run::run(&arguments),
+        Command::Plot(arguments) => plot::run(&arguments),
+        Command::Orbit(arguments) => orbit::run(&arguments),
+        Command::Lyapunov(arguments) => lyapunov::run(&arguments),
+        Command::Scan(arguments) => scan::run(&arguments),
+        Command::New(arguments) => new::run(&arguments),
         Command::Figure(arguments) => figure::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
