@@ -151,7 +151,7 @@ WRONG = [
     (dict(seed=1), "seed"),
     (dict(stream=1), "stream"),
     (dict(kick_every=0.3, seed=-1), "seed"),
-    (dict(sigma=0.1, transition="tanh"), "transition"),
+    (dict(sigma=0.1, transition="arctan"), "transition"),
     (dict(switch="hysteretic", sigma=0.1), "sigma"),
     (dict(switch="hysteretic", transition="tanh"), "transition"),
     (dict(switch="filippov"), "exit"),

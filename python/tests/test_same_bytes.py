@@ -27,6 +27,7 @@ RUNS = {
         dict(switch="hysteretic", hysteresis="single", eps=0.01),
     ),
     "perturbed": (["--t-end", "30", "--method", "dopri5", "--sigma", "0.1"], dict(sigma=0.1)),
+    "arctan": (["--t-end", "30", "--method", "dopri5", "--transition", "arctan"], dict(transition="arctan")),
     "filippov": (
         ["--t-end", "30", "--switch", "filippov", "--exit", "random:exponential:0.5", "--plus-probability", "0.4"],
         dict(switch="filippov", exit="random:exponential:0.5", plus_probability=0.4),

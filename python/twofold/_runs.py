@@ -146,7 +146,8 @@ def _spec(
         _refuse(of_hysteresis, 'it belongs to switch="hysteretic"')
         _refuse(of_filippov, 'it belongs to switch="filippov"')
         if sigma is not None:
-            _refuse({"transition": transition}, "sigma perturbs tanh; leave one of the two out")
+            other = None if transition == "tanh" else transition
+            _refuse({"transition": other}, "sigma perturbs tanh; leave one of the two out")
             shape: Any = {"perturbed-tanh": {"sigma": _finite("sigma", sigma)}}
         else:
             shape = transition or "tanh"
@@ -581,7 +582,7 @@ def solve(
         own; or nothing: the discontinuous system, in Filippov's sense, event by event.
     eps : float
         Width of the layer, in units of h [default 1e-3].
-    transition : {"tanh", "arctan", "algebraic", "erf", ...}
+    transition : {"tanh", "arctan", "algebraic", "erf"}
         Transition function of a smoothed switch [default "tanh"].
     sigma : float
         Perturbs the tanh transition by sigma sqrt(eps) exp(-h^2).
@@ -844,7 +845,7 @@ def classify(
     progress: Progress = False,
     **options: Any,
 ) -> Classification:
-    """Says what a run settles on, judged from its passages through a plane; three states.
+    """Says what a run settles on, judged from its passages through a plane; systems of two states and more.
 
     The arguments are those of :func:`section`. A chaotic run's largest exponent is computed too.
     """
