@@ -70,7 +70,9 @@ fn chapters() -> Vec<PathBuf> {
 fn every_command_of_the_book_does_what_it_says() {
     let program = Path::new(env!("CARGO_BIN_EXE_twofold"));
     let path = std::env::join_paths(
-        [program.parent().unwrap().to_path_buf()].into_iter().chain(std::env::split_paths(&std::env::var_os("PATH").unwrap())),
+        [program.parent().unwrap().to_path_buf()]
+            .into_iter()
+            .chain(std::env::split_paths(&std::env::var_os("PATH").unwrap())),
     )
     .unwrap();
     let makefile = fs::read_to_string(Path::new(ROOT).join("Makefile")).unwrap();
@@ -95,7 +97,10 @@ fn every_command_of_the_book_does_what_it_says() {
                     if let Some(target) = command.strip_prefix("make ") {
                         // What make does is tested where it is done; here, that it can be done at all.
                         let target = target.split_whitespace().next().unwrap();
-                        assert!(makefile.lines().any(|l| l.starts_with(&format!("{target}:"))), "{place}: no such target");
+                        assert!(
+                            makefile.lines().any(|l| l.starts_with(&format!("{target}:"))),
+                            "{place}: no such target"
+                        );
                         continue;
                     }
                     if ["cargo ", "pip ", "mdbook ", "python"].iter().any(|p| command.starts_with(p)) {
