@@ -4,7 +4,6 @@
 use nalgebra::{SVector, vector};
 use twofold::analyse::Direction;
 use twofold::analyse::digits::{Agreement, agreement};
-use twofold::analyse::growth::{GrowthQuestion, growth};
 use twofold::analyse::reference::{ExtendedCrossing, Plane, reference};
 use twofold::integrate::*;
 use twofold::num::{Arithmetic, DoubleDouble, Scalar};
@@ -164,36 +163,4 @@ fn equations_with_other_layers_need_no_telling() {
     methods_meet(&hysteretic, vector![0.2, 0.0, -1.0, 1.0], 3.0, 1e-7);
     let perturbed = Smoothed { system: caricature, transition: Transition::PerturbedTanh { sigma: 1.0 }, eps: 1e-3 };
     methods_meet(&perturbed, vector![0.2, 0.0, -1.0], 4.0, 1e-7);
-}
-
-#[test]
-fn a_visit_amplifies_by_digits_per_decade_of_eps() {
-    let question = GrowthQuestion {
-        start: START,
-        section: SECTION,
-        near: 0.05,
-        offsets: vec![-100.0, -0.1, 0.0],
-        at_start: 1e-8,
-        exit_by: 40.0,
-    };
-    let growth = [1e-2, 1e-3].map(|eps| {
-        let found = growth(&smoothed(1e-1, eps), &question).unwrap();
-        let visit = found.visit.unwrap();
-        // Two ways to disturb the start: a size that gives a response in the linear range, and the size asked for.
-        for (a, b) in visit.rows[0].factors.iter().zip(found.from_start.unwrap()) {
-            assert!((a / b.unwrap() - 1.0).abs() < 0.02, "{a} {b:?}");
-        }
-        for r in &visit.rows {
-            println!("eps {eps} t {} x {:?} factors {:?}", r.t, r.x, r.factors);
-        }
-        assert!((visit.t - 13.2).abs() < 0.05, "the first visit, SCIENCE.md section 5");
-        assert_eq!(visit.rows[0].t, 0.0);
-        visit.rows
-    });
-    for i in [1, 2] {
-        let digits = growth[1][i].log10_factor - growth[0][i].log10_factor;
-        assert!((2.0..5.0).contains(&digits), "{digits} digits per decade");
-    }
-    // Brought in from outside, a disturbance is contracted first: two digits at most.
-    assert!(growth.iter().all(|rows| rows[0].factor < 1e2 && rows[2].factor > 1e6));
 }
