@@ -164,3 +164,29 @@ fn equations_with_other_layers_need_no_telling() {
     let perturbed = Smoothed { system: caricature, transition: Transition::PerturbedTanh { sigma: 1.0 }, eps: 1e-3 };
     methods_meet(&perturbed, vector![0.2, 0.0, -1.0], 4.0, 1e-7);
 }
+
+#[test]
+fn a_run_by_name_is_the_reference() {
+    use twofold::job::spec::{Method, MethodSpec, Observation, RunSpec, SwitchSpec};
+    use twofold::job::{Desk, Run};
+    // Through the first visit, which multiplies by 1e12 whatever the default tolerance or 0.1 as a binary number leave out.
+    let run = RunSpec {
+        system: Caricature::with_reinjection(1e-1, 1e-5).into(),
+        switch: SwitchSpec::tanh(1e-3),
+        start: vec![0.2, 0.0, -1.0],
+        t_end: 20.0,
+        method: MethodSpec::defaults(Method::TaylorExtended),
+        schedule: Schedule::default(),
+        observe: Observation::Section { coordinate: 1, value: 0.0 },
+    };
+    let answer = Desk::quiet().ask(&Run(run)).unwrap();
+    let table = answer.table("section").unwrap();
+    let wanted = rows(include_str!("data/crossings-reconstructed.csv"));
+    assert!(table.len() >= 5, "{} crossings", table.len());
+    for (i, want) in wanted.iter().take(table.len()).enumerate() {
+        for (column, w) in [("t", want.t), ("x", want.x[0]), ("z", want.x[2])] {
+            let got = table.numbers(column)[i];
+            assert!((got - w).abs() < 1e-13 * (1.0 + w.abs()), "row {i}, {column}: {got} {w}");
+        }
+    }
+}

@@ -74,10 +74,10 @@ pub struct RunFlags {
     /// Integration method [default: lsoda; dopri5 with --switch filippov].
     #[arg(long, value_enum, help_heading = "Method")]
     pub method: Option<Method>,
-    /// Relative tolerance [default: 10^-7.97727, NDSolve's].
+    /// Relative tolerance [default: 10^-7.97727, NDSolve's; 1e-32 with taylor-extended].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub rtol: Option<f64>,
-    /// Absolute tolerance [default: 10^-7.97727, NDSolve's].
+    /// Absolute tolerance [default: 10^-7.97727, NDSolve's; 1e-32 with taylor-extended].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub atol: Option<f64>,
     /// Longest step [default: a tenth of the time between restarts or kicks, NDSolve's].
@@ -488,7 +488,7 @@ impl RunFlags {
             Some(numbers) => numbers.clone(),
         };
         let method = self.method.unwrap_or(if self.filippov() { Method::Dopri5 } else { Method::Lsoda });
-        let defaults = MethodSpec::ndsolve_defaults(integrate::Method::from(method));
+        let defaults = MethodSpec::defaults(integrate::Method::from(method));
         let method = MethodSpec {
             name: defaults.name,
             tolerance: Tolerance {

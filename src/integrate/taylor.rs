@@ -103,7 +103,7 @@ impl<const N: usize> Taylor<N, DoubleDouble> {
         Self::with_tolerance(tolerance)
     }
 
-    /// Reads the equation's constants as decimal numbers ([`Constants::Decimal`]), from the next restart on.
+    /// Reads the equation's constants, and a start at t = 0, as decimal numbers ([`Constants::Decimal`]), from the next restart on.
     pub fn with_decimal_constants(mut self) -> Self {
         self.constants = Constants::Decimal;
         self
@@ -286,7 +286,12 @@ impl<const N: usize, S: Precision> Stepper<N> for Taylor<N, S> {
         t_end: f64,
         max_step: f64,
     ) -> Result<(), Failure> {
-        self.restart_from(field, S::from_f64(t), x.map(S::from_f64), t_end, max_step)
+        // A start is given in decimal, like the constants; later states are what they are.
+        let exact = |x: f64| match self.constants {
+            Constants::Decimal if t == 0.0 && x.is_finite() => S::from_decimal(&x.into()),
+            _ => S::from_f64(x),
+        };
+        self.restart_from(field, S::from_f64(t), x.map(exact), t_end, max_step)
     }
 
     fn step<F: VectorField<N>>(&mut self, _: &F) -> Result<Step<'_, N>, Failure> {

@@ -191,7 +191,11 @@ impl Range {
     /// The squares of its numbers.
     pub fn squared(&self) -> Self {
         let (a, b) = (&self.low * &self.low, &self.high * &self.high);
-        let least = if self.low.is_negative() != self.high.is_negative() { Rational::whole(0) } else { a.clone().min(b.clone()) };
+        let least = if self.low.is_negative() != self.high.is_negative() {
+            Rational::whole(0)
+        } else {
+            a.clone().min(b.clone())
+        };
         Self { low: least, high: a.max(b) }
     }
 }

@@ -10,6 +10,7 @@ mod report;
 mod run;
 mod store;
 mod sweep;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -36,6 +37,7 @@ enum Command {
     Bless(bless::Arguments),
     Report(report::Arguments),
     Inspect(inspect::Arguments),
+    Verify(verify::Arguments),
     Store(store::Arguments),
     Completions(manual::Completions),
     Man(manual::Man),
@@ -56,6 +58,7 @@ pub fn main() -> ExitCode {
         Command::Bless(arguments) => bless::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::Verify(arguments) => verify::run(&arguments),
         Command::Store(arguments) => store::run(&arguments),
         Command::Completions(arguments) => manual::completions(&arguments, Arguments::command()),
         Command::Man(arguments) => manual::man(&arguments, Arguments::command()),
