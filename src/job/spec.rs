@@ -120,7 +120,19 @@ impl MethodSpec {
             max_steps: DEFAULT_MAX_STEPS,
         }
     }
+
+    /// What a method does if nothing else is asked for: as NDSolve, but extended precision is used to its end, 1e-32.
+    pub fn defaults(name: Method) -> Self {
+        let mut defaults = Self::ndsolve_defaults(name);
+        if name == Method::TaylorExtended {
+            defaults.tolerance = Tolerance { rtol: FINEST_EXTENDED, atol: FINEST_EXTENDED };
+        }
+        defaults
+    }
 }
+
+/// The finest tolerance that double-double arithmetic can hold.
+const FINEST_EXTENDED: f64 = 1e-32;
 
 /// What is recorded of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -338,7 +350,9 @@ impl MethodSpec {
         positive("rtol", self.tolerance.rtol)?;
         positive("atol", self.tolerance.atol)?;
         let (finest, rule) = match self.name {
-            Method::TaylorExtended => (1e-32, "double-double arithmetic carries 32 digits; give 1e-32 or more"),
+            Method::TaylorExtended => {
+                (FINEST_EXTENDED, "double-double arithmetic carries 32 digits; give 1e-32 or more")
+            }
             Method::Taylor => (1e-17, "f64 carries 16 digits; give 1e-17 or more"),
             _ => (1e-15, "f64 carries 16 digits; give 1e-15 or more"),
         };
