@@ -6,7 +6,7 @@ use std::sync::Arc;
 use twofold::job::sweep::Rows;
 use twofold::job::table::Table;
 use twofold::job::{AnyQuestion, JobError};
-use twofold::paper::census::{Data, Found, Kind};
+use twofold::paper::census::{self, Data, Found, Kind};
 use twofold::paper::claims::claims;
 use twofold::paper::study::Computed;
 use twofold::paper::{Figure, Reading, Study};
@@ -129,7 +129,7 @@ fn draw(tables: &[Table]) -> Sheet {
         let row = found.words("what").position(|w| w == what);
         row.map_or(f64::NAN, |r| found.numbers(column)[r])
     };
-    let p = |what: &str| format!("{:.3}", value(what, "p_permutation"));
+    let p = |what: &str| census::p_in_words(value(what, "p_permutation"));
     let together = |what: &str| {
         let [mean, low, high] = ["value", "low", "high"].map(|c| value(what, c));
         format!("{} % [{}, {}]", percent(mean), percent(low), percent(high))
@@ -152,7 +152,7 @@ fn draw(tables: &[Table]) -> Sheet {
             runs.iter().max().copied().unwrap_or(0)
         ))
         .footer(format!(
-            "Tests for the same odds (permutation): intervals 20, 40, 100 p = {}; *σ* p = {}; all six panels p = {}; methods p = {}; tolerances p = {}.",
+            "Tests for the same odds (permutation): intervals 20, 40, 100 {}; *σ* {}; all six panels {}; methods {}; tolerances {}.",
             p("intervals 20, 40, 100"),
             p("sigma 0.01, 0.1, 0.13"),
             p("all six panels"),
