@@ -330,3 +330,30 @@ fn fused_focus_attracts_algebraically_and_bears_a_cycle() {
     let mode = path(&run(&s, FILIPPOV, 5.0, Observation::Times { every: 0.5 }), "t");
     assert_eq!(mode.len(), 11);
 }
+
+/// A limit cycle of radius one beside a surface y = level: apart from it Newton's method finds the cycle; where it touches there is no
+/// derivative, and through a two-fold no map.
+#[test]
+fn grazing_and_set_valued_orbits_are_refused() {
+    let text = "states = ['x', 'y']\nstart = [1, 0]\nh = 'y - level'\nplus = ['g*x - y + 1', 'g*y + x - 1']\nminus = ['g*x - y', 'g*y + x']\n\
+                [parameters]\nlevel = 1.2\n[let]\ng = '1 - x^2 - y^2'";
+    let s = System::new(twofold::system::Definition::from_toml(text, "cycle.toml").unwrap_or_else(|e| panic!("{e}")));
+    let found = ask(&orbit(&s, FILIPPOV, 1, 0.0));
+    let (period, m): (f64, Vec<[f64; 2]>) = (found.fact("period").unwrap(), found.fact("multipliers").unwrap());
+    assert!((period - 2.0 * PI).abs() < 1e-8 && (m[0][0] - (-4.0 * PI).exp()).abs() < 1e-6, "{period} {m:?}");
+    let refused = |s: &System, axis: usize, start: &[f64]| {
+        let question = ClosedOrbit { start: start.to_vec(), ..orbit(s, FILIPPOV, axis, 0.0) };
+        Desk::quiet().ask(&question).unwrap_err().to_string()
+    };
+    let grazing = refused(&s.clone().with("level", 1.0).unwrap(), 1, &[1.0, 0.0]);
+    assert!(grazing.contains("grazes"), "{grazing}");
+    // Along the level it is found until it grazes, and that is said.
+    let along = Along { parameter: "level".into(), from: 1.2, to: 0.8, steps: 8, most: 100 };
+    let found = ask(&ClosedOrbit { along: Some(along), ..orbit(&s, FILIPPOV, 1, 0.0) });
+    let end = found.facts["end"].to_string();
+    let last = *found.table("branch").unwrap().numbers("level").last().unwrap();
+    assert!(end.contains("grazes") && (last - 1.0).abs() < 1e-2, "{end} {last}");
+    // From the attracting region of the two-fold, into it.
+    let set_valued = refused(&system("two-fold"), 2, &[0.0, 0.1, 0.0]);
+    assert!(set_valued.contains("many futures") || set_valued.contains("did not return"), "{set_valued}");
+}
