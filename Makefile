@@ -64,9 +64,21 @@ browser-test: ## the report in a headless Chromium, if there is one (needs Node)
 	@$(CARGO) build --release --locked --bins
 	@if command -v node >/dev/null; then node scripts/browser_test.mjs $(BROWSER_TEST); else echo "browser test SKIPPED: no Node found"; fi
 
+.PHONY: python-test deny
+PYTHON  ?= python3
+VENV    := target/python
+python-test: ## the Python package, installed into an environment of its own and tested (needs Python 3.9 or newer and PyPI)
+	@$(PYTHON) -m venv $(VENV)
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check './python[test]'
+	@$(CARGO) build --release --locked --bin twofold
+	@TWOFOLD_PROGRAM=$(CURDIR)/target/release/twofold $(VENV)/bin/python -m pytest python $(PYTEST_FLAGS)
+
+deny: ## licences, duplicates, sources and known defects of every dependency (needs cargo-deny: cargo install --locked cargo-deny)
+	@$(CARGO) deny --workspace check
+
 lint: ## formatting, clippy and documentation, warnings denied
 	@$(CARGO) fmt --check
-	@$(CARGO) clippy --workspace --locked --all-targets -- -D warnings
+	@$(CARGO) clippy --workspace --exclude twofold-python --locked --all-targets -- -D warnings
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --quiet
 
 torture: ## kill the program at random moments and look for losses: make torture KILLS=100

@@ -576,3 +576,14 @@ fn exponent_on_a_closed_orbit_is_zero() {
     let e = largest::<2, 4, _>(&VanDerPol, vector![2.0, 0.0], &settings).unwrap();
     assert!(e.value.abs() < 2e-3, "{e:?}");
 }
+
+#[test]
+fn evidence_of_next_to_nothing_comes_back_from_its_record() {
+    for points in [0, 1] {
+        let section = vec![SectionPoint { t: 1.0, u: [0.0; 2], upward: true }; points];
+        let evidence = classify(&section, &Question::default(), &Thresholds::default());
+        let text = serde_json::to_string(&evidence).unwrap();
+        let back: Evidence = serde_json::from_str(&text).unwrap();
+        assert_eq!((serde_json::to_string(&back).unwrap(), back.name.as_str()), (text, "too-few"));
+    }
+}

@@ -189,9 +189,11 @@ pub struct Evidence {
     pub summary: String,
     /// Crossings given.
     pub crossings: usize,
-    /// Diagonal of the box around them.
+    /// Diagonal of the box around them; not a number if there are none.
+    #[serde(deserialize_with = "number_or_none")]
     pub extent: f64,
-    /// Mean time between crossings of one direction.
+    /// Mean time between crossings of one direction; not a number if there are fewer than two.
+    #[serde(deserialize_with = "number_or_none")]
     pub return_time: f64,
     /// From this time on the picture shows points.
     pub shown_from: f64,
@@ -208,4 +210,9 @@ pub struct Evidence {
     pub lyapunov: Option<Exponent>,
     /// The limits used.
     pub thresholds: Thresholds,
+}
+
+/// JSON has no not-a-number: it is written as null, and read from it.
+fn number_or_none<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
