@@ -50,7 +50,7 @@ fn every_kind_of_picture_of_every_switch() {
             let bytes = fs::read(at.join(&file)).unwrap();
             // A blank picture has one colour.
             let pixels = decode_png(&bytes).unwrap();
-            let mut colours: Vec<_> = pixels.rgb.chunks(3).collect();
+            let mut colours: Vec<_> = pixels.rgba.chunks(4).collect();
             colours.sort();
             colours.dedup();
             assert!(colours.len() > 20, "{file}: {} colours", colours.len());
