@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use twofold::integrate::filippov::ExitRule;
 use twofold::job::question::question_hash;
 use twofold::job::spec::{RunSpec, SwitchSpec};
+use twofold::job::sweep::{Axis, Draws, Fate, Outcome, Rows, Shard, Sweep};
 use twofold::job::table::Cells;
 use twofold::job::{Answer, Classification, Desk, JobError, Question, Run, Stop, Table, encode};
 
@@ -105,10 +106,38 @@ pub fn classify(py: Python<'_>, text: &str, show: Option<&Bound<'_, PyAny>>) -> 
     })
 }
 
-/// What runs from many starts settle on, in the order of the starts: a JSON object each, with "evidence" or "error".
+/// A sweep over axes: its rows as arrays, and as the bytes that `twofold sweep` writes. `random` is how often random axes are drawn, and their seed.
+#[pyfunction]
+#[pyo3(signature = (text, over, random, threads, show=None))]
+pub fn sweep<'py>(
+    py: Python<'py>,
+    text: &str,
+    over: Vec<String>,
+    random: Option<(u64, u64)>,
+    threads: usize,
+    show: Option<&Bound<'py, PyAny>>,
+) -> PyResult<(Bound<'py, PyDict>, Vec<u8>)> {
+    let wrong = |what: String| errors::SpecError::new_err((what, "over"));
+    let axes =
+        over.iter().map(|axis| axis.parse::<Axis>().map_err(|e| wrong(e.to_string()))).collect::<PyResult<_>>()?;
+    let random = random.map(|(count, seed)| Draws { count, seed });
+    let sweep = Sweep::new(spec(text)?, axes, random).map_err(|e| wrong(e.to_string()))?;
+    let rows = supervise(py, show, move |work| {
+        let numbers: Vec<u64> = Shard::WHOLE.rows(&sweep).collect();
+        let made = side_by_side(numbers, threads, work, |_, number| sweep.row(number, work))?;
+        let mut rows = Rows::of(sweep);
+        for row in made {
+            rows.insert(row).map_err(|e| JobError::Other(e.to_string()))?;
+        }
+        Ok(rows)
+    })?;
+    Ok((arrays(py, rows.table())?, rows.csv()))
+}
+
+/// Where runs from these starts end, in their order: a JSON object each, with "outcome" or "error".
 #[pyfunction]
 #[pyo3(signature = (text, starts, threads, show=None))]
-pub fn sweep(
+pub fn fates(
     py: Python<'_>,
     text: &str,
     starts: Vec<Vec<f64>>,
@@ -120,39 +149,47 @@ pub fn sweep(
         RunSpec { start: start.clone(), ..spec.clone() }.validate().map_err(|e| errors::spec(&e))?;
     }
     supervise(py, show, move |work| {
-        // A pool of its own: a global one would not survive a fork.
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let pool = pool.map_err(|e| JobError::Other(format!("{threads} threads could not be started: {e}")))?;
-        let (all, done) = (starts.len(), AtomicUsize::new(0));
-        work.says(&format!("{all} runs"));
-        work.finished(0, all);
-        pool.install(|| {
-            let one = |(k, start): (usize, Vec<f64>)| {
-                if work.stopped() {
-                    return Err(JobError::Interrupted);
-                }
-                let end = end(&spec, k, start, work)?;
-                work.finished(done.fetch_add(1, Ordering::Relaxed) + 1, all);
-                Ok(end.to_string())
-            };
-            starts.into_par_iter().enumerate().map(one).collect()
-        })
+        side_by_side(starts, threads, work, |k, start| Ok(fate(&spec, k, start, work)?.to_string()))
     })
 }
 
+/// Independent jobs on a pool of threads, their results in order. The pool is made for the call: a global one would not survive a fork.
+fn side_by_side<A: Send, B: Send>(
+    jobs: Vec<A>,
+    threads: usize,
+    work: &Work,
+    job: impl Fn(usize, A) -> Result<B, JobError> + Sync,
+) -> Result<Vec<B>, JobError> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|e| JobError::Other(format!("{threads} threads could not be started: {e}")))?;
+    let (all, done) = (jobs.len(), AtomicUsize::new(0));
+    work.says(&format!("{all} runs"));
+    work.finished(0, all);
+    let one = |(k, asked): (usize, A)| {
+        if work.stopped() {
+            return Err(JobError::Interrupted);
+        }
+        let answer = job(k, asked)?;
+        work.finished(done.fetch_add(1, Ordering::Relaxed) + 1, all);
+        Ok(answer)
+    };
+    pool.install(|| jobs.into_par_iter().enumerate().map(one).collect())
+}
+
 /// What becomes of start number `k`, counted from 0.
-fn end(spec: &RunSpec, k: usize, start: Vec<f64>, work: &Work) -> Result<Value, JobError> {
+fn fate(spec: &RunSpec, k: usize, start: Vec<f64>, work: &Work) -> Result<Value, JobError> {
     let mut run = RunSpec { start, ..spec.clone() };
-    // Chance of its own in every run: the same kicks from neighbouring starts would not be independent runs. `twofold sweep` counts from 1.
-    let more = k as u64 + 1;
+    // Chance of its own in every run, as the rows of a sweep have it.
+    let more = k as u64;
     if let Some(kick) = &mut run.schedule.kick {
-        kick.stream += more;
+        kick.stream = kick.stream.wrapping_add(more);
     }
     if let SwitchSpec::Filippov { exit: ExitRule::Random { stream, .. }, .. } = &mut run.switch {
-        *stream += more;
+        *stream = stream.wrapping_add(more);
     }
-    match Classification::of(run).ask(&Desk::new(None, work)) {
-        Ok(evidence) => Ok(json!({ "evidence": evidence })),
+    let answer = Desk::new(None, work).ask(&Fate(Classification::of(run)));
+    match answer.and_then(|a| Ok(a.fact::<Outcome>("outcome")?)) {
+        Ok(outcome) => Ok(json!({ "outcome": outcome })),
         Err(JobError::Interrupted) => Err(JobError::Interrupted),
         Err(error) => Ok(json!({ "error": error.to_string() })),
     }

@@ -14,7 +14,7 @@ mod system;
 #[pyo3::pymodule]
 mod _native {
     #[pymodule_export]
-    use super::answers::{classify, run, sweep, written};
+    use super::answers::{classify, fates, run, sweep, written};
     #[pymodule_export]
     use super::paper::{panels, verdict_table};
     #[pymodule_export]

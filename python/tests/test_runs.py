@@ -151,7 +151,7 @@ WRONG = [
     (dict(seed=1), "seed"),
     (dict(stream=1), "stream"),
     (dict(kick_every=0.3, seed=-1), "seed"),
-    (dict(sigma=0.1, transition="tanh"), "transition"),
+    (dict(sigma=0.1, transition="arctan"), "transition"),
     (dict(switch="hysteretic", sigma=0.1), "sigma"),
     (dict(switch="hysteretic", transition="tanh"), "transition"),
     (dict(switch="filippov"), "exit"),
@@ -214,18 +214,49 @@ def test_a_sweep_does_not_depend_on_threads(caricature):
     starts = twofold.shifted(START, 4, 1e-9)
     np.testing.assert_array_equal(starts[:, 1:], np.tile(START[1:], (4, 1)))
     np.testing.assert_array_equal(starts[:, 0], [0.2 + k * 1e-9 for k in (1, 2, 3, 4)])
-    sweeps = [twofold.sweep(quick, starts, 3e3, plane="y=0", restart=100.0, threads=n) for n in (1, 2)]
-    assert sweeps[0].ends == sweeps[1].ends and len(sweeps[0]) == 4
-    assert [c.evidence for c in sweeps[0].classifications] == [c.evidence for c in sweeps[1].classifications]
-    assert sum(sweeps[0].counts.values()) == 4 and sweeps[0].errors == [None] * 4
-    for wrong in [START, np.empty((0, 3)), [[1, 2]]]:
+    run = dict(plane="y=0", restart=100.0, t_end=3e3)
+    sweeps = [twofold.sweep(quick, starts, **run, threads=n) for n in (1, 2)]
+    sweeps += [twofold.sweep(quick, START, over="shift.x=1e-9*4", **run, threads=n) for n in (1, 2)]
+    assert sweeps[2].csv == sweeps[3].csv and sweeps[0].csv is None
+    for name in sweeps[0].table:
+        columns = [s.table[name] for s in sweeps if name in s.table]
+        assert len(columns) == (2 if name.startswith("start.") else 4)
+        for column in columns:
+            np.testing.assert_array_equal(column, columns[0], err_msg=name)
+            assert column.dtype.kind == columns[0].dtype.kind and len(column) == 4
+    assert sum(sweeps[0].counts.values()) == len(sweeps[0]) == 4 and sweeps[0].errors == [None] * 4
+    assert all(s.ends == sweeps[0].ends for s in sweeps)
+
+
+def test_a_sweep_over_a_grid_and_draws(caricature):
+    grid = twofold.sweep(caricature, START, 50.0, plane="y=0", over=["params.alpha=0.1,0.2", "method=dopri5,lsoda"])
+    assert len(grid) == 4 and list(grid.table["method"]) == ["dopri5", "lsoda"] * 2
+    np.testing.assert_array_equal(grid.table["params.alpha"], [0.1, 0.1, 0.2, 0.2])
+    drawn = [twofold.sweep(caricature, None, 20.0, plane="y=0", over="shift.x=-1e-9..1e-9", random=3, random_seed=s) for s in (1, 1, 2)]
+    shifts = [d.table["shift.x"] for d in drawn]
+    np.testing.assert_array_equal(shifts[0], shifts[1])
+    assert len(set(shifts[0])) == 3 and not set(shifts[0]) & set(shifts[2])
+
+
+def test_wrong_sweeps(caricature):
+    for start, more in [
+        (START, {}),
+        (np.empty((0, 3)), {}),
+        ([[1, 2]], {}),
+        ([START], dict(over="shift.x=1e-9*4")),
+        (START, dict(over="nonsense")),
+        (START, dict(over="kick-size=1,2")),
+        (START, dict(over="shift.x=0..1")),
+        (START, dict(over="shift.x=1*2", random=2)),
+        (START, dict(over="shift.x=1*2", random_seed=2)),
+    ]:
         with pytest.raises(twofold.SpecError):
-            twofold.sweep(quick, wrong, 10.0, plane="y=0")
+            twofold.sweep(caricature, start, 10.0, plane="y=0", **more)
 
 
 def test_a_failed_run_discards_no_other():
     # From x > 0 the third state blows up; from x < 0 nothing does.
     system = twofold.System(states=["x", "y", "z"], h="x", plus=["0", "1", "1 + z^2"], minus=["0", "z", "-y"])
     done = twofold.sweep(system, [[1, 0, 0], [-1, 1, 1]], 500.0, plane="y=0.5")
-    assert done.ends[0] == "failed" and done.errors[0] and done.classifications[0] is None
+    assert done.ends[0] == "failed" and "step size" in done.errors[0] and np.isnan(done.table["end"][0])
     assert done.ends[1] != "failed" and done.errors[1] is None

@@ -27,6 +27,7 @@ RUNS = {
         dict(switch="hysteretic", hysteresis="single", eps=0.01),
     ),
     "perturbed": (["--t-end", "30", "--method", "dopri5", "--sigma", "0.1"], dict(sigma=0.1)),
+    "arctan": (["--t-end", "30", "--method", "dopri5", "--transition", "arctan"], dict(transition="arctan")),
     "filippov": (
         ["--t-end", "30", "--switch", "filippov", "--exit", "random:exponential:0.5", "--plus-probability", "0.4"],
         dict(switch="filippov", exit="random:exponential:0.5", plus_probability=0.4),
@@ -76,12 +77,13 @@ def test_a_system_from_a_file_has_the_same_bytes(command, tmp_path):
     assert twofold.written(twofold.spec(twofold.System(file).with_(f=0.7), t_end=20.0)) == command(*flags)
 
 
-def test_a_sweep_counts_the_same(command, caricature):
+def test_a_sweep_has_the_same_bytes(command, caricature):
     quick = caricature.with_(beta=1e-4)
-    flags = "sweep --alpha 0.1 --beta 1e-4 --restart 100 --t-end 3000 --method dopri5 --runs 4 --shift 1e-9 --section y=0 --json --quiet"
-    theirs = json.loads(command(*flags.split()))
-    ours = twofold.sweep(quick, twofold.shifted(START, 4, 1e-9), 3000.0, plane="y=0", restart=100.0)
-    assert [c.summary for c in ours.classifications] == [row["summary"] for row in theirs["rows"]]
+    flags = "sweep --alpha 0.1 --beta 1e-4 --restart 100 --t-end 2000 --method dopri5 --section y=0 --quiet".split()
+    ours = twofold.sweep(quick, START, 2000.0, plane="y=0", restart=100.0, over=["eps=1e-3,2e-3", "shift.x=1e-9*2"])
+    assert ours.csv == command(*flags, "--over", "eps=1e-3,2e-3", "--over", "shift.x=1e-9*2")
+    lottery = twofold.sweep(quick, START, 2000.0, plane="y=0", restart=100.0, over="shift.x=1e-9*3")
+    assert lottery.csv == command(*flags, "--runs", "3", "--shift", "1e-9")
 
 
 def test_figures_have_their_published_hashes():

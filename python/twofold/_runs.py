@@ -146,7 +146,8 @@ def _spec(
         _refuse(of_hysteresis, 'it belongs to switch="hysteretic"')
         _refuse(of_filippov, 'it belongs to switch="filippov"')
         if sigma is not None:
-            _refuse({"transition": transition}, "sigma perturbs tanh; leave one of the two out")
+            other = None if transition == "tanh" else transition
+            _refuse({"transition": other}, "sigma perturbs tanh; leave one of the two out")
             shape: Any = {"perturbed-tanh": {"sigma": _finite("sigma", sigma)}}
         else:
             shape = transition or "tanh"
@@ -581,7 +582,7 @@ def solve(
         own; or nothing: the discontinuous system, in Filippov's sense, event by event.
     eps : float
         Width of the layer, in units of h [default 1e-3].
-    transition : {"tanh", "arctan", "algebraic", "erf", ...}
+    transition : {"tanh", "arctan", "algebraic", "erf"}
         Transition function of a smoothed switch [default "tanh"].
     sigma : float
         Perturbs the tanh transition by sigma sqrt(eps) exp(-h^2).
@@ -786,7 +787,7 @@ class Classification:
     """What a run settles on."""
 
     name: str
-    """"periodic", "spiralling", "quasi-periodic", "chaotic", "noisy", "escaped" or "too-few"."""
+    """"periodic", "spiralling", "quasi-periodic", "chaotic", "undecided", "noisy", "escaped" or "too-few"."""
     summary: str
     """The same in one line."""
     evidence: Dict[str, Any] = field(repr=False)
@@ -844,7 +845,7 @@ def classify(
     progress: Progress = False,
     **options: Any,
 ) -> Classification:
-    """Says what a run settles on, judged from its passages through a plane; three states.
+    """Says what a run settles on, judged from its passages through a plane; systems of two states and more.
 
     The arguments are those of :func:`section`. A chaotic run's largest exponent is computed too.
     """
@@ -853,29 +854,37 @@ def classify(
         return _classification(json.loads(_native.classify(json.dumps(question, allow_nan=False), show)))
 
 
-@dataclass(frozen=True)
 class Sweep:
-    """What runs from many starts settle on, in the order of the starts."""
+    """Where many runs end: a row a run, in order."""
 
-    starts: Floats = field(repr=False)
-    """The starts, shape (runs, states)."""
-    classifications: List[Optional[Classification]] = field(repr=False)
-    """What each run settles on; None where a run failed."""
-    errors: List[Optional[str]] = field(repr=False)
-    """Why a run failed; None where it did not."""
+    table: Table
+    """The rows: first what was varied, then ``outcome``, ``period``, ``captured_at``, ``settled_at``, ``radius``, ``rate``, ``rate_error``, ``turn``,
+    ``exponent``, ``exponent_error``, ``crossings``, ``end``, ``steps``, ``reason``. NaN where there is nothing to say. Times are in the system's unit of time,
+    rates and exponents per unit of time."""
+    csv: Optional[bytes]
+    """The same as the very bytes that ``twofold sweep --out FILE.csv`` writes; None for runs from a list of starts."""
+
+    def __init__(self, table: Table, csv: Optional[bytes]) -> None:
+        self.table, self.csv = table, csv
 
     @property
     def ends(self) -> List[str]:
-        """Which orbit each run ends on: "period 1", "chaotic", ..., "failed"."""
-        return ["failed" if c is None else c.end for c in self.classifications]
+        """Where each run ends: "period-1", "leaving-period-1", "quasi-periodic", "irregular", "undecided", "noisy", "noisy-around-period-1", "far",
+        "escaped", "too-few" or "failed"."""
+        return [str(word) for word in self.table["outcome"]]
 
     @property
     def counts(self) -> Dict[str, int]:
         """How often each end occurred, the most frequent first."""
         return dict(sorted(Counter(self.ends).items(), key=lambda kv: (-kv[1], kv[0])))
 
+    @property
+    def errors(self) -> List[Optional[str]]:
+        """Why a run failed; None where it did not. A run that fails stops no other."""
+        return [str(reason) or None for reason in self.table["reason"]]
+
     def __len__(self) -> int:
-        return len(self.classifications)
+        return self.table.rows
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{end}: {n}" for end, n in self.counts.items())
@@ -885,40 +894,95 @@ class Sweep:
 def shifted(start: ArrayLike, runs: int, shift: float, state: int = 0) -> Floats:
     """Starts that differ by almost nothing: ``start`` with one state shifted by ``shift``, twice ``shift``, ...; shape (runs, states).
 
-    These are the starts of ``twofold sweep --runs RUNS --shift SHIFT``.
+    These are the starts of ``twofold sweep --runs RUNS --shift SHIFT``, and of ``over="shift.x=SHIFT*RUNS"``.
     """
     starts = np.tile(np.asarray(start, dtype=np.float64), (_count("runs", runs), 1))
     starts[:, state] += np.arange(1, runs + 1) * float(shift)
     return starts
 
 
+_OUTCOME = {
+    "outcome": "", "period": 0, "captured_at": None, "settled_at": None, "radius": None, "rate": None, "rate_error": None, "turn": None,
+    "exponent": None, "exponent_error": None, "crossings": 0, "end": None, "steps": 0, "reason": "",
+}  # fmt: skip
+
+
+def _outcomes(names: Sequence[str], starts: Floats, rows: Sequence[Dict[str, Any]]) -> Table:
+    """The rows of a list of starts, in the columns of a sweep."""
+    found: List[Dict[str, Any]] = []
+    for row in rows:
+        outcome = row.get("outcome")
+        if outcome is None:
+            found.append({**_OUTCOME, "outcome": "failed", "reason": row["error"]})
+        else:
+            found.append({**_OUTCOME, **{k: v for k, v in outcome.items() if k != "word"}, "outcome": outcome["word"]})
+    columns: Dict[str, Any] = {f"start.{name}": np.ascontiguousarray(starts[:, i]) for i, name in enumerate(names)}
+    for name, usual in _OUTCOME.items():
+        values = [row[name] for row in found]
+        if usual is None:
+            columns[name] = np.array([np.nan if v is None else v for v in values], dtype=np.float64)
+        else:
+            columns[name] = np.array(values, dtype=np.int64 if usual == 0 else np.str_)
+    return Table(columns)
+
+
 def sweep(
     system: SystemLike,
-    starts: ArrayLike,
+    start: Optional[ArrayLike] = None,
     t_end: float = 150.0,
     *,
     plane: Plane,
+    over: Union[str, Sequence[str], None] = None,
+    random: Optional[int] = None,
+    random_seed: Optional[int] = None,
     threads: int = 0,
     progress: Progress = False,
     **options: Any,
 ) -> Sweep:
-    """Runs the same system from many starts, side by side, and says what each settles on. See :func:`shifted`.
+    """Varies any number of a run, or takes many starts, and says where each run ends. Runs are computed side by side.
 
     Parameters
     ----------
-    starts : array_like, shape (runs, states)
-        Initial states.
+    start : array_like
+        Shape (runs, states): a run from each of these starts (see :func:`shifted`). Shape (states,), or nothing: one start, and ``over`` says what varies.
+    over : list of str
+        What varies, as ``twofold sweep --over`` has it: ``"params.alpha=0.1,0.2"``, ``"interval=20,40,100"`` (between restarts),
+        ``"shift.x=1e-9*40"``, ``"eps=1e-4..1e-2:log:20"``; ``"start.x=-1..1"`` is drawn at random. All combinations are computed, the last axis fastest.
+    random, random_seed : int
+        How often random axes are drawn, and the seed of the draws [default 2013].
     threads : int
         Threads; 0 is one a core. The answers do not depend on it.
     system, t_end, plane, progress, **options
         As for :func:`section`. Random kicks and exits have a stream of their own in every run.
+
+    Returns
+    -------
+    Sweep
+        ``table`` (a row a run), ``ends``, ``counts``, ``errors``.
+
+    Examples
+    --------
+    >>> import twofold
+    >>> twofold.sweep("caricature", None, 20.0, plane="y=0", over=["interval=5,10", "shift.x=1e-9*2"]).counts
+    {'too-few': 4}
     """
-    given = np.asarray(starts, dtype=np.float64)
+    system = as_system(system)
+    given = None if start is None else np.asarray(start, dtype=np.float64)
+    workers = _count("threads", threads)
+    if given is None or given.ndim == 1:
+        if over is None:
+            raise SpecError("give over: what varies; or starts of the shape (runs, states)", "over")
+        if random is None:
+            _refuse({"random_seed": random_seed}, "nothing is drawn at random; give random, the number of draws")
+        draws = None if random is None else (_count("random", random), 2013 if random_seed is None else _count("random_seed", random_seed))
+        question = json.dumps(spec(system, given, t_end, plane=plane, **options), allow_nan=False)
+        with Shown(progress) as show:
+            columns, csv = _native.sweep(question, [over] if isinstance(over, str) else list(over), draws, workers, show)
+        return Sweep(Table(columns), bytes(csv))
+    _refuse({"over": over, "random": random, "random_seed": random_seed}, "the starts say what varies")
     if given.ndim != 2 or len(given) == 0:
-        raise SpecError(f"starts have the shape {given.shape}: give (runs, states), a run at least", "starts")
-    question = spec(system, given[0], t_end, plane=plane, **options)
+        raise SpecError(f"the starts have the shape {given.shape}: give (runs, states), a run at least", "start")
+    question = json.dumps(spec(system, given[0], t_end, plane=plane, **options), allow_nan=False)
     with Shown(progress) as show:
-        rows = _native.sweep(json.dumps(question, allow_nan=False), given.tolist(), _count("threads", threads), show)
-    ends = [json.loads(row) for row in rows]
-    classifications = [_classification(end["evidence"]) if "evidence" in end else None for end in ends]
-    return Sweep(given, classifications, [end.get("error") for end in ends])
+        rows = _native.fates(question, given.tolist(), workers, show)
+    return Sweep(_outcomes(system.states, given, [json.loads(row) for row in rows]), None)

@@ -28,6 +28,8 @@ const LICENCES: [(&str, &str, &str); 2] = [
 ];
 /// The article, as its author's university lists it.
 const ARTICLE: &str = "https://research-information.bris.ac.uk/en/publications/singularities-that-induce-a-breakdown-of-determinism-in-mechanics";
+/// That university: address, name.
+const AFFILIATION: (&str, &str) = ("https://www.bristol.ac.uk/", "University of Bristol");
 /// Where the article appeared, in that list's words.
 const PROCEEDINGS: &str = "Proc. 5th International Conference on Structural Dynamics SEMS, Cape Town";
 
@@ -91,7 +93,13 @@ pub fn archive(report: &Report, made: &[FileBytes], added: &[(&str, &[u8])]) -> 
             "url": ARTICLE,
         }),
         json!({ "@id": "#proceedings", "@type": "PublicationVolume", "name": PROCEEDINGS }),
-        json!({ "@id": "#article-author", "@type": "Person", "name": report.article.author }),
+        json!({
+            "@id": "#article-author",
+            "@type": "Person",
+            "name": report.article.author,
+            "affiliation": { "@id": AFFILIATION.0 },
+        }),
+        json!({ "@id": AFFILIATION.0, "@type": "Organization", "name": AFFILIATION.1, "url": AFFILIATION.0 }),
     ];
     graph.extend(
         LICENCES.map(|(id, name, description)| {
