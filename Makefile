@@ -58,7 +58,7 @@ census: ## go on with the census, the audit and the basins (hours; Ctrl-C keeps 
 
 proofs: ## prove the theorems anew (proofs/README.md), write their certificates and check those (minutes)
 	@set -e; for p in $(PROOFS); do $(RUN) --package twofold-proofs --bin $$p; done
-	@python3 proofs/check.py
+	@$(RUN) --bin twofold -- verify proofs/certificates/*.json
 
 browser-test: ## the report in a headless Chromium, if there is one (needs Node)
 	@$(CARGO) build --release --locked --bins

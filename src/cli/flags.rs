@@ -74,7 +74,7 @@ pub struct RunFlags {
     /// Integration method [default: lsoda; dopri5 with --switch filippov].
     #[arg(long, value_enum, help_heading = "Method")]
     pub method: Option<Method>,
-    /// Relative tolerance [default: 10^-7.97727, NDSolve's; of exponents 1e-9, of closed orbits 1e-11].
+    /// Relative tolerance [default: 10^-7.97727, NDSolve's; 1e-32 with taylor-extended; of exponents 1e-9, of closed orbits 1e-11].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub rtol: Option<f64>,
     /// Absolute tolerance [default: that of --rtol's default].
@@ -560,7 +560,7 @@ impl RunFlags {
             Some(numbers) => numbers.clone(),
         };
         let method = self.method.unwrap_or(if self.filippov() { Method::Dopri5 } else { Method::Lsoda });
-        let mut defaults = MethodSpec::ndsolve_defaults(integrate::Method::from(method));
+        let mut defaults = MethodSpec::defaults(integrate::Method::from(method));
         match command {
             Use::Orbit => defaults.tolerance = Tolerance { rtol: 1e-11, atol: 1e-11 },
             Use::Exponent => {

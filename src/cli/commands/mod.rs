@@ -15,6 +15,7 @@ mod run;
 mod scan;
 mod store;
 mod sweep;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -46,6 +47,7 @@ enum Command {
     Bless(bless::Arguments),
     Report(report::Arguments),
     Inspect(inspect::Arguments),
+    Verify(verify::Arguments),
     Store(store::Arguments),
     Completions(manual::Completions),
     Man(manual::Man),
@@ -71,6 +73,7 @@ pub fn main() -> ExitCode {
         Command::Bless(arguments) => bless::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::Verify(arguments) => verify::run(&arguments),
         Command::Store(arguments) => store::run(&arguments),
         Command::Completions(arguments) => manual::completions(&arguments, Arguments::command()),
         Command::Man(arguments) => manual::man(&arguments, Arguments::command()),
