@@ -79,7 +79,7 @@ fn formats_by_name_and_recorded_runs() {
         "--chord",
         "1e-3",
     ];
-    for (file, magic) in [("a.svg", "<?xml"), ("a.PDF", "%PDF")] {
+    for (file, magic) in [("a.svg", "<svg"), ("a.PDF", "%PDF")] {
         good(at, &[&["plot", "--quiet", "--out", file][..], &run].concat());
         assert!(fs::read(at.join(file)).unwrap().starts_with(magic.as_bytes()), "{file}");
     }
@@ -120,7 +120,7 @@ fn pictures_that_cannot_be_are_refused_with_reasons() {
     );
     plot(&["--out", "a.png", "--from", "other.csv"], 2, &["--t-end has no effect", "--from"]);
     refused(at, &["plot", "--from", "other.csv", "--out", "a.png"], 2, &["other.csv", "twofold run"]);
-    refused(at, &["plot", "--out", "nowhere/a.png"], 2, &["nowhere"]);
+    refused(at, &["plot", "--out", "other.csv/a.png"], 2, &["other.csv", "is a file"]);
     assert_eq!(fs::read_dir(at).unwrap().count(), 1, "something was written");
 }
 
@@ -194,7 +194,7 @@ fn orbits_and_exponents_say_what_is_wrong() {
     let orbit = |more: &[&str], code: i32, expected: &[&str]| {
         refused(at, &[&["orbit", "--quiet"][..], more].concat(), code, expected);
     };
-    orbit(&[], 2, &["--section y=0"]);
+    orbit(&[], 2, &["--section, such as y=0"]);
     orbit(&["--section", "y=0", "--t-end", "5"], 2, &["--t-end has no effect", "--settle"]);
     orbit(&["--section", "y=0", "--along", "alpha"], 2, &["no \"=\"", "alpha=0.1..0.2:40"]);
     orbit(&["--section", "y=0", "--along", "alhpa=1..2"], 2, &["alhpa", "did you mean `alpha`?"]);
@@ -234,7 +234,8 @@ fn streamed_rows_are_those_of_the_whole_and_thin_out() {
         let bytes = fs::read(at.join("whole.json")).unwrap();
         let (_, answer) = twofold::job::encode::from_json(&bytes).unwrap();
         let (heading, table) = twofold::job::encode::from_csv(&streamed).unwrap();
-        assert_eq!(table, answer.tables[0], "{more:?}");
+        let bits = |t: &twofold::job::Table| twofold::job::encode::bits(std::slice::from_ref(t));
+        assert!(bits(&table) == bits(&answer.tables[0]), "{more:?}");
         assert!(heading.about["question"]["t_end"] == 150.0, "{more:?}");
         // To a file the same bytes.
         good(at, &[&run[..], &["--out", "run.csv"]].concat());
