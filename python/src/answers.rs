@@ -90,13 +90,8 @@ pub fn written(py: Python<'_>, text: &str, format: &str, show: Option<&Bound<'_,
     supervise(py, show, move |work| {
         let run = Run(spec);
         let answer = ask(run.0.clone(), work)?;
-        let mut about = json!({ "kind": run.kind(), "question": run.json() });
-        // The command writes CSV while it computes, when it does not know yet why a run ends; the futures of a funnel it writes at the end.
-        let funnel = matches!(run.0.switch, SwitchSpec::Filippov { funnel: Some(_), .. });
-        if !as_csv || funnel {
-            about["stop"] = json!(answer.stop);
-        }
-        Ok(if as_csv { encode::csv(&answer.tables[0], &about) } else { encode::json(&answer, &about) })
+        let about = json!({ "kind": run.kind(), "question": run.json(), "stop": answer.stop });
+        Ok(if as_csv { encode::csv_of_run(&run, &answer) } else { encode::json(&answer, &about) })
     })
 }
 
