@@ -170,10 +170,11 @@ fn plane(run: &RunSpec) -> Result<(&str, Option<&str>), JobError> {
         return Err(refused("a run is classified from its section; record one with --section"));
     };
     let names = run.system.coordinates();
+    let states = names.len();
     let mut free = names.into_iter().enumerate().filter(|(i, _)| *i != coordinate).map(|(_, name)| name);
     match free.next() {
-        Some(first) => Ok((first, free.next())),
-        None => Err(refused(
+        Some(first) if states > 1 => Ok((first, free.next())),
+        _ => Err(refused(
             "a run is classified from where it meets a section, so its system must have at least two states",
         )),
     }
