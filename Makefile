@@ -7,7 +7,7 @@ PROOFS  := printed-cycle coexistence sensitivity crossings
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help figures gallery report check bless test elementary rigor-test census proofs browser-test lint bench bench-peers torture ci clean
+.PHONY: help figures gallery report check bless test elementary rigor-test census proofs browser-test lint bench bench-peers torture ci clean bench-keep
 
 help: ## this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -47,8 +47,8 @@ READINGS := --over params.alpha=1e-3,0.1
 CELLS := --over params.alpha=1e-3..1:log:7 --over params.beta=1e-6..1e-3:log:7
 census: ## go on with the census, the audit and the basins (hours; Ctrl-C keeps what is finished, and the next call goes on)
 	@$(CARGO) build --release --locked --bin twofold
-	@$(SWEEP) --t-end 1e4 --method dopri5 --over start.x=-60..60:41 --over start.y=0 --over start.z=-60..60:41 --out figures/basin/printed.parquet
-	@$(SWEEP) --t-end 1e4 --method dopri5 --reading reconstructed --over start.x=-3..3:41 --over start.y=0 --over start.z=-3..3:41 --out figures/basin/reconstructed.parquet
+	@$(SWEEP) --t-end 1e4 --method dopri5 --over start.x=-60..60:25 --over start.y=0 --over start.z=-60..60:25 --out figures/basin/printed.parquet
+	@$(SWEEP) --t-end 1e4 --method dopri5 --reading reconstructed --over start.x=-3..3:25 --over start.y=0 --over start.z=-3..3:25 --out figures/basin/reconstructed.parquet
 	@$(SWEEP) --t-end 2e5 $(READINGS) --over interval=20,40,100 $(STARTS) --random 300 --out figures/census/fig7.parquet
 	@$(SWEEP) --t-end 2e5 $(READINGS) --restart 100 --over sigma=0.01,0.1,0.13 $(STARTS) --random 300 --out figures/census/fig8.parquet
 	@$(SWEEP) --t-end 2e5 --restart 100 --over params.alpha=0.1 --over method=dopri5,radau5 $(STARTS) --random 100 --out figures/census/methods.parquet
@@ -85,11 +85,16 @@ torture: ## kill the program at random moments and look for losses: make torture
 	@$(CARGO) build --release --locked --bin twofold
 	@scripts/torture.sh $(or $(KILLS),100)
 
-bench-peers: ## the units of work of benches/README.md by Boost.odeint and by us, in turn, with ratios (needs g++ and Boost's headers)
+bench-peers: ## W1 and W2 of benches/README.md by the peers and by us, in turn: table, ratios, picture (needs g++, Boost, SUNDIALS, python3)
 	@sh benches/peers/run.sh
 
-bench: ## benchmarks
-	@$(CARGO) bench --locked
+bench: ## benchmarks, compared with the last kept ones (make bench-keep)
+	@if ls target/criterion/*/*/kept >/dev/null 2>&1; then flags="--baseline kept"; fi; \
+	$(CARGO) bench --locked --bench steppers -- $$flags && $(CARGO) bench --locked --bench render -- $$flags
+
+bench-keep: ## benchmarks, kept as what `make bench` compares with
+	@$(CARGO) bench --locked --bench steppers -- --save-baseline kept
+	@$(CARGO) bench --locked --bench render -- --save-baseline kept
 
 ci: lint test ## what CI runs; nothing in it rests on a store
 	@$(MAKE) --no-print-directory figures FIGURE_FLAGS=--fresh

@@ -56,7 +56,7 @@ fn powers_are_the_predicted_ones() {
         // Measured elsewhere: 3.857 to 3.869, and 3.359 to 3.369.
         close(across, 3.864, 0.012, "power across");
         close(along, 3.365, 0.012, "power along");
-        close(across - along, 0.5, 1e-3, "across over along");
+        close(across - along, 0.5, 5e-3, "across over along");
         // The formula with its logarithm is nearer than that.
         close(across, -law.across() - law.correction(slope, z2), 6e-3, "power across by the formula");
         close(along, -law.along() - law.correction(slope, z2), 6e-3, "power along by the formula");
@@ -86,12 +86,16 @@ fn the_far_exit_is_periodic_in_the_logarithm_of_eps() {
 #[test]
 fn other_transitions_have_another_phase_and_the_same_powers() {
     let question = PassageQuestion { start: START, beyond: 3.0, offsets: vec![0.0], carried: 0.0, far: 0.0, by: 80.0 };
-    for transition in [Transition::Arctan, Transition::Algebraic, Transition::Erf] {
+    let tanh = far(1e-4, Transition::Tanh)[1];
+    // The slope of each on the canard over that of tanh: eps divided by it is tanh's eps.
+    for (transition, stretch) in [(Transition::Arctan, 0.634), (Transition::Algebraic, 0.999), (Transition::Erf, 1.129)]
+    {
         let [a, b] = [1e-4, 1e-5]
             .map(|eps| passage(&field(1e-1, eps, transition), eps, &question).unwrap().growth[0].factors[0]);
         close((b / a).log10(), 3.864, 0.03, "power across");
-        let shift = (far(1e-4, transition)[1] - far(1e-4, Transition::Tanh)[1]).abs();
-        assert!(shift > 0.05, "{transition:?}: another phase ({shift})");
+        close(far(stretch * 1e-4, transition)[1], tanh, 0.03, "the far exit without its phase");
+        let shift = (far(1e-4, transition)[1] - tanh).abs();
+        assert_eq!(shift > 0.03, (stretch - 1.0_f64).abs() > 0.01, "{transition:?}: a phase of its own ({shift})");
     }
 }
 

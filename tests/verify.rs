@@ -60,14 +60,9 @@ fn may_pass(name: &str, at: &str, up: bool) -> bool {
     let ends = |s: &str| at.ends_with(s);
     match name {
         // The derivative on the candidate enters the image with the candidate's width as a factor, 1e-9.
-        "printed-cycle" | "coexistence" => {
-            let lower = ends("/0");
-            at.contains("derivative_on_candidate") || at.contains("preconditioner")
-                // Bounds of crossings in between are compared with a plain orbit only: to its accuracy.
-                || (at.contains("/crossings/") && (at.contains("/time/") || at.contains("/point/")) && lower != up)
-        }
+        "printed-cycle" | "coexistence" => at.contains("derivative_on_candidate") || at.contains("preconditioner"),
         // The numbers of the flow: distances tie places together, the rest is ordered and narrow.
-        "sensitivity" => at.contains("/time/") || at.contains("growth_until") || ends("/radius"),
+        "sensitivity" => at.contains("/time/") || at.contains("growth_until") || ends("/radius") || ends("/states/z"),
         // Rows are tied to the table: the enclosures may be wider.
         "crossings" => ends("/radius") && up,
         _ => false,

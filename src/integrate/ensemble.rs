@@ -76,8 +76,8 @@ pub fn in_lanes<F: VectorField<N>, const N: usize, const W: usize>(
     }
     while lanes.run.iter().any(Option::is_some) {
         let done = lanes.step(field, settings);
-        for lane in 0..W {
-            if let (true, Some(run)) = (done[lane], lanes.run[lane]) {
+        for (lane, done) in done.into_iter().enumerate() {
+            if let (true, Some(run)) = (done, lanes.run[lane]) {
                 ends[run] = Some(lanes.end(lane, settings));
                 lanes.refill(lane, field, settings, &mut waiting, &mut ends);
             }

@@ -355,6 +355,12 @@ pub fn from_json(bytes: &[u8]) -> Result<(Value, Answer), Malformed> {
         columns: Vec<ColumnHeading>,
         rows: Vec<Vec<Value>>,
     }
+    let float = |value: &Value| match value {
+        Value::Null => Some(f64::NAN),
+        Value::String(s) if s == "inf" => Some(f64::INFINITY),
+        Value::String(s) if s == "-inf" => Some(f64::NEG_INFINITY),
+        value => value.as_f64(),
+    };
     let file: File = serde_json::from_slice(bytes).map_err(|e| Malformed(e.to_string()))?;
     let mut tables = Vec::new();
     for t in file.tables {
@@ -365,10 +371,7 @@ pub fn from_json(bytes: &[u8]) -> Result<(Value, Answer), Malformed> {
             }
             for (column, value) in table.columns.iter_mut().zip(row) {
                 let fits = match (&mut column.cells, value) {
-                    (Cells::Numbers(v), Value::Null) => Some(v.push(f64::NAN)),
-                    (Cells::Numbers(v), Value::String(s)) if s == "inf" => Some(v.push(f64::INFINITY)),
-                    (Cells::Numbers(v), Value::String(s)) if s == "-inf" => Some(v.push(f64::NEG_INFINITY)),
-                    (Cells::Numbers(v), value) => value.as_f64().map(|x| v.push(x)),
+                    (Cells::Numbers(v), value) => float(value).map(|x| v.push(x)),
                     (Cells::Integers(v), value) => value.as_i64().map(|n| v.push(n)),
                     (Cells::Words(w), value) => value.as_str().map(|word| w.push(word)),
                 };

@@ -135,7 +135,7 @@ impl ClosedOrbit {
     fn validate(&self) -> Result<(), JobError> {
         let wrong = |field, value: String, rule| Err(SpecError { field, value, rule }.into());
         let n = self.system.dimension();
-        if n < 2 || n > MOST_STATES {
+        if !(2..=MOST_STATES).contains(&n) {
             return wrong(
                 "system",
                 format!("one of {n} states"),

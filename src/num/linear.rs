@@ -209,6 +209,8 @@ fn double_step(a: &mut [Vec<f64>], low: usize, last: usize, (x, y, w): (f64, f64
         let (x, y, z) = (p / s, q / s, r / s);
         (q, r) = (q / p, r / p);
         let three = k + 1 < last;
+        // Three rows at once, column by column.
+        #[allow(clippy::needless_range_loop)]
         for j in k..=last {
             let mut t = a[k][j] + q * a[k + 1][j];
             if three {

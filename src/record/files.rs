@@ -68,7 +68,7 @@ pub struct Growing {
 
 enum Growth {
     Stream(File),
-    File { temporary: Temporary, at: PathBuf, old: Option<Metadata> },
+    File { temporary: Temporary, at: PathBuf, old: Box<Option<Metadata>> },
 }
 
 impl Growing {
@@ -85,7 +85,7 @@ impl Growing {
                 let folder = folder_of(&at);
                 fs::create_dir_all(folder).map_err(FileError::new("create the folder", folder))?;
                 let temporary = Temporary::new_in(folder).map_err(FileError::new("write in", folder))?;
-                Growth::File { temporary, at, old }
+                Growth::File { temporary, at, old: Box::new(old) }
             }
         };
         Ok(Self { path: path.to_path_buf(), to })
@@ -116,13 +116,13 @@ impl Growing {
                     let why = io::Error::new(io::ErrorKind::AlreadyExists, "it is no ordinary file");
                     return Err(FileError::new("write", instead)(why));
                 }
-                Place::File { at: other, old: there } => (at, old) = (other, there),
+                Place::File { at: other, old: there } => (at, *old) = (other, there),
             }
         }
         temporary
             .file()
             .sync_data()
-            .and_then(|()| like(temporary.file(), old.as_ref()))
+            .and_then(|()| like(temporary.file(), (*old).as_ref()))
             .and_then(|()| temporary.persist(&at))
             .map_err(FileError::new("write", instead.unwrap_or(&path)))
     }
