@@ -354,7 +354,7 @@ const EFFECTS: [Effect; 35] = {
             "--every",
             |f| f.every.is_some(),
             |f, command| command.records_a_path() && f.section.is_none() && !f.exit_begins("all"),
-            "it belongs to a recorded path; passages are not thinned, and futures of a funnel are recorded at fixed points of each step",
+            "it belongs to a recorded path; the passages of --section are not thinned, and futures of a funnel are recorded at fixed points of each step",
         ),
     ]
 };
