@@ -111,6 +111,10 @@ fn passages<M: Stepper<2>>(mut method: M) -> Result<Vec<f64>, Failure> {
 }
 
 /// Compares the two, passage by passage.
+///
+/// # Errors
+///
+/// If either orbit cannot be followed.
 pub fn compare() -> Result<Vec<[f64; 2]>, Failure> {
     let ours = passages(ClassicalRungeKutta::new(0.01))?;
     let theirs = passages(Dopri5::new(Tolerance { rtol: 1e-10, atol: 1e-10 }))?;

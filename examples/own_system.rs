@@ -25,6 +25,10 @@ impl PiecewiseSmooth<2> for Refuge {
 }
 
 /// The events of an orbit.
+///
+/// # Errors
+///
+/// If the orbit cannot be followed.
 pub fn follow() -> Result<Vec<ModeEvent<2>>, FilippovError> {
     let rule = ExitRule::AtOnce { side: Side::Plus }; // What to do where the future is not unique: must be chosen.
     let mut record = Trajectory::new(4);

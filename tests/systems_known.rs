@@ -144,9 +144,9 @@ fn relay_parabolic_chatters_geometrically() {
 /// closed form. Sticking makes its multiplier zero.
 #[test]
 fn stick_slip_period() {
-    let (belt, friction, w) = (0.3, 1.0, 0.2);
+    let (belt, friction, w) = (0.3, 1.0, 0.2_f64);
     let centre = friction - w * belt;
-    let omega = (1.0 - 0.25 * w * w as f64).sqrt();
+    let omega = (1.0 - 0.25 * w * w).sqrt();
     // x = centre + e^(w t/2) (a cos + b sin), from x = friction, v = belt.
     let a: f64 = friction - centre;
     let b: f64 = (belt - 0.5 * w * a) / omega;

@@ -119,7 +119,7 @@ fn missing_and_added_parts_are_refused() {
 fn exit_codes() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path().join("cert.json");
-    let mut run = |text: &str| {
+    let run = |text: &str| {
         fs::write(&at, text).unwrap();
         let output = Command::cargo_bin("twofold").unwrap().arg("verify").arg(&at).output().unwrap();
         (output.status.code().unwrap(), String::from_utf8_lossy(&output.stdout).into_owned())

@@ -72,7 +72,9 @@ fn draw(tables: &[Table]) -> Sheet {
         let Some(kind) = Kind::ALL.iter().position(|k| k.words() == word) else { continue };
         counts[kind] += 1;
         let (a, b) = (x[i], z[i]);
-        map = map.solid(vec![[a - dx, b - dz], [a + dx, b - dz], [a + dx, b + dz], [a - dx, b + dz]], COLOURS[kind]);
+        // A little beyond its edge, under the next cell: between cells that only touch, paper shines through.
+        let (right, top) = (a + 1.08 * dx, b + 1.08 * dz);
+        map = map.solid(vec![[a - dx, b - dz], [right, b - dz], [right, top], [a - dx, top]], COLOURS[kind]);
     }
     let start = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::INK, size: 4.5 };
     map = map.markers(vec![[0.2, -1.0]], start);

@@ -63,7 +63,7 @@ fn tables(reading: Reading) -> Result<Vec<Table>, JobError> {
 /// Columns of counts as stacked bars with a name above each.
 fn bars(names: &[String], counts: &[Vec<f64>], below: &[Vec<String>]) -> PlanePanel {
     let n = names.len() as f64;
-    let mut panel = PlanePanel::new(Axis::linear("", -0.75, n + 0.15), Axis::linear("", -0.24, 1.16));
+    let mut panel = PlanePanel::new(Axis::linear("", -0.95, n + 0.15), Axis::linear("", -0.24, 1.16));
     panel.axes = false;
     for percent in [0.0, 50.0, 100.0] {
         let y = percent / 100.0;

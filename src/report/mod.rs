@@ -7,10 +7,10 @@
 //! ```
 //! use twofold::record::FileBytes;
 //! use twofold::report::{Links, assemble, page};
-//! // A record without its pictures: what is missing is said, not passed over.
-//! let record = FileBytes { path: "own/own.json".into(), bytes: b"{}".to_vec() };
-//! let report = assemble(&[record], &[]);
-//! assert!(report.problems.iter().any(|p| p.contains("own/own.json")));
+//! // No record vouches for this file, so it counts for nothing.
+//! let file = FileBytes { path: "own/table.csv".into(), bytes: b"t,x\n".to_vec() };
+//! let report = assemble(&[file], &[]);
+//! assert_eq!((report.summary.pictures, report.summary.panels), (0, 0));
 //! assert!(page(&report, Links::Beside).starts_with(b"<!DOCTYPE html>"));
 //! ```
 

@@ -14,7 +14,7 @@ use crate::job::run::Run;
 use crate::job::simulate::simulate_until;
 use crate::job::spec::SwitchSpec;
 
-/// What a run settles on, as [`Classification`] has it, or that it goes to the far state: see [`corner`](far::corner). Fact: `outcome`
+/// What a run settles on, as [`Classification`] has it, or that it goes to the far state: the region that no orbit leaves. Fact: `outcome`
 /// ([`Outcome`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fate(pub Classification);
