@@ -50,7 +50,9 @@ def test_other_threads_go_on(caricature):
     ],
 )
 def test_ctrl_c_stops_within_a_moment(call):
-    program = f"import twofold\nLONG = {LONG!r}\nprint('begun', flush=True)\n{call}\n"
+    # A shell starts background jobs with Ctrl-C ignored, and children inherit that.
+    heard = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    program = f"{heard}import twofold\nLONG = {LONG!r}\nprint('begun', flush=True)\n{call}\n"
     child = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert child.stdout.readline().strip() == b"begun"
     time.sleep(1.0)
