@@ -51,7 +51,8 @@ pub fn listen() {
 
 #[cfg(unix)]
 mod unix {
-    use std::sync::atomic::Ordering;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
     use std::thread;
     use std::time::Duration;
 
@@ -64,28 +65,26 @@ mod unix {
     use crate::record;
 
     pub fn listen() {
-        // The signals are taken over by the thread itself: where it cannot be started, they are not.
+        // A file grown beyond its limit (SIGXFSZ) is then an error of that write, with a message, instead of a silent end. It is
+        // taken before anything is written, not by the thread, which may start later than a short run ends.
+        let _ = signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
+        // The other signals are taken over by the thread itself: where it cannot be started, they are not.
         let _ = thread::Builder::new().name("signals".into()).spawn(|| {
-            // A file grown beyond its limit is then an error of that write, with a message, instead of a silent end.
-            if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM, SIGXFSZ]) {
+            if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) {
                 wait(&mut signals);
             }
         });
     }
 
     fn wait(signals: &mut Signals) {
-        let exit_of = |signal| match signal {
-            SIGINT => Some(Exit::Interrupted),
-            SIGTERM => Some(Exit::Terminated),
-            _ => None,
-        };
-        let Some(exit) = signals.forever().find_map(exit_of) else { return };
+        let Some(signal) = signals.forever().next() else { return };
+        let exit = if signal == SIGTERM { Exit::Terminated } else { Exit::Interrupted };
         CAME.store(exit as u8, Ordering::SeqCst);
         if GRACES.load(Ordering::SeqCst) > 0 {
             // The main thread ends the process when it has kept what it has. A second signal ends the waiting.
             for _ in 0..GRACE_MS / 10 {
                 thread::sleep(Duration::from_millis(10));
-                if signals.pending().any(|s| exit_of(s).is_some()) {
+                if signals.pending().next().is_some() {
                     break;
                 }
             }

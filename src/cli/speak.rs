@@ -2,7 +2,7 @@
 //! any more ends no computation.
 
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::CliError;
 use crate::record;
@@ -45,6 +45,17 @@ pub fn print_bytes(bytes: &[u8]) -> Result<(), CliError> {
 /// One line for people on standard error. If nobody can read it, it is lost, and nothing else is.
 pub fn complain(text: &str) {
     let _ = io::stderr().lock().write_all(format!("{}\n", harmless(text)).as_bytes());
+}
+
+/// Where an answer goes and whether its progress is shown, on every command that computes one.
+#[derive(Clone, Debug, clap::Args)]
+pub struct Delivery {
+    /// File to write instead of standard output (-).
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// No progress on standard error.
+    #[arg(long)]
+    pub quiet: bool,
 }
 
 /// Writes data to a file, or to standard output if `-` is named, or nothing.

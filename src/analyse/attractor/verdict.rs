@@ -162,11 +162,12 @@ impl std::fmt::Display for Verdict {
                 }
                 match contrast {
                     Some(c) => {
+                        // As a ratio of densities: "1109 % fuller" would say the same to nobody.
                         let [value, low, high, free] =
-                            [c.value, c.interval[0], c.interval[1], c.free[0]].map(|v| 100.0 * v);
+                            [c.value, c.interval[1], c.interval[0], c.free[0]].map(|v| 1.0 - v);
                         write!(
                             f,
-                            ", islands {value:.0} % [{low:.0}, {high:.0}] emptier than the sea, {free:.0} % or more without noise"
+                            ", islands {value:.2} [{low:.2}, {high:.2}] times as dense as the sea, at most {free:.2} without noise"
                         )
                     }
                     None => Ok(()),

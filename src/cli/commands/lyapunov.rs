@@ -1,13 +1,11 @@
 //! `twofold lyapunov`: the largest Lyapunov exponent of any system.
 
-use std::path::PathBuf;
-
 use serde_json::json;
 
 use crate::analyse::lyapunov::{Exponent, Settings};
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::progress::Progress;
-use crate::cli::speak::{deliver, try_delivery};
+use crate::cli::speak::{Delivery, deliver, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::integrate::StepCap;
 use crate::job::{Desk, JobError, LargestExponent, Question, Stop, encode};
@@ -30,12 +28,8 @@ pub struct Arguments {
     /// Output format [default: text].
     #[arg(long, value_enum)]
     format: Option<Format>,
-    /// File to write instead of standard output (-).
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// No progress on standard error.
-    #[arg(long)]
-    quiet: bool,
+    #[command(flatten)]
+    delivery: Delivery,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -62,9 +56,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         kick: spec.schedule.kick,
     };
     let question = LargestExponent { system: spec.system, switch: spec.switch, start: spec.start, settings };
-    let out = arguments.out.as_deref();
+    let out = arguments.delivery.out.as_deref();
     try_delivery(out)?;
-    let progress = Progress::with_grace(arguments.quiet);
+    let progress = Progress::with_grace(arguments.delivery.quiet);
     let answer = match (Desk::new(None, &progress).ask(&question), progress.asked_to_stop()) {
         (Err(JobError::Interrupted), Some(exit)) => {
             return Err(CliError::Stopped { said: "interrupted before there was a mean with an error".into(), exit });

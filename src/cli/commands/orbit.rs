@@ -1,7 +1,6 @@
 //! `twofold orbit`: closed orbits and their stability.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 use serde_json::json;
 
@@ -9,7 +8,7 @@ use crate::analyse::floquet::Plane;
 use crate::cli::exit::part_of;
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::progress::Progress;
-use crate::cli::speak::{deliver, is_standard_output, try_delivery};
+use crate::cli::speak::{Delivery, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::job::orbit::Along;
 use crate::job::spec::Observation;
@@ -47,12 +46,8 @@ pub struct Arguments {
     /// Output format [default: text].
     #[arg(long, value_enum)]
     format: Option<Format>,
-    /// File to write instead of standard output (-).
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// No progress on standard error.
-    #[arg(long)]
-    quiet: bool,
+    #[command(flatten)]
+    delivery: Delivery,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -95,9 +90,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         longest_return: arguments.longest_return,
         along: arguments.along.as_deref().map(along).transpose()?,
     };
-    let out = arguments.out.as_deref();
+    let out = arguments.delivery.out.as_deref();
     try_delivery(out)?;
-    let progress = Progress::with_grace(arguments.quiet);
+    let progress = Progress::with_grace(arguments.delivery.quiet);
     let answer = match Desk::new(None, &progress).ask(&question) {
         Err(JobError::Interrupted) if progress.asked_to_stop().is_some() => {
             let exit = progress.asked_to_stop().unwrap_or(Exit::Interrupted);

@@ -1,14 +1,14 @@
 //! `twofold run`: any run, not only the paper's.
 
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::json;
 
 use crate::cli::exit::part_of;
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::progress::Progress;
-use crate::cli::speak::{deliver, is_standard_output, try_delivery};
+use crate::cli::speak::{Delivery, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::job::parquet::parquet;
 use crate::job::spec::SwitchSpec;
@@ -35,12 +35,8 @@ pub struct Arguments {
     /// Output format [default: csv].
     #[arg(long, value_enum)]
     format: Option<Format>,
-    /// File to write instead of standard output (-).
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// No progress on standard error.
-    #[arg(long)]
-    quiet: bool,
+    #[command(flatten)]
+    delivery: Delivery,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -55,7 +51,7 @@ enum Format {
 
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let spec = arguments.flags.spec(Use::Any)?;
-    let out = arguments.out.as_deref();
+    let out = arguments.delivery.out.as_deref();
     try_delivery(out)?;
     if arguments.print_spec {
         let mut text = serde_json::to_vec_pretty(&spec).expect("specs are plain data");
@@ -63,7 +59,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         deliver(out, &text)?;
         return Ok(Exit::Fine);
     }
-    let progress = Progress::with_grace(arguments.quiet);
+    let progress = Progress::with_grace(arguments.delivery.quiet);
     let run = Run(spec);
     let format = arguments.format.unwrap_or(Format::Csv);
     let funnel = matches!(run.0.switch, SwitchSpec::Filippov { funnel: Some(_), .. });

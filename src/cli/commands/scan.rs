@@ -8,7 +8,7 @@ use serde_json::json;
 use crate::cli::exit::part_of;
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::progress::Progress;
-use crate::cli::speak::{complain, deliver, is_standard_output, try_delivery};
+use crate::cli::speak::{Delivery, complain, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit, in_pool};
 use crate::draw::scan::{self, Basin};
 use crate::integrate::Watch;
@@ -49,12 +49,8 @@ pub struct Arguments {
     /// Threads; 0 is one per core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
-    /// File to write instead of standard output (-).
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// No progress on standard error.
-    #[arg(long)]
-    quiet: bool,
+    #[command(flatten)]
+    delivery: Delivery,
 }
 
 /// Most runs of a scan: their rows are kept in memory.
@@ -114,12 +110,12 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     {
         return usage("--plot: a map is drawn over numbers".into());
     }
-    let out = arguments.out.as_deref();
+    let out = arguments.delivery.out.as_deref();
     try_delivery(out)?;
     if let Some(file) = &arguments.plot {
         try_delivery(Some(file))?;
     }
-    let progress = Progress::with_grace(arguments.quiet);
+    let progress = Progress::with_grace(arguments.delivery.quiet);
     let rows = sweep.rows();
     let watch = job::Progress::begin(&progress, "scan", rows as f64);
     let done = std::sync::atomic::AtomicU64::new(0);

@@ -22,7 +22,7 @@
 //! How near it comes to ODEPACK is tested in tests/odepack.rs. Of 62 runs of its LSODA on ten problems, 27 make the same
 //! decisions from starts 1e-12 apart; there steps, evaluations, Jacobians, orders and switches are the same here, one by
 //! one. In the others rounding decides sooner or later, and the counts here differ from ODEPACK's as ODEPACK's differ from
-//! themselves, by at most 9 %.
+//! themselves: steps by at most 14.6 %, evaluations by at most 11.4 %.
 //!
 //! Every constant and decision of step, order and method selection, of the corrector's convergence and of the failures was also compared, line by
 //! line, with ODEPACK's own text (LSODA, STODA; public domain). They are the same, but for three things that are meant: the Jacobian is exact and not
