@@ -7,7 +7,7 @@ PROOFS  := printed-cycle coexistence sensitivity crossings
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help figures report check bless test elementary rigor-test proofs browser-test lint bench bench-peers torture ci clean
+.PHONY: help figures report check bless test elementary rigor-test census proofs browser-test lint bench bench-peers torture ci clean
 
 help: ## this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -35,6 +35,23 @@ rigor-test: ## millions of interval operations against exact integer arithmetic 
 elementary: ## tanh and exp against double-double arithmetic: 2^24 and 2^30 points each (half an hour)
 	@$(CARGO) test --release --locked --lib num::elementary -- --include-ignored --nocapture
 
+# The sweeps behind figures/census, figures/audit and figures/basin: 300 starts within 1e-9 of the paper's; alpha and beta over three decades each;
+# starts on a plane. What is there already is kept if six of its rows come out the same again.
+SWEEP := $(RUN) --bin twofold -- sweep --threads $(or $(THREADS),0) --resume --recheck 6
+STARTS := --over shift.x=-5e-10..5e-10 --over shift.y=-5e-10..5e-10 --over shift.z=-5e-10..5e-10
+READINGS := --over params.alpha=1e-3,0.1
+CELLS := --over params.alpha=1e-3..1:log:7 --over params.beta=1e-6..1e-3:log:7
+census: ## go on with the census, the audit and the basins (hours; Ctrl-C keeps what is finished, and the next call goes on)
+	@$(CARGO) build --release --locked --bin twofold
+	@$(SWEEP) --t-end 1e4 --method dopri5 --over start.x=-60..60:41 --over start.y=0 --over start.z=-60..60:41 --out figures/basin/printed.parquet
+	@$(SWEEP) --t-end 1e4 --method dopri5 --reading reconstructed --over start.x=-3..3:41 --over start.y=0 --over start.z=-3..3:41 --out figures/basin/reconstructed.parquet
+	@$(SWEEP) --t-end 2e5 $(READINGS) --over interval=20,40,100 $(STARTS) --random 300 --out figures/census/fig7.parquet
+	@$(SWEEP) --t-end 2e5 $(READINGS) --restart 100 --over sigma=0.01,0.1,0.13 $(STARTS) --random 300 --out figures/census/fig8.parquet
+	@$(SWEEP) --t-end 2e5 --restart 100 --over params.alpha=0.1 --over method=dopri5,radau5 $(STARTS) --random 100 --out figures/census/methods.parquet
+	@$(SWEEP) --t-end 2e5 --restart 100 --over params.alpha=0.1 --method dopri5 --over tolerance=1e-6,1e-8,1e-10,1e-12 $(STARTS) --random 100 --out figures/census/tolerances.parquet
+	@$(SWEEP) --t-end 2e5 --method dopri5 $(CELLS) --over interval=20,40,100 $(STARTS) --random 12 --out figures/audit/fig7.parquet
+	@$(SWEEP) --t-end 2e5 --method dopri5 --restart 100 $(CELLS) --over sigma=0.01,0.1,0.13 $(STARTS) --random 12 --out figures/audit/fig8.parquet
+
 proofs: ## prove the theorems anew (proofs/README.md), write their certificates and check those (minutes)
 	@set -e; for p in $(PROOFS); do $(RUN) --package twofold-proofs --bin $$p; done
 	@python3 proofs/check.py
@@ -43,9 +60,21 @@ browser-test: ## the report in a headless Chromium, if there is one (needs Node)
 	@$(CARGO) build --release --locked --bins
 	@if command -v node >/dev/null; then node scripts/browser_test.mjs $(BROWSER_TEST); else echo "browser test SKIPPED: no Node found"; fi
 
+.PHONY: python-test deny
+PYTHON  ?= python3
+VENV    := target/python
+python-test: ## the Python package, installed into an environment of its own and tested (needs Python 3.9 or newer and PyPI)
+	@$(PYTHON) -m venv $(VENV)
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check './python[test]'
+	@$(CARGO) build --release --locked --bin twofold
+	@TWOFOLD_PROGRAM=$(CURDIR)/target/release/twofold $(VENV)/bin/python -m pytest python $(PYTEST_FLAGS)
+
+deny: ## licences, duplicates, sources and known defects of every dependency (needs cargo-deny: cargo install --locked cargo-deny)
+	@$(CARGO) deny --workspace check
+
 lint: ## formatting, clippy and documentation, warnings denied
 	@$(CARGO) fmt --check
-	@$(CARGO) clippy --workspace --locked --all-targets -- -D warnings
+	@$(CARGO) clippy --workspace --exclude twofold-python --locked --all-targets -- -D warnings
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --quiet
 
 torture: ## kill the program at random moments and look for losses: make torture KILLS=100

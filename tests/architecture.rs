@@ -55,7 +55,7 @@ const LIBRARIES: [(&str, &[&str]); 11] = [
     ("plotters", &["render"]),
     ("plotters_backend", &["render"]),
     ("tiny_skia", &["render"]),
-    ("ttf_parser", &["render"]),
+    ("skrifa", &["render"]),
     ("tempfile", &["record", "job"]),
     ("clap", &["cli", "bin"]),
 ];

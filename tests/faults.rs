@@ -368,16 +368,67 @@ fn an_interrupted_sweep_keeps_its_rows() {
     let to = out.to_str().unwrap();
     let mut sweep = Running::start(&["sweep", "--runs", "1000000", "--t-end", "300", "--threads", "1", "--out", to]);
     let mut lines = std::io::BufRead::lines(std::io::BufReader::new(sweep.child().stderr.take().unwrap()));
-    // A classification's line comes after those of the runs that it rests on.
-    let finished = lines.by_ref().map(Result::unwrap).filter(|l| l.contains("what becomes of")).take(3).count();
+    let finished = lines.by_ref().map(Result::unwrap).filter(|l| l.contains("of 1000000 rows")).take(3).count();
     assert_eq!(finished, 3);
     signal(&mut sweep, "INT");
     let rest: Vec<String> = lines.map(Result::unwrap).collect();
     assert_eq!(sweep.output().status.code(), Some(130), "{rest:?}");
     assert!(rest.last().unwrap().contains("runs are finished"), "{rest:?}");
-    let rows = fs::read_to_string(folder.path().join("sweep.csv.part")).unwrap();
-    assert!(rows.starts_with("shift,verdict") && rows.lines().count() >= 4 && rows.ends_with('\n'), "{rows}");
-    assert_eq!(files(folder.path()), ["sweep.csv.part"]);
+    assert_eq!(files(folder.path()), ["sweep.csv.journal"]);
+    // What is there can be looked at, and a sweep that was not told to go on leaves it alone.
+    let journal = folder.path().join("sweep.csv.journal");
+    let part = twofold(&["sweep", "merge", journal.to_str().unwrap(), "--quiet"]);
+    assert!(String::from_utf8(part.stdout).unwrap().lines().count() >= 5);
+    refuses(&twofold(&["sweep", "--t-end", "300", "--out", to]), 2, &["--resume"]);
+}
+
+/// Killed without warning and gone on with, whole or in parts: the same bytes.
+#[cfg(unix)]
+#[test]
+fn a_killed_sweep_goes_on_to_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let axes = [
+        "--over",
+        "params.alpha=0.1,0.2",
+        "--over",
+        "shift.x=0..1e-9",
+        "--random",
+        "30",
+        "--t-end",
+        "120",
+        "--threads",
+        "1",
+    ];
+    let sweep =
+        |more: &[&str]| [&["sweep"], &axes[..], more].concat().iter().map(|s| s.to_string()).collect::<Vec<_>>();
+    let run = |more: &[&str]| {
+        let arguments = sweep(more);
+        let done = twofold(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+        assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
+    };
+    let whole = file("whole.parquet");
+    run(&["--out", &whole]);
+    let cut = file("cut.parquet");
+    let arguments = sweep(&["--out", &cut]);
+    for _ in 0..3 {
+        let resumed: Vec<&str> = arguments.iter().map(String::as_str).chain(["--resume"]).collect();
+        let mut running = Running::start(&resumed);
+        std::thread::sleep(std::time::Duration::from_millis(150));
+        let _ = running.child().kill();
+        drop(running);
+    }
+    run(&["--out", &cut, "--resume"]);
+    assert!(fs::read(&whole).unwrap() == fs::read(&cut).unwrap());
+    let (a, b, c) = (file("a.csv"), file("b.parquet"), file("c.parquet"));
+    run(&["--out", &a, "--shard", "1/3"]);
+    run(&["--out", &b, "--shard", "2/3"]);
+    run(&["--out", &c, "--shard", "3/3"]);
+    let merged = file("merged.parquet");
+    assert_eq!(twofold(&["sweep", "merge", &c, &a, &b, "--out", &merged, "--quiet"]).status.code(), Some(0));
+    assert!(fs::read(&whole).unwrap() == fs::read(&merged).unwrap());
+    // Another sweep's file is refused.
+    refuses(&twofold(&["sweep", "--t-end", "9", "--resume", "--out", &whole]), 2, &["different sweeps"]);
 }
 
 /// A short fig. 7 on one thread, into `folder`.

@@ -33,7 +33,7 @@ pub fn figure() -> Figure {
                 )
             };
             vec![
-                panel("i", 20.0).claimed(Claim::Section(SectionClaim::Period(1))),
+                panel("i", 20.0).claimed(Claim::Section(SectionClaim::Periodic)),
                 panel("ii", 40.0).claimed(Claim::Section(SectionClaim::Period(3))),
                 panel("iii", 100.0).claimed(Claim::Section(SectionClaim::Chaos)),
             ]

@@ -22,7 +22,7 @@ pub fn figure() -> Figure {
             let mut panels = Vec::new();
             for (row, method) in ["a", "b", "c"].into_iter().zip([Method::Lsoda, Method::Dopri5, Method::Radau5]) {
                 for (column, interval, claim) in [
-                    ("i", 20.0, SectionClaim::Period(1)),
+                    ("i", 20.0, SectionClaim::Periodic),
                     ("ii", 40.0, SectionClaim::Period(3)),
                     ("iii", 100.0, SectionClaim::Chaos),
                 ] {

@@ -155,6 +155,10 @@ impl Observer<3> for Until {
 
 /// Runs `stepper` from `x0` and compares its n-th crossing of `plane` with the n-th of `reference`. Fewer rows come back
 /// if the method has made fewer crossings when twice the reference's time is over.
+///
+/// # Errors
+///
+/// If the method fails before its last crossing.
 pub fn agreement<F: VectorField<3>, M: Stepper<3>>(
     field: &F,
     x0: SVector<f64, 3>,

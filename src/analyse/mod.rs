@@ -28,6 +28,7 @@
 //! ```
 
 pub mod attractor;
+pub mod counts;
 pub mod digits;
 pub mod divider;
 pub mod floquet;

@@ -9,17 +9,18 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 
 use super::CliError;
-use super::words::{KickLaw, Method, Reading, Relaxation};
+use super::words::{KickLaw, Method, Reading, Relaxation, Transition};
 use crate::integrate;
 use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use crate::integrate::{Kick, Schedule, StepCap, Tolerance};
 use crate::job::spec::*;
+use crate::job::sweep::{Axis, Coordinate};
 use crate::num::Decimal;
 use crate::num::decimal::DecimalError;
 use crate::paper;
 use crate::record::files::{read_text, read_text_from};
 use crate::system::diagnostic::nearest;
-use crate::system::{Definition, ParameterError, System, Transition, library};
+use crate::system::{self, Definition, ParameterError, System, library};
 
 /// The flags that describe a run. What is not given has the default that its help names.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -52,7 +53,10 @@ pub struct RunFlags {
     /// Stiffness parameter [default: 0.001].
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub eps: Option<f64>,
-    /// Size of the transition function's perturbation (fig. 8) [default: none].
+    /// How the smoothed switch goes over from one side to the other [default: tanh].
+    #[arg(long, value_enum, help_heading = "System")]
+    pub transition: Option<Transition>,
+    /// Size of the tanh transition's perturbation (fig. 8) [default: none].
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub sigma: Option<f64>,
     /// Relaxation time of the hysteretic switch [default: 10 eps].
@@ -200,7 +204,7 @@ const NOT_FILIPPOV: &str =
 const OF_KICKS: &str = "there are no kicks; leave it out, or give --kick-every";
 
 /// The table. Every flag of [`RunFlags`] but --spec stands in it once.
-const EFFECTS: [Effect; 33] = {
+const EFFECTS: [Effect; 34] = {
     const fn always(flag: &'static str, given: fn(&RunFlags) -> bool) -> Effect {
         Effect { flag, given, works: |_, _| true, why: "" }
     }
@@ -236,10 +240,16 @@ const EFFECTS: [Effect; 33] = {
             "the discontinuous system has no eps; leave it out, or choose another --switch",
         ),
         when(
+            "--transition",
+            |f| f.transition.is_some(),
+            |f, _| f.switch() == Switch::Smoothed,
+            "it shapes the smoothed switch; leave it out, or use --switch smoothed",
+        ),
+        when(
             "--sigma",
             |f| f.sigma.is_some(),
-            |f, _| f.switch() == Switch::Smoothed,
-            "it perturbs the smoothed switch; leave it out, or use --switch smoothed",
+            |f, _| f.switch() == Switch::Smoothed && matches!(f.transition, None | Some(Transition::Tanh)),
+            "it perturbs the smoothed switch's tanh; leave it out, or use --switch smoothed and --transition tanh",
         ),
         when(
             "--eps-prime",
@@ -332,6 +342,68 @@ impl From<Misuse> for CliError {
 }
 
 impl RunFlags {
+    /// The first flag here that gives a number which every row of a sweep over `axes` replaces, and the axes' name for it.
+    pub fn replaced_by(&self, axes: &[Axis]) -> Option<(&'static str, String)> {
+        let varied = |c: &Coordinate| axes.iter().any(|axis| axis.coordinate == *c);
+        let parameter = |name: &str| varied(&Coordinate::Parameter(name.to_owned()));
+        let tolerance = varied(&Coordinate::Tolerance);
+        let plain = |c: Coordinate| varied(&c).then(|| c.to_string());
+        let named = |name: &str| parameter(name).then(|| format!("params.{name}"));
+        let starts = axes.iter().filter(|axis| matches!(axis.coordinate, Coordinate::Start(_))).count();
+        let all_started = || self.start.as_ref().is_some_and(|s| s.len() == starts).then(|| "start.NAME".to_owned());
+        // A reading is of use where it gives a number in which readings differ.
+        let both = || {
+            let values = paper::Reading::ALL.map(|r| [r.caricature().alpha, r.caricature().beta]);
+            let gives = |i: usize, flag: bool, name: &str| {
+                flag || self.sets(name) || parameter(name) || values.iter().all(|v| v[i] == values[0][i])
+            };
+            let replaced = parameter("alpha") || parameter("beta");
+            (replaced && gives(0, self.alpha.is_some(), "alpha") && gives(1, self.beta.is_some(), "beta"))
+                .then(|| "params.alpha and params.beta".to_owned())
+        };
+        let set = || {
+            let names = self.set.iter().filter_map(|text| text.split('=').next());
+            names.map(str::trim).find_map(named)
+        };
+        let of = |coordinate: Coordinate| {
+            if tolerance && matches!(coordinate, Coordinate::Rtol | Coordinate::Atol) {
+                Some(Coordinate::Tolerance.to_string())
+            } else {
+                plain(coordinate)
+            }
+        };
+        let table: [(&'static str, bool, Option<String>); 19] = [
+            ("--set", !self.set.is_empty(), set()),
+            ("--reading", self.reading.is_some(), both()),
+            ("--alpha", self.alpha.is_some(), named("alpha")),
+            ("--beta", self.beta.is_some(), named("beta")),
+            ("--v-plus", self.v_plus.is_some(), named("v_plus")),
+            ("--v-minus", self.v_minus.is_some(), named("v_minus")),
+            ("--eps", self.eps.is_some(), self.eps_is_replaced(axes)),
+            ("--sigma", self.sigma.is_some(), of(Coordinate::Sigma)),
+            ("--eps-prime", self.eps_prime.is_some(), of(Coordinate::EpsPrime)),
+            ("--start", self.start.is_some(), all_started()),
+            ("--t-end", self.t_end.is_some(), of(Coordinate::TEnd)),
+            ("--method", self.method.is_some(), of(Coordinate::Method)),
+            ("--rtol", self.rtol.is_some(), of(Coordinate::Rtol)),
+            ("--atol", self.atol.is_some(), of(Coordinate::Atol)),
+            ("--max-step", self.max_step.is_some(), of(Coordinate::MaxStep)),
+            ("--restart", self.restart.is_some(), of(Coordinate::Interval)),
+            ("--kick-size", self.kick_size.is_some(), of(Coordinate::KickSize)),
+            ("--seed", self.seed.is_some(), of(Coordinate::Seed)),
+            ("--stream", self.stream.is_some(), of(Coordinate::Stream)),
+        ];
+        table.into_iter().find_map(|(flag, given, by)| if given { Some((flag, by?)) } else { None })
+    }
+
+    /// --eps also gives eps' and the size of kicks where those have no flag of their own.
+    fn eps_is_replaced(&self, axes: &[Axis]) -> Option<String> {
+        let used_elsewhere = (self.kicked() && self.kick_size.is_none())
+            || (self.switch() == Switch::Hysteretic && self.eps_prime.is_none());
+        let varied = axes.iter().any(|axis| axis.coordinate == Coordinate::Eps);
+        (varied && !used_elsewhere).then(|| Coordinate::Eps.to_string())
+    }
+
     /// The spec that the flags describe, checked. For [`Use::Passages`] a path becomes its passages through the plane where the second
     /// coordinate is zero.
     ///
@@ -378,7 +450,13 @@ impl RunFlags {
         let switch = match self.switch() {
             Switch::Smoothed => SwitchSpec::Smoothed {
                 eps,
-                transition: self.sigma.map_or(Transition::Tanh, |sigma| Transition::PerturbedTanh { sigma }),
+                transition: match (self.transition.unwrap_or(Transition::Tanh), self.sigma) {
+                    (Transition::Tanh, Some(sigma)) => system::Transition::PerturbedTanh { sigma },
+                    (Transition::Tanh, None) => system::Transition::Tanh,
+                    (Transition::Arctan, _) => system::Transition::Arctan,
+                    (Transition::Algebraic, _) => system::Transition::Algebraic,
+                    (Transition::Erf, _) => system::Transition::Erf,
+                },
             },
             Switch::Hysteretic => SwitchSpec::Hysteretic {
                 eps,
@@ -553,7 +631,7 @@ mod tests {
 
     /// Every flag with a value that no default has and that every run allows on which the flag has an effect; several, if
     /// none differs from every default.
-    const SAMPLES: [(&str, &[&str]); 33] = [
+    const SAMPLES: [(&str, &[&str]); 34] = [
         ("--system", &["wheel", "two-fold"]),
         ("--set", &["alpha=0.3", "omega0=1.1"]),
         ("--switch", &["smoothed", "hysteretic", "filippov"]),
@@ -563,6 +641,7 @@ mod tests {
         ("--v-plus", &["-1.3"]),
         ("--v-minus", &["-1.5"]),
         ("--eps", &["0.002"]),
+        ("--transition", &["arctan"]),
         ("--sigma", &["0.1"]),
         ("--eps-prime", &["0.03"]),
         ("--hysteresis", &["single"]),
@@ -658,6 +737,66 @@ mod tests {
             }
         }
         assert!(tried > 1500 && refused > 500, "{tried} pairs, {refused} refused");
+    }
+
+    /// Every flag beside every axis of a sweep: some row asks something else because of the flag, or the flag is refused.
+    #[test]
+    fn no_flag_is_ignored_beside_an_axis() {
+        use crate::job::sweep::Sweep;
+        let axes = [
+            "params.alpha=0.3,0.4",
+            "params.beta=0.3,0.4",
+            "params.v_plus=-2,-3",
+            "start.x=1,2",
+            "shift.x=1,2",
+            "rtol=1e-5,1e-6",
+            "atol=1e-5,1e-6",
+            "tolerance=1e-5,1e-6",
+            "max-step=1,2",
+            "t-end=3,4",
+            "interval=1,2",
+            "eps=0.01,0.02",
+            "eps-prime=0.01,0.02",
+            "sigma=0.3,0.4",
+            "kick-every=1,2",
+            "kick-size=1,2",
+            "seed=1,2",
+            "stream=1,2",
+            "method=taylor,dopri5",
+        ];
+        let lists: Vec<Vec<Axis>> = axes
+            .iter()
+            .map(|a| vec![a.parse().unwrap()])
+            .chain([vec![axes[0].parse().unwrap(), axes[1].parse().unwrap()]])
+            .chain([["start.x=1", "start.y=1", "start.z=1"].iter().map(|a| a.parse().unwrap()).collect()])
+            .collect();
+        let rows = |flags: &RunFlags, over: &[Axis]| {
+            let sweep = Sweep::new(flags.spec(Use::Passages).ok()?, over.to_vec(), None).ok()?;
+            Some((0..sweep.rows()).map(|row| sweep.question(row).map(|q| q.0.run)).collect::<Vec<_>>())
+        };
+        let (mut tried, mut refused) = (0, 0);
+        for kind in kinds() {
+            for over in &lists {
+                let Some(plain) = rows(&parse(&kind), over) else { continue };
+                for (flag, values) in SAMPLES.iter().filter(|(flag, _)| !kind.contains(flag)) {
+                    let with = parse(&[&kind[..], &[flag, values[0]]].concat());
+                    // A flag that is refused on its own is another test's business.
+                    let Some(changed) = rows(&with, over) else { continue };
+                    tried += 1;
+                    match with.replaced_by(over) {
+                        Some((named, _)) => {
+                            refused += 1;
+                            assert!(
+                                changed == plain && named == *flag || kind.contains(&named),
+                                "{kind:?} {flag} {over:?}: {named}"
+                            );
+                        }
+                        None => assert!(changed != plain, "{kind:?} {flag} {over:?}: accepted without effect"),
+                    }
+                }
+            }
+        }
+        assert!(tried > 5000 && refused > 300, "{tried} tried, {refused} refused");
     }
 
     /// With a spec from a file every other flag is refused, whatever it is.

@@ -3,6 +3,15 @@
 //! - [`figure`]: the command line that every figure's binary shares. [`commands`]: that of `twofold`.
 //! - [`flags`]: the flags that describe a run, and the table of which of them has an effect when. [`words`]: values by name.
 //! - [`exit`]: exit codes and errors. [`speak`]: the two streams. [`progress`]: bars. [`interrupt`]: Ctrl-C.
+//!
+//! ```
+//! use twofold::cli::{CliError, Exit, in_pool};
+//! assert_eq!(in_pool(2, || 6 * 7)?, 42);
+//! let refused = in_pool(1_000_000, || ()).expect_err("more threads than are ever started");
+//! assert_eq!(refused.exit(), Exit::Usage);
+//! assert_eq!(Exit::Usage as u8, 2);
+//! # Ok::<(), CliError>(())
+//! ```
 
 pub mod commands;
 pub mod exit;

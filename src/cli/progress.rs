@@ -1,7 +1,7 @@
 //! Progress on standard error: bars on a terminal, plain lines elsewhere, nothing with `--quiet`.
 
 use std::io::{self, IsTerminal};
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -126,6 +126,92 @@ impl Watch for RunProgress<'_> {
         }
         self.progress.asked_to_stop().is_none()
     }
+}
+
+/// The progress of many short jobs: how many are finished, and the time left. On a terminal a bar, elsewhere a line now and then.
+pub struct Tally<'a> {
+    progress: &'a Progress,
+    bar: Option<ProgressBar>,
+    total: u64,
+    state: Mutex<TallyState>,
+}
+
+struct TallyState {
+    finished: u64,
+    failed: u64,
+    begun: Instant,
+    /// When the next line is due.
+    next: Duration,
+}
+
+/// The first line comes after this, each next one after twice the time that passed, at most [`LINE_EVERY`] later.
+const FIRST_LINE: Duration = Duration::from_millis(200);
+/// The longest time between two lines.
+const LINE_EVERY: Duration = Duration::from_secs(60);
+
+impl<'a> Tally<'a> {
+    /// Counts up to `total`.
+    pub fn new(progress: &'a Progress, total: u64) -> Self {
+        let bar = match &progress.style {
+            Style::Bars(bars) => {
+                let bar = bars.add(ProgressBar::new(total));
+                bar.set_style(
+                    ProgressStyle::with_template("{human_pos} of {human_len} rows {wide_bar} {eta} left {msg}")
+                        .unwrap_or_else(|_| ProgressStyle::default_bar()),
+                );
+                Some(bar)
+            }
+            _ => None,
+        };
+        let state = TallyState { finished: 0, failed: 0, begun: Instant::now(), next: FIRST_LINE };
+        Self { progress, bar, total, state: Mutex::new(state) }
+    }
+
+    /// A job is finished.
+    pub fn done(&self, failed: bool) {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        state.finished += 1;
+        state.failed += u64::from(failed);
+        let failures = if state.failed > 0 { format!(", {} failed", state.failed) } else { String::new() };
+        if let Some(bar) = &self.bar {
+            bar.set_position(state.finished);
+            bar.set_message(failures);
+            return;
+        }
+        let spent = state.begun.elapsed();
+        if spent >= state.next && state.finished < self.total {
+            state.next = (2 * spent).min(spent + LINE_EVERY);
+            let left = spent.mul_f64((self.total - state.finished) as f64 / state.finished as f64);
+            let line = format!("{} of {} rows{failures}, about {} left", state.finished, self.total, human(left));
+            self.progress.line(&line);
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl job::Progress for Tally<'_> {
+    fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn job::JobWatch + 'a> {
+        Box::new(Silent(self.progress))
+    }
+}
+
+/// Shows nothing, and stops when the user asks for it.
+struct Silent<'a>(&'a Progress);
+
+impl Watch for Silent<'_> {
+    fn reached(&self, _: f64) -> bool {
+        self.0.asked_to_stop().is_none()
+    }
+}
+
+impl job::JobWatch for Silent<'_> {
+    fn done(self: Box<Self>, _: &str) {}
 }
 
 /// A time as people say it, rounded once.

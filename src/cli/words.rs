@@ -84,6 +84,19 @@ mirror! {
     }
 }
 
+/// A transition function of the smoothed switch, without the numbers that other flags give.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Transition {
+    /// phi = (1 + tanh(h/eps))/2, the article's.
+    Tanh,
+    /// phi = 1/2 + arctan(h/eps)/pi.
+    Arctan,
+    /// phi = (1 + u/sqrt(1 + u^2))/2, u = h/eps.
+    Algebraic,
+    /// phi = (1 + erf(h/eps))/2.
+    Erf,
+}
+
 /// Which readings to make.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Readings {

@@ -64,6 +64,10 @@ const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
 const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
 
 /// Compares pixel by pixel. Transparent pixels are laid on white first.
+///
+/// # Errors
+///
+/// If the two have different sizes.
 pub fn compare(expected: &Pixels, actual: &Pixels) -> Result<Comparison, SizesDiffer> {
     same_size(expected, actual)?;
     let (width, height) = (expected.width as usize, expected.height as usize);
@@ -205,6 +209,10 @@ const SMALL: usize = 350;
 /// The difference as a picture: what both share faintly in grey, ink that only `expected` has in orange, ink that only `actual` has in
 /// blue. Changed pixels are drawn wider on each side, by one pixel or, where they are few, by so many that a single one is
 /// seen when the picture is shown small.
+///
+/// # Errors
+///
+/// If the two have different sizes.
 pub fn difference_image(expected: &Pixels, actual: &Pixels) -> Result<Pixels, SizesDiffer> {
     same_size(expected, actual)?;
     let (width, height) = (expected.width as usize, expected.height as usize);

@@ -1,4 +1,13 @@
 //! From answers to drawings: sketches and surfaces made of plain data.
+//!
+//! ```
+//! use twofold::draw::surface;
+//! use twofold::system::System;
+//! let system = System::builtin("two-fold").expect("a built-in name");
+//! let cube = [(-1.0, 1.0); 3];
+//! let at = surface::singularity(&system, &cube).expect("the origin");
+//! assert!(at.iter().all(|x| x.abs() < 1e-12));
+//! ```
 
 pub mod sketch;
 pub mod surface;

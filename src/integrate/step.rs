@@ -70,6 +70,10 @@ pub struct Tolerance {
 pub trait Stepper<const N: usize> {
     /// Starts afresh at (t, x) towards `t_end` with steps no longer than `max_step`. Everything learnt before (step size,
     /// order, saved derivatives, factorised Jacobians) is forgotten; only [`Statistics`] go on counting.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure`]: the field is not finite at `x`, or no first step can be found.
     fn restart<F: VectorField<N>>(
         &mut self,
         field: &F,
@@ -81,6 +85,10 @@ pub trait Stepper<const N: usize> {
 
     /// Makes one accepted step. Never passes `t_end`; the step that reaches it has `t1 == t_end` exactly. Must not be
     /// called again after that without [`Stepper::restart`].
+    ///
+    /// # Errors
+    ///
+    /// [`Failure`]: the step shrank below rounding, an iteration did not converge, or the state is no longer finite. The stepper must be restarted before it is used again.
     fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure>;
 
     /// What the method has done since it was made.

@@ -148,6 +148,10 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
     }
 
     /// [`Stepper::restart`] from a time and state in full precision.
+    ///
+    /// # Errors
+    ///
+    /// The same as [`Stepper::restart`].
     pub fn restart_from<F: VectorField<N>>(
         &mut self,
         field: &F,

@@ -2,16 +2,16 @@
 
 use serde_json::{Value, json};
 
-use super::answer::Answer;
+use super::answer::{Answer, Stop};
 use super::desk::Desk;
 use super::exponent::LargestExponent;
 use super::question::{JobError, Question};
-use super::recording::{Data, Recording};
 use super::run::Run;
 use super::spec::{Observation, RunSpec, SwitchSpec};
+use crate::analyse::Direction;
 use crate::analyse::attractor::{self, Evidence, SectionPoint, Thresholds, Verdict, classify};
 use crate::analyse::lyapunov::{self, Exponent};
-use crate::analyse::{Crossing, Direction};
+use crate::integrate::filippov::ExitRule;
 use crate::integrate::{Schedule, Watch};
 
 /// What a run settles on, judged from its section: with the largest exponent where motion is not captured by a cycle, and beside its noise-free
@@ -68,105 +68,177 @@ impl Question for Classification {
 struct Lengths {
     /// Time after which the first transient is over and a chaotic run is on its structure.
     settling: f64,
-    /// Fewest points that make a structure to compare with.
+    /// Fewest points of a noise-free run that make a structure to compare with.
     structure_points: usize,
+    /// Noise-free runs that are made to compare with ...
+    free_runs: usize,
+    /// ... how far apart they start ...
+    free_shift: f64,
+    /// ... and how long they are.
+    free_length: f64,
     /// Time over which a hysteretic system's exponent is averaged: stiff for the explicit method of the variational equation.
     hysteretic_average: f64,
 }
 
-const LENGTHS: Lengths = Lengths { settling: 1000.0, structure_points: 2000, hysteretic_average: 2_000.0 };
+const LENGTHS: Lengths = Lengths {
+    settling: 1000.0,
+    structure_points: 2000,
+    free_runs: 8,
+    free_shift: 1e-9,
+    free_length: 5e4,
+    hysteretic_average: 2_000.0,
+};
 
 impl Classification {
     fn evidence(&self, desk: &Desk<'_>) -> Result<Evidence, JobError> {
+        self.evidence_of(desk, &*desk.ask(&Run(self.run.clone()))?)
+    }
+
+    /// The evidence that an answer to the run's question gives.
+    pub(super) fn evidence_of(&self, desk: &Desk<'_>, answer: &Answer) -> Result<Evidence, JobError> {
         let run = &self.run;
-        let (recording, section) = section(desk, run)?;
+        let (end, section) = section(run, answer)?;
+        let random_exits = matches!(run.switch, SwitchSpec::Filippov { exit: ExitRule::Random { .. }, .. });
         let mut question = attractor::Question {
             t_end: Some(run.t_end),
             shown_from: 0.5 * run.t_end,
-            kicked: run.schedule.kick.is_some(),
+            kicked: run.schedule.kick.is_some() || random_exits,
             lyapunov: None,
             reference: None,
         };
         if question.kicked {
-            let reference = self.noise_free_structure(desk)?;
-            question.reference = Some(&reference);
+            // Without its chance a random exit rule is no rule: there is nothing to compare with.
+            let reference = if random_exits { None } else { Some(self.noise_free_structure(desk)?) };
+            question.reference = reference.as_deref();
             return Ok(classify(&section, &question, &self.thresholds));
         }
         let evidence = classify(&section, &question, &self.thresholds);
-        if let Verdict::Chaotic { .. } = evidence.verdict {
-            question.lyapunov = self.exponent(desk, recording.x)?;
+        if let Verdict::Chaotic { .. } | Verdict::Undecided { .. } = evidence.verdict {
+            question.lyapunov = self.exponent(desk, end)?;
             return Ok(classify(&section, &question, &self.thresholds));
         }
         Ok(evidence)
     }
 
     /// The largest exponent of the run's system, from its final state; `None` if that orbit could not be followed.
-    fn exponent(&self, desk: &Desk<'_>, start: [f64; 3]) -> Result<Option<Exponent>, JobError> {
+    fn exponent(&self, desk: &Desk<'_>, start: Vec<f64>) -> Result<Option<Exponent>, JobError> {
         let settings = match self.run.switch {
             SwitchSpec::Hysteretic { .. } => {
                 lyapunov::Settings { duration: LENGTHS.hysteretic_average, ..lyapunov::Settings::default() }
             }
             _ => lyapunov::Settings::default(),
         };
-        let question = LargestExponent {
-            system: self.run.system.clone(),
-            switch: self.run.switch,
-            start: start.to_vec(),
-            settings,
-        };
+        let question = LargestExponent { system: self.run.system.clone(), switch: self.run.switch, start, settings };
         Ok(desk.ask(&question)?.fact("exponent").ok())
     }
 
-    /// The structure that noise can wash out: the section of the same run without kicks, as long as it was not captured by a closed orbit.
-    /// If it was captured at once, what is left is the closed orbit's dots.
-    fn noise_free_structure(&self, desk: &Desk<'_>) -> Result<Vec<SectionPoint>, JobError> {
+    /// The structure that noise can wash out: sections of the same run without kicks, from starts a little apart, each as long as it was not
+    /// captured by a closed orbit.
+    fn noise_free_structure(&self, desk: &Desk<'_>) -> Result<Vec<Vec<SectionPoint>>, JobError> {
         let run = &self.run;
-        let twin = RunSpec { schedule: Schedule { kick: None, ..run.schedule }, ..run.clone() };
-        let (_, section) = section(desk, &twin)?;
-        let question = attractor::Question {
-            t_end: Some(run.t_end),
-            shown_from: 0.5 * run.t_end,
-            ..attractor::Question::default()
-        };
-        let verdict = classify(&section, &question, &self.thresholds).verdict;
-        let captured = verdict.cycle().map_or(f64::INFINITY, |c| c.captured_at);
-        let (mut loose, late): (Vec<SectionPoint>, Vec<SectionPoint>) = (
-            section.iter().filter(|p| p.t > LENGTHS.settling && p.t < captured).copied().collect(),
-            section.iter().filter(|p| p.t > 0.5 * run.t_end).copied().collect(),
-        );
-        if loose.len() < LENGTHS.structure_points {
-            loose = late;
+        let mut free = Vec::new();
+        for k in 0..LENGTHS.free_runs {
+            let mut twin = RunSpec {
+                schedule: Schedule { kick: None, ..run.schedule },
+                t_end: run.t_end.min(LENGTHS.free_length),
+                ..run.clone()
+            };
+            twin.start[0] += k as f64 * LENGTHS.free_shift;
+            let (_, section) = section(&twin, &*desk.ask(&Run(twin.clone()))?)?;
+            let question = attractor::Question {
+                t_end: Some(twin.t_end),
+                shown_from: 0.5 * twin.t_end,
+                ..attractor::Question::default()
+            };
+            let verdict = classify(&section, &question, &self.thresholds).verdict;
+            let captured = verdict.cycle().map_or(f64::INFINITY, |c| c.captured_at);
+            let loose: Vec<SectionPoint> =
+                section.into_iter().filter(|p| p.t > LENGTHS.settling && p.t < captured).collect();
+            if loose.len() >= LENGTHS.structure_points {
+                free.push(loose);
+            }
         }
-        // The classifier compares what is shown; the whole structure is to be compared.
-        loose.iter_mut().for_each(|p| p.t = run.t_end);
-        Ok(loose)
+        Ok(free)
     }
 }
 
-/// The run's recording and its section as the classifier takes it.
-fn section(desk: &Desk<'_>, run: &RunSpec) -> Result<(Recording, Vec<SectionPoint>), JobError> {
-    if run.system.dimension() != 3 {
-        return Err(JobError::Other(
-            "a run is classified from the plane of a section, so its system must have three states".into(),
+/// Where the run ended, and its section as the classifier takes it: in the plane of the first two coordinates that the section leaves free. With
+/// two states there is one, and the other is 0; with more than three this is a projection, in which different points may fall together but
+/// one orbit's period, its approach and its irregularity are seen as they are.
+fn section(run: &RunSpec, answer: &Answer) -> Result<(Vec<f64>, Vec<SectionPoint>), JobError> {
+    let refused = |why: &str| JobError::Other(why.into());
+    let Observation::Section { coordinate, .. } = run.observe else {
+        return Err(refused("a run is classified from its section; record one with --section"));
+    };
+    if answer.stop == Stop::Interrupted {
+        return Err(JobError::Interrupted);
+    }
+    let names = run.system.coordinates();
+    let mut free = names.iter().enumerate().filter(|(i, _)| *i != coordinate).map(|(_, name)| *name);
+    let Some(first) = free.next() else {
+        return Err(refused(
+            "a run is classified from where it meets a section, so its system must have at least two states",
         ));
-    }
-    let recording = Recording::of_answer(run, &*desk.ask(&Run(run.clone()))?)?.whole()?;
-    let Data::Section(crossings) = &recording.data else {
-        return Err(JobError::Other("a run is classified from its section; record one with --section".into()));
     };
-    let points = points(run, crossings);
-    Ok((recording, points))
+    let table = answer.table("section").ok_or_else(|| refused("the run has no table of its section"))?;
+    let (u, v) = (table.numbers(first), free.next().map(|second| table.numbers(second)));
+    let directions = table.words("direction").map(|word| word == Direction::Up.word());
+    let points = table.numbers("t").iter().zip(u).zip(directions).enumerate();
+    let points =
+        points.map(|(row, ((t, u), upward))| SectionPoint { t: *t, u: [*u, v.map_or(0.0, |v| v[row])], upward });
+    Ok((answer.fact("state")?, points.collect()))
 }
 
-/// The section's points in the plane of the two coordinates that are not fixed by it.
-pub fn points(run: &RunSpec, crossings: &[Crossing]) -> Vec<SectionPoint> {
-    let coordinate = match run.observe {
-        Observation::Section { coordinate, .. } => coordinate,
-        Observation::Path { .. } => 1,
-    };
-    let kept: Vec<usize> = (0..3).filter(|i| *i != coordinate).collect();
-    crossings
-        .iter()
-        .map(|c| SectionPoint { t: c.t, u: [c.x[kept[0]], c.x[kept[1]]], upward: c.direction == Direction::Up })
-        .collect()
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::{StepCap, Tolerance};
+    use crate::job::spec::{DEFAULT_MAX_STEPS, Method, MethodSpec};
+    use crate::system::{Definition, System};
+
+    /// Van der Pol's oscillator at mu = 1, alone and with states that follow it or die out: period 6.663286859, amplitude 2.00861986 (Urabe 1958).
+    fn evidence(states: &str, field: &str, start: Vec<f64>) -> Result<Evidence, JobError> {
+        let text = format!("states = {states}\nh = \"y\"\nplus = {field}\nminus = {field}\n");
+        let run = RunSpec {
+            system: System::new(Definition::from_toml(&text, "oscillator.toml").unwrap()),
+            switch: SwitchSpec::tanh(1e-2),
+            start,
+            t_end: 2000.0,
+            method: MethodSpec {
+                name: Method::Dopri5,
+                tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
+                step_cap: StepCap::None,
+                max_steps: DEFAULT_MAX_STEPS,
+            },
+            schedule: Schedule::default(),
+            observe: Observation::Section { coordinate: 1, value: 0.0 },
+        };
+        Classification::of(run).ask(&Desk::quiet())
+    }
+
+    #[test]
+    fn a_limit_cycle_is_recognised_in_two_states_and_in_five() {
+        let two = evidence("[\"x\", \"y\"]", "[\"y\", \"(1 - x*x)*y - x\"]", vec![0.1, 0.0]).unwrap();
+        let five = evidence(
+            "[\"a\", \"y\", \"x\", \"b\", \"c\"]",
+            "[\"-a\", \"(1 - x*x)*y - x\", \"y\", \"x - b\", \"y - 2*c\"]",
+            vec![1.0, 0.0, 0.1, 0.0, 0.0],
+        )
+        .unwrap();
+        for (evidence, amplitude) in [(two, 0), (five, 1)] {
+            let cycle = evidence.verdict.cycle().unwrap_or_else(|| panic!("{}", evidence.summary));
+            assert!(matches!(evidence.verdict, Verdict::Periodic(_)), "{}", evidence.summary);
+            assert_eq!(cycle.period, 1);
+            assert!((cycle.duration - 6.663_286_859).abs() < 1e-5, "{}", cycle.duration);
+            let sizes = cycle.points.iter().map(|p| p.u[amplitude].abs());
+            // In five states the plane is (a, x).
+            sizes.for_each(|size| assert!((size - 2.008_619_86).abs() < 1e-6, "{size}"));
+        }
+    }
+
+    #[test]
+    fn one_state_has_no_section_to_judge() {
+        let error = evidence("[\"y\"]", "[\"-y\"]", vec![1.0]).unwrap_err();
+        assert!(error.to_string().contains("at least two states"), "{error}");
+    }
 }

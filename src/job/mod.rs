@@ -8,6 +8,7 @@
 //! |---|---|
 //! | [`Run`] | what happens from a start: a path, a section, a Filippov motion, a funnel of futures |
 //! | [`Classification`] | what a run settles on |
+//! | [`Fate`](sweep::Fate) | the same, or that the run leaves for good: a cell of a [`Sweep`](sweep::Sweep) |
 //! | [`LargestExponent`] | how fast neighbours part |
 //! | [`PathComparison`] | how alike two paths are |
 //! | [`MethodDigits`] | how many digits of an orbit methods get right |
@@ -52,6 +53,7 @@ pub mod run;
 pub mod simulate;
 pub mod spec;
 pub mod store;
+pub mod sweep;
 pub mod table;
 
 pub use answer::{Answer, Stop};

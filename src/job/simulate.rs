@@ -24,8 +24,29 @@ pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, JobError
     if spec.system.dimension() != 3 {
         return Err(too_many_states(spec, "three states are looked at here"));
     }
-    let recording = three_states(spec, watch)?;
+    let recording = three_states(spec, None, watch)?;
     if recording.stop == StopReason::Observer {
+        return Err(full(recording.t));
+    }
+    Ok(recording)
+}
+
+/// Says of a state whether a run that has come there may end.
+pub type Until<'a> = &'a dyn Fn(&[f64]) -> bool;
+
+/// Computes the section of a smoothed or hysteretic run of a system with three states, and ends it at the first step's end of which `until`
+/// holds: the recording then stops with [`StopReason::Observer`], and is otherwise that of [`simulate`].
+///
+/// # Errors
+///
+/// As [`simulate`].
+pub fn simulate_until(spec: &RunSpec, until: Until<'_>, watch: &dyn Watch) -> Result<Recording, JobError> {
+    spec.validate()?;
+    if spec.system.dimension() != 3 {
+        return Err(too_many_states(spec, "three states are looked at here"));
+    }
+    let recording = three_states(spec, Some(until), watch)?;
+    if recording.stop == StopReason::Observer && recording.data.len() >= MOST_POINTS {
         return Err(full(recording.t));
     }
     Ok(recording)
@@ -39,14 +60,14 @@ pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, JobError
 pub fn answer(spec: &RunSpec, watch: &dyn Watch) -> Result<Answer, JobError> {
     spec.validate()?;
     let answer = match spec.system.dimension() {
-        1 => record::<1, 2>(spec, watch)?.to_answer(spec),
-        2 => record::<2, 3>(spec, watch)?.to_answer(spec),
-        3 => three_states(spec, watch)?.to_answer(spec),
-        4 => record::<4, 5>(spec, watch)?.to_answer(spec),
-        5 => record::<5, 6>(spec, watch)?.to_answer(spec),
-        6 => record::<6, 7>(spec, watch)?.to_answer(spec),
-        7 => record::<7, 8>(spec, watch)?.to_answer(spec),
-        8 => record::<8, 9>(spec, watch)?.to_answer(spec),
+        1 => record::<1, 2>(spec, None, watch)?.to_answer(spec),
+        2 => record::<2, 3>(spec, None, watch)?.to_answer(spec),
+        3 => three_states(spec, None, watch)?.to_answer(spec),
+        4 => record::<4, 5>(spec, None, watch)?.to_answer(spec),
+        5 => record::<5, 6>(spec, None, watch)?.to_answer(spec),
+        6 => record::<6, 7>(spec, None, watch)?.to_answer(spec),
+        7 => record::<7, 8>(spec, None, watch)?.to_answer(spec),
+        8 => record::<8, 9>(spec, None, watch)?.to_answer(spec),
         _ => return Err(too_many_states(spec, "runs are computed with up to eight states")),
     };
     if answer.stop == Stop::Found { Err(full(answer.fact("t")?)) } else { Ok(answer) }
@@ -63,28 +84,32 @@ fn too_many_states(spec: &RunSpec, rule: &'static str) -> JobError {
 }
 
 /// Three states: by the compiled equations where there are some, which give the same bits as the recorded ones and give them sooner.
-fn three_states(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, JobError> {
+fn three_states(spec: &RunSpec, until: Option<Until<'_>>, watch: &dyn Watch) -> Result<Recording, JobError> {
     let x0 = start::<3>(spec);
     match (spec.system.compiled(), spec.switch) {
         (Some(Compiled::Caricature(system)), SwitchSpec::Smoothed { eps, transition }) => {
-            observe(spec, &Smoothed { system, transition, eps }, x0, watch)
+            observe(spec, &Smoothed { system, transition, eps }, x0, until, watch)
         }
         (Some(Compiled::Caricature(system)), SwitchSpec::Hysteretic { eps, eps_prime, relaxation, phi0 }) => {
             let field = Hysteretic { system, eps, eps_prime, relaxation };
-            observe(spec, &field, vector![x0[0], x0[1], x0[2], phi0], watch)
+            observe(spec, &field, vector![x0[0], x0[1], x0[2], phi0], until, watch)
         }
         (Some(Compiled::Caricature(system)), SwitchSpec::Filippov { exit, funnel }) => {
             discontinuous(spec, &system, x0, exit, funnel, watch)
         }
         (Some(Compiled::Wheel(system)), SwitchSpec::Smoothed { eps, transition }) => {
-            observe(spec, &Smoothed { system, transition, eps }, x0, watch)
+            observe(spec, &Smoothed { system, transition, eps }, x0, until, watch)
         }
-        _ => record::<3, 4>(spec, watch),
+        _ => record::<3, 4>(spec, until, watch),
     }
 }
 
 /// `D` states, by the recorded equations; `M` is `D + 1`.
-fn record<const D: usize, const M: usize>(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording<D>, JobError>
+fn record<const D: usize, const M: usize>(
+    spec: &RunSpec,
+    until: Option<Until<'_>>,
+    watch: &dyn Watch,
+) -> Result<Recording<D>, JobError>
 where
     for<'a> SlidingFlow<'a, Bound<D>, D>: VectorField<M>,
 {
@@ -92,12 +117,12 @@ where
     match spec.switch {
         SwitchSpec::Smoothed { eps, transition } => {
             let field = Field::smoothed(&spec.system, transition, eps).bind::<D>()?;
-            observe(spec, &field, x0, watch)
+            observe(spec, &field, x0, until, watch)
         }
         SwitchSpec::Hysteretic { eps, eps_prime, relaxation, phi0 } => {
             let field = Field::hysteretic(&spec.system, eps, eps_prime, relaxation).bind::<M>()?;
             let x0 = SVector::<f64, M>::from_fn(|i, _| if i < D { x0[i] } else { phi0 });
-            observe(spec, &field, x0, watch)
+            observe(spec, &field, x0, until, watch)
         }
         SwitchSpec::Filippov { exit, funnel } => {
             discontinuous(spec, &spec.system.bind::<D>()?, x0, exit, funnel, watch)
@@ -230,6 +255,7 @@ fn observe<F: VectorField<N>, const D: usize, const N: usize>(
     spec: &RunSpec,
     field: &F,
     x0: SVector<f64, N>,
+    until: Option<Until<'_>>,
     watch: &dyn Watch,
 ) -> Result<Recording<D>, JobError> {
     let (summary, data) = match spec.observe {
@@ -239,7 +265,13 @@ fn observe<F: VectorField<N>, const D: usize, const N: usize>(
         }
         Observation::Section { coordinate, value } => {
             let mut recorder = SectionRecorder::<D>::new(coordinate, value);
-            (integrate(spec, field, x0, D, &mut recorder, watch)?, Data::Section(recorder.into_crossings()))
+            let summary = match until {
+                None => integrate(spec, field, x0, D, &mut recorder, watch)?,
+                Some(until) => {
+                    integrate(spec, field, x0, D, &mut RecordUntil { recorder: &mut recorder, until }, watch)?
+                }
+            };
+            (summary, Data::Section(recorder.into_crossings()))
         }
     };
     Ok(Recording {
@@ -250,6 +282,21 @@ fn observe<F: VectorField<N>, const D: usize, const N: usize>(
         most_steps_in_segment: summary.most_steps_in_segment,
         stop: summary.stop,
     })
+}
+
+/// Records a section until a state is reached of which `until` holds.
+struct RecordUntil<'a, const D: usize> {
+    recorder: &'a mut SectionRecorder<D>,
+    until: Until<'a>,
+}
+
+impl<const N: usize, const D: usize> Observer<N> for RecordUntil<'_, D> {
+    fn step(&mut self, step: &Step<'_, N>) -> Flow {
+        match self.recorder.step(step) {
+            Flow::Continue if (self.until)(step.x1.as_slice()) => Flow::Stop,
+            flow => flow,
+        }
+    }
 }
 
 /// The run itself; `states` of the equation's components are the system's.

@@ -178,6 +178,10 @@ pub struct SpecError {
 
 impl RunSpec {
     /// Checks every number; a spec that passes can be run.
+    ///
+    /// # Errors
+    ///
+    /// The first field that is wrong, its value, and the rule that it breaks.
     pub fn validate(&self) -> Result<(), SpecError> {
         let error = |field, value: f64, rule| Err(SpecError { field, value: format!("{value:?}"), rule });
         let positive = |field, value: f64| {

@@ -46,8 +46,9 @@ impl Claim {
     ///
     /// - a period agrees with that period, reached or still being approached, if the whole of the shown part follows it;
     /// - chaos agrees with chaos and nothing else: not with a picture whose chaos ended in the shown part;
-    /// - "partly washed out" agrees with noise that leaves a share of the structure that is neither all nor nothing, by the
-    ///   limits in [`Thresholds`](crate::analyse::attractor::Thresholds), and that does not merely hold the run around a closed orbit.
+    /// - "partly washed out" agrees with noise that leaves the islands of noise-free runs emptier than the sea, but not as empty as noise-free
+    ///   runs leave them ([`Contrast`](crate::analyse::attractor::Contrast), whole interval), and that does not merely hold the run around
+    ///   a closed orbit.
     pub fn score(self, evidence: &Evidence) -> Score {
         let (agrees, because) = match (self, &evidence.verdict) {
             (Self::Period(k), Verdict::Periodic(c) | Verdict::Spiralling(c)) if c.period != k => {
@@ -74,13 +75,15 @@ impl Claim {
             (Self::PartlyWashedOut, Verdict::Noisy { around: Some(_), .. }) => {
                 (false, format!("no attractor is left to be washed out: {}", evidence.summary))
             }
-            (Self::PartlyWashedOut, Verdict::Noisy { share_of_structure: Some(s), .. }) => {
+            (Self::PartlyWashedOut, Verdict::Noisy { contrast: Some(c), .. }) => {
                 let th = &evidence.thresholds;
-                (*s >= th.washed_out && *s <= th.untouched, evidence.summary.clone())
+                let (left, touched) = (c.interval[0] > th.washed_out, c.interval[1] < th.untouched.min(c.free[0]));
+                (left && touched, evidence.summary.clone())
             }
-            (Self::PartlyWashedOut, Verdict::Noisy { share_of_structure: None, .. }) => {
-                (false, "there is no noise-free reference to compare with".to_owned())
-            }
+            (Self::PartlyWashedOut, Verdict::Noisy { contrast: None, .. }) => (
+                false,
+                "noise-free runs show no islands in a sea, so there is nothing that could be washed out".to_owned(),
+            ),
             _ => (false, evidence.summary.clone()),
         };
         Score { claim: self, agrees, because }

@@ -4,8 +4,22 @@
 //! figure is the same: questions -> [`pipeline`] (asked of a [`Desk`](crate::job::Desk) side by side, each computed once) -> answers
 //! -> [`drawing`] -> bytes -> files. The figures themselves stand in `figures/NAME/figure.rs`: every number of the
 //! paper's caption, and nothing else.
+//!
+//! ```
+//! use twofold::job::Desk;
+//! use twofold::paper::{figures, pipeline};
+//! let figure = figures::all().into_iter().find(|f| f.id == "fig1").expect("the first figure");
+//! let picture = pipeline::compute(&figure.pictures[0], &Desk::quiet())?;
+//! assert!(picture.rendered.svg.starts_with(b"<?xml") || picture.rendered.svg.starts_with(b"<svg"));
+//! // The committed reference holds the same hashes.
+//! let reference = figures::reference("fig1").expect("every figure has one");
+//! assert!(reference.contains(picture.record.hashes.pixels.as_str()));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
+pub mod census;
 pub mod claim;
+pub mod claims;
 pub mod drawing;
 pub mod figures;
 pub mod pipeline;

@@ -12,6 +12,8 @@ use super::{Picture, Reading};
 use crate::analyse::attractor::Evidence;
 use crate::analyse::divider::Shared;
 use crate::job::{AnyQuestion, Classification, Desk, JobError, PathComparison};
+use crate::num::elementary::sqrt;
+use crate::num::fit::mean;
 
 /// What the paper says of a panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -66,6 +68,15 @@ pub enum Grounds {
         /// What they share.
         shared: Shared,
     },
+    /// Two panels were compared over starts that a reader could not tell apart.
+    Freshness {
+        /// Mean share of strides into new places, of this panel's paths and of the next one's.
+        mean: [f64; 2],
+        /// Its standard errors.
+        standard_error: [f64; 2],
+        /// Pairs of runs.
+        runs: usize,
+    },
 }
 
 impl Claim {
@@ -77,6 +88,29 @@ impl Claim {
             Claim::DiffersFromNext => "(iii) and (iv) differ".into(),
         }
     }
+}
+
+/// Runs from neighbouring starts by which 6(i) and 6(ii) are compared.
+const NEIGHBOURS: usize = 12;
+/// How far apart those start.
+const NEIGHBOUR_SHIFT: f64 = 1e-10;
+/// 6(i) is less organised than 6(ii) if the means are so many standard errors of their difference apart.
+const CLEARLY: f64 = 2.0;
+
+/// The comparisons of a panel with the next one from neighbouring starts, the paper's first.
+fn neighbours(picture: &Picture, index: usize) -> Vec<PathComparison> {
+    let (Some(here), Some(next)) = (picture.panels.get(index), picture.panels.get(index + 1)) else {
+        return Vec::new();
+    };
+    (0..NEIGHBOURS)
+        .map(|k| {
+            let [mut a, mut b] = [here.run.clone(), next.run.clone()];
+            for run in [&mut a, &mut b] {
+                run.start[0] += k as f64 * NEIGHBOUR_SHIFT;
+            }
+            PathComparison(a, b)
+        })
+        .collect()
 }
 
 /// The question behind a panel's verdict; none if there is nothing to judge it by (one panel alone of two that the claim compares).
@@ -106,17 +140,29 @@ pub fn judge(picture: &Picture, desk: &Desk<'_>) -> Result<Vec<PanelVerdict>, Jo
                 let score = claim.score(&evidence);
                 (Grounds::Section(Box::new(evidence.clone())), evidence.summary, score.agrees, score.because)
             }
-            Claim::LessOrganisedThanNext | Claim::DiffersFromNext => {
-                let (freshness, shared): ([f64; 2], Shared) = (answer.fact("freshness")?, answer.fact("shared")?);
-                let (found, agrees) = if claim == Claim::LessOrganisedThanNext {
-                    let [here, next] = freshness.map(|f| 100.0 * f);
-                    let found = format!("{here:.0} % of its way leads to new places, {next:.0} % in the next panel");
-                    (found, freshness[0] > freshness[1])
-                } else {
-                    let found = format!("the two share {:.0} % of their places", 100.0 * shared.overlap);
-                    (found, shared.overlap <= 1.0 - MARKED_DIFFERENCE)
+            Claim::LessOrganisedThanNext => {
+                let mut shares = [Vec::new(), Vec::new()];
+                for comparison in neighbours(picture, i) {
+                    let freshness: [f64; 2] = desk.ask(&comparison)?.fact("freshness")?;
+                    shares.iter_mut().zip(freshness).for_each(|(all, one)| all.push(one));
+                }
+                let [(here, here_error), (next, next_error)] = shares.map(|s| mean(&s));
+                let error = sqrt(here_error * here_error + next_error * next_error);
+                let [p, q, dp, dq] = [here, next, here_error, next_error].map(|v| 100.0 * v);
+                let found = format!(
+                    "{p:.1} +- {dp:.1} % of its way leads to new places, {q:.1} +- {dq:.1} % in the next panel ({NEIGHBOURS} neighbouring starts)"
+                );
+                let grounds = Grounds::Freshness {
+                    mean: [here, next],
+                    standard_error: [here_error, next_error],
+                    runs: NEIGHBOURS,
                 };
-                (Grounds::Paths { freshness, shared }, found.clone(), agrees, found)
+                (grounds, found.clone(), here - next > CLEARLY * error, found)
+            }
+            Claim::DiffersFromNext => {
+                let (freshness, shared): ([f64; 2], Shared) = (answer.fact("freshness")?, answer.fact("shared")?);
+                let found = format!("the two share {:.0} % of their places", 100.0 * shared.overlap);
+                (Grounds::Paths { freshness, shared }, found.clone(), shared.overlap <= 1.0 - MARKED_DIFFERENCE, found)
             }
         };
         verdicts.push(PanelVerdict {

@@ -275,6 +275,10 @@ pub fn still_there(files: &[(PathBuf, u64)]) -> Result<(), FileError> {
 }
 
 /// Removes a file; one that is already gone is no error.
+///
+/// # Errors
+///
+/// If the file is there and cannot be removed.
 pub fn remove(path: &Path) -> Result<(), FileError> {
     match fs::remove_file(path) {
         Err(e) if e.kind() != io::ErrorKind::NotFound => Err(FileError::new("remove", path)(e)),

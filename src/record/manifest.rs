@@ -156,6 +156,10 @@ pub fn is_plain_name(name: &str) -> bool {
 
 impl Manifest {
     /// Reads a manifest; `name` is for messages.
+    ///
+    /// # Errors
+    ///
+    /// If the text is not JSON, of an unknown version, or names a file outside its folder.
     pub fn parse(text: &str, name: &str) -> Result<Self, ManifestError> {
         let syntax = |source| ManifestError::Syntax { name: name.to_owned(), source };
         // The version decides how the rest is read, so it is looked at alone first.

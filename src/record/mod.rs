@@ -13,9 +13,11 @@
 pub mod files;
 pub mod folder;
 pub mod hash;
+pub mod journal;
 pub mod manifest;
 
 pub use files::{FileError, write};
 pub use folder::{FileBytes, Tree, read_tree};
 pub use hash::Hash;
+pub use journal::Journal;
 pub use manifest::{Layer, Manifest, PanelEntry, PictureEntry, VerdictEntry};

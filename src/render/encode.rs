@@ -6,6 +6,10 @@ use super::png_file::{image_stream, rgb};
 use super::{Pixels, RenderError};
 
 /// Writes pixels as an RGB file without metadata; transparency is dropped. Same pixels, same bytes.
+///
+/// # Errors
+///
+/// If the encoder refuses the picture, such as one without pixels.
 pub fn encode_png(pixels: &Pixels) -> Result<Vec<u8>, RenderError> {
     let mut info = Info::with_size(pixels.width, pixels.height);
     info.bit_depth = BitDepth::Eight;

@@ -2,8 +2,14 @@
 
 use std::sync::OnceLock;
 
-use ttf_parser::gpos::{PairAdjustment, PositioningSubtable};
-use ttf_parser::{Face, GlyphId, OutlineBuilder, Tag};
+use skrifa::charmap::Charmap;
+use skrifa::instance::{LocationRef, Size};
+use skrifa::metrics::GlyphMetrics;
+use skrifa::outline::{DrawSettings, OutlinePen};
+use skrifa::raw::tables::gpos::{PairPos, PositionSubtables, ValueRecord};
+use skrifa::raw::types::GlyphId16;
+use skrifa::raw::{ReadError, TableProvider};
+use skrifa::{FontRef, MetadataProvider, OutlineGlyphCollection, Tag};
 
 static REGULAR: &[u8] = include_bytes!("../../assets/fonts/LibertinusSerif-Regular.otf");
 static ITALIC: &[u8] = include_bytes!("../../assets/fonts/LibertinusSerif-Italic.otf");
@@ -27,8 +33,11 @@ pub enum FontFace {
 pub const CAP_HEIGHT: f64 = 0.658;
 
 struct Loaded {
-    face: Face<'static>,
-    kerning: Vec<PairAdjustment<'static>>,
+    characters: Charmap<'static>,
+    outlines: OutlineGlyphCollection<'static>,
+    metrics: GlyphMetrics<'static>,
+    units_per_em: f64,
+    kerning: Vec<PairPos<'static>>,
 }
 
 fn loaded(face: FontFace) -> &'static Loaded {
@@ -44,21 +53,34 @@ fn loaded(face: FontFace) -> &'static Loaded {
 
 fn load(bytes: &'static [u8]) -> Loaded {
     // The bytes are part of the program and a test loads each of them, so this cannot fail at run time.
-    let face = Face::parse(bytes, 0).expect("an embedded font is readable");
-    let mut kerning = Vec::new();
-    if let Some(gpos) = face.tables().gpos {
-        let feature =
-            (0..gpos.features.len()).filter_map(|i| gpos.features.get(i)).find(|f| f.tag == Tag::from_bytes(b"kern"));
-        for lookup in feature.into_iter().flat_map(|f| f.lookup_indices.into_iter()).filter_map(|i| gpos.lookups.get(i))
-        {
-            for subtable in lookup.subtables.into_iter::<PositioningSubtable>() {
-                if let PositioningSubtable::Pair(pair) = subtable {
-                    kerning.push(pair);
-                }
+    let font = FontRef::new(bytes).expect("an embedded font is readable");
+    // In the font's own units: nothing is scaled, hinted or varied here.
+    let (size, place) = (Size::unscaled(), LocationRef::default());
+    Loaded {
+        characters: font.charmap(),
+        outlines: font.outline_glyphs(),
+        metrics: font.glyph_metrics(size, place),
+        units_per_em: f64::from(font.metrics(size, place).units_per_em),
+        kerning: kerning(&font).expect("an embedded font's kerning is readable"),
+    }
+}
+
+/// The tables of pairs that the font's first feature "kern" names, in their order.
+fn kerning(font: &FontRef<'static>) -> Result<Vec<PairPos<'static>>, ReadError> {
+    let gpos = font.gpos()?;
+    let (features, lookups) = (gpos.feature_list()?, gpos.lookup_list()?.lookups());
+    let Some(record) = features.feature_records().iter().find(|f| f.feature_tag() == Tag::new(b"kern")) else {
+        return Ok(Vec::new());
+    };
+    let mut tables = Vec::new();
+    for index in record.feature(features.offset_data())?.lookup_list_indices() {
+        if let PositionSubtables::Pair(pairs) = lookups.get(usize::from(index.get()))?.subtables()? {
+            for pair in pairs.iter() {
+                tables.push(pair?);
             }
         }
     }
-    Loaded { face, kerning }
+    Ok(tables)
 }
 
 /// A glyph of a face.
@@ -66,21 +88,21 @@ fn load(bytes: &'static [u8]) -> Loaded {
 pub struct Glyph {
     /// The face it comes from.
     pub face: FontFace,
-    id: GlyphId,
+    id: GlyphId16,
 }
 
 /// The glyph of a character; signs that a face lacks come from the regular one. `None` if the family has no such sign.
 pub fn glyph(face: FontFace, character: char) -> Option<Glyph> {
     [face, FontFace::Regular].into_iter().find_map(|face| {
-        let id = loaded(face).face.glyph_index(character)?;
-        Some(Glyph { face, id })
+        let id = loaded(face).characters.map(character)?;
+        Some(Glyph { face, id: GlyphId16::try_from(id).ok()? })
     })
 }
 
 /// Advance width of a glyph as a share of the font size.
 pub fn advance(glyph: Glyph) -> f64 {
-    let face = &loaded(glyph.face).face;
-    f64::from(face.glyph_hor_advance(glyph.id).unwrap_or(0)) / f64::from(face.units_per_em())
+    let font = loaded(glyph.face);
+    f64::from(font.metrics.advance_width(glyph.id.into()).unwrap_or(0.0)) / font.units_per_em
 }
 
 /// Correction of the distance between two neighbouring glyphs as a share of the font size.
@@ -89,21 +111,29 @@ pub fn kern(left: Glyph, right: Glyph) -> f64 {
         return 0.0;
     }
     let font = loaded(left.face);
-    for pair in &font.kerning {
-        let Some(index) = pair.coverage().get(left.id) else { continue };
-        let value = match pair {
-            PairAdjustment::Format1 { sets, .. } => sets.get(index).and_then(|set| set.get(right.id)),
-            PairAdjustment::Format2 { classes, matrix, .. } => {
-                matrix.get((classes.0.get(left.id), classes.1.get(right.id)))
-            }
-        };
-        if let Some((first, _)) = value
-            && first.x_advance != 0
-        {
-            return f64::from(first.x_advance) / f64::from(font.face.units_per_em());
+    let adjustments = font.kerning.iter().filter_map(|pairs| adjustment(pairs, left.id, right.id)?.x_advance());
+    let first = adjustments.into_iter().find(|advance| *advance != 0);
+    f64::from(first.unwrap_or(0)) / font.units_per_em
+}
+
+/// What a table of pairs says about the left one of two glyphs.
+fn adjustment(pairs: &PairPos<'static>, left: GlyphId16, right: GlyphId16) -> Option<ValueRecord<'static>> {
+    match pairs {
+        PairPos::Format1(single) => {
+            let set = single.coverage().ok()?.get(left)?;
+            let set = single.pair_sets().get(set as usize).ok()?;
+            Some(*set.find_pair_value_record(right)?.value_record1())
         }
+        PairPos::Format2(classes) => {
+            classes.coverage().ok()?.get(left)?;
+            let row = u16::try_from(classes.class_def1().ok()?.get(left)).ok()?;
+            let column = u16::try_from(classes.class_def2().ok()?.get(right)).ok()?;
+            let [first, _] = classes.value_record_refs(row, column)?;
+            Some(first)
+        }
+        // For fonts of more than 65535 glyphs.
+        PairPos::Format3(_) | PairPos::Format4(_) => None,
     }
-    0.0
 }
 
 /// A piece of a glyph's outline as shares of the font size, y upwards from the baseline.
@@ -121,10 +151,14 @@ pub enum Stroke {
 
 /// The outline of a glyph.
 pub fn outline(glyph: Glyph) -> Vec<Stroke> {
-    let face = &loaded(glyph.face).face;
-    let mut collector = Collector { scale: f64::from(face.units_per_em()), last: [0.0; 2], strokes: Vec::new() };
+    let font = loaded(glyph.face);
+    let mut collector = Collector { scale: font.units_per_em, last: [0.0; 2], strokes: Vec::new() };
     // A glyph without ink, such as a space, has no outline.
-    let _ = face.outline_glyph(glyph.id, &mut collector);
+    if let Some(outline) = font.outlines.get(glyph.id.into()) {
+        let settings = DrawSettings::unhinted(Size::unscaled(), LocationRef::default());
+        // A test draws every glyph of every embedded font.
+        let _ = outline.draw(settings, &mut collector);
+    }
     collector.strokes
 }
 
@@ -140,7 +174,7 @@ impl Collector {
     }
 }
 
-impl OutlineBuilder for Collector {
+impl OutlinePen for Collector {
     fn move_to(&mut self, x: f32, y: f32) {
         self.last = self.at(x, y);
         self.strokes.push(Stroke::Move(self.last));
@@ -199,7 +233,23 @@ mod tests {
 
     #[test]
     fn the_stated_heights_are_those_of_the_font() {
-        let face = &loaded(FontFace::Regular).face;
-        assert_eq!(f64::from(face.capital_height().unwrap()) / 1000.0, CAP_HEIGHT);
+        let height = FontRef::new(REGULAR).unwrap().os2().unwrap().s_cap_height().unwrap();
+        assert_eq!(f64::from(height) / loaded(FontFace::Regular).units_per_em, CAP_HEIGHT);
+    }
+
+    #[test]
+    fn every_glyph_can_be_drawn() {
+        for (face, least) in
+            [(FontFace::Regular, 2000), (FontFace::Italic, 2000), (FontFace::Bold, 2000), (FontFace::BoldItalic, 1500)]
+        {
+            let mut drawn = 0;
+            for (id, outline) in loaded(face).outlines.iter() {
+                let mut collector = Collector { scale: 1.0, last: [0.0; 2], strokes: Vec::new() };
+                let settings = DrawSettings::unhinted(Size::unscaled(), LocationRef::default());
+                outline.draw(settings, &mut collector).unwrap_or_else(|e| panic!("{face:?} {id}: {e}"));
+                drawn += 1;
+            }
+            assert!(drawn > least, "{face:?}: {drawn}");
+        }
     }
 }

@@ -123,6 +123,10 @@ pub struct Rendered {
 }
 
 /// Draws a sheet.
+///
+/// # Errors
+///
+/// If the sheet asks for something that cannot be drawn: no axes, an empty range, a picture that is too large.
 pub fn render(sheet: &Sheet) -> Result<Rendered, RenderError> {
     check(sheet)?;
     let scene = layout::draw(sheet)?;

@@ -104,6 +104,10 @@ fn seal_position(file: &[u8], format: Format) -> Option<usize> {
 }
 
 /// Reads the provenance of a PNG, SVG or PDF file that [`render`](super::render) made.
+///
+/// # Errors
+///
+/// If the file is none of the three formats, is damaged, or carries no provenance.
 pub fn read_provenance(bytes: &[u8]) -> Result<Provenance, ProvenanceError> {
     let format = format_of(bytes)?;
     let entries = match format {

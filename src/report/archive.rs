@@ -13,9 +13,25 @@ use crate::render::read_provenance;
 /// differ from run to run.
 pub const RELEASE_DATE: &str = "2026-11-21";
 
-/// The licence of program and pictures: either of two.
-const LICENCES: [(&str, &str); 2] =
-    [("https://spdx.org/licenses/MIT", "MIT License"), ("https://spdx.org/licenses/Apache-2.0", "Apache License 2.0")];
+/// The licence of program and pictures, either of two: address, name, what it allows in a line.
+const LICENCES: [(&str, &str, &str); 2] = [
+    (
+        "https://spdx.org/licenses/MIT",
+        "MIT License",
+        "Use, change and pass on freely, with the copyright notice; without warranty.",
+    ),
+    (
+        "https://spdx.org/licenses/Apache-2.0",
+        "Apache License 2.0",
+        "Use, change and pass on freely, with the licence and notices of changes; grants patents; without warranty.",
+    ),
+];
+/// The article, as its author's university lists it.
+const ARTICLE: &str = "https://research-information.bris.ac.uk/en/publications/singularities-that-induce-a-breakdown-of-determinism-in-mechanics";
+/// That university: address, name.
+const AFFILIATION: (&str, &str) = ("https://www.bristol.ac.uk/", "University of Bristol");
+/// Where the article appeared, in that list's words.
+const PROCEEDINGS: &str = "Proc. 5th International Conference on Structural Dynamics SEMS, Cape Town";
 
 /// The metadata of a folder that holds `made` and what the report adds to it (`added`: name and bytes).
 pub fn archive(report: &Report, made: &[FileBytes], added: &[(&str, &[u8])]) -> Vec<u8> {
@@ -37,14 +53,16 @@ pub fn archive(report: &Report, made: &[FileBytes], added: &[(&str, &[u8])]) -> 
             "@type": "Dataset",
             "name": format!("Figures of {} ({}), recomputed", report.article.author, report.article.year),
             "description": format!(
-                "Pictures, numbers, hashes and verdicts for \"{}\", computed by {}. Every file is the same byte for byte \
-                 on any machine.",
+                "Pictures, numbers, hashes and verdicts for \"{}\", computed by {}. The same version is made to compute the same \
+                 bytes on every machine; on which this was tried, its README says. The hash of every file is given here.",
                 report.article.title, report.made_by
             ),
             "datePublished": RELEASE_DATE,
             "license": { "@id": LICENCES[0].0 },
             "author": { "@id": "#authors" },
-            "citation": { "@id": "#article" },
+            "publisher": { "@id": "#authors" },
+            "citation": { "@id": ARTICLE },
+            "keywords": "non-smooth dynamics, two-fold singularity, Filippov systems, reproducibility, chaos",
             "mainEntity": { "@id": names::PAGE },
             "mentions": report.figures.iter().map(|f| json!({ "@id": action(&f.id) })).collect::<Vec<_>>(),
             "hasPart": files.iter().map(|(path, _)| json!({ "@id": address(path) })).collect::<Vec<_>>(),
@@ -63,19 +81,30 @@ pub fn archive(report: &Report, made: &[FileBytes], added: &[(&str, &[u8])]) -> 
             "description": env!("CARGO_PKG_DESCRIPTION"),
             "programmingLanguage": "Rust",
             "author": { "@id": "#authors" },
-            "license": LICENCES.map(|(id, _)| json!({ "@id": id })),
+            "license": LICENCES.map(|(id, _, _)| json!({ "@id": id })),
         }),
         json!({
-            "@id": "#article",
+            "@id": ARTICLE,
             "@type": "ScholarlyArticle",
             "name": report.article.title,
             "author": { "@id": "#article-author" },
             "datePublished": report.article.year.to_string(),
+            "isPartOf": { "@id": "#proceedings" },
+            "url": ARTICLE,
         }),
-        json!({ "@id": "#article-author", "@type": "Person", "name": report.article.author }),
+        json!({ "@id": "#proceedings", "@type": "PublicationVolume", "name": PROCEEDINGS }),
+        json!({
+            "@id": "#article-author",
+            "@type": "Person",
+            "name": report.article.author,
+            "affiliation": { "@id": AFFILIATION.0 },
+        }),
+        json!({ "@id": AFFILIATION.0, "@type": "Organization", "name": AFFILIATION.1, "url": AFFILIATION.0 }),
     ];
     graph.extend(
-        LICENCES.map(|(id, name)| json!({ "@id": id, "@type": "CreativeWork", "name": name, "identifier": id })),
+        LICENCES.map(|(id, name, description)| {
+            json!({ "@id": id, "@type": "CreativeWork", "name": name, "description": description, "identifier": id })
+        }),
     );
     for figure in &report.figures {
         let within = format!("{}/", figure.id);

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::model::*;
 use crate::compare;
+use crate::job::spec::Method;
 use crate::paper::Reading;
 use crate::paper::pipeline::{PanelRecord, TableRecord, pixel_hash};
 use crate::paper::wording;
@@ -261,7 +262,8 @@ fn unreadable(file: &FileBytes, error: &dyn std::fmt::Display) -> String {
 
 fn panel(p: PanelRecord) -> PanelReport {
     PanelReport {
-        within_ndsolve_limit: p.most_steps_in_segment <= NDSOLVE_MAX_STEPS,
+        within_ndsolve_limit: (p.run.method.name == Method::Lsoda)
+            .then_some(p.most_steps_in_segment <= NDSOLVE_MAX_STEPS),
         label: p.label,
         title: p.title,
         run: p.run,
@@ -427,7 +429,9 @@ fn summary(figures: &[FigureReport]) -> Summary {
             Reference::Missing { .. } | Reference::Altered => s.without_reference += 1,
         }
         s.panels += picture.panels.len();
-        s.panels_beyond_ndsolve_limit += picture.panels.iter().filter(|p| !p.within_ndsolve_limit).count();
+        let within = picture.panels.iter().filter_map(|p| p.within_ndsolve_limit);
+        s.panels_by_ndsolves_method += within.clone().count();
+        s.panels_beyond_ndsolve_limit += within.filter(|within| !within).count();
         // The paper's claims are about the paper's figures; our own pictures repeat some of them under other methods.
         if picture.verdicts.is_empty() || !of_the_paper(&figure.id) {
             continue;

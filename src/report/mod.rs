@@ -3,6 +3,16 @@
 //! [`assemble`] reads records, files and manifests (as bytes: nothing here touches a file) into a [`Report`]; [`page()`] writes it for
 //! people, [`Report::to_json`] for programs, [`archive`] as RO-Crate metadata. Which figures there are is read from the
 //! records, not known here. Same input, same bytes: no clock, no path of the machine.
+//!
+//! ```
+//! use twofold::record::FileBytes;
+//! use twofold::report::{Links, assemble, page};
+//! // A record without its pictures: what is missing is said, not passed over.
+//! let record = FileBytes { path: "own/own.json".into(), bytes: b"{}".to_vec() };
+//! let report = assemble(&[record], &[]);
+//! assert!(report.problems.iter().any(|p| p.contains("own/own.json")));
+//! assert!(page(&report, Links::Beside).starts_with(b"<!DOCTYPE html>"));
+//! ```
 
 mod archive;
 mod assemble;

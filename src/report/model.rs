@@ -70,7 +70,9 @@ pub struct Summary {
     pub readings: Vec<ReadingSummary>,
     /// Panels of pictures as published.
     pub panels: usize,
-    /// Of these, panels in which some stretch between restarts takes more than [`NDSOLVE_MAX_STEPS`] steps.
+    /// Of these, panels computed by the method that NDSolve took by default: to the others its limit says nothing.
+    pub panels_by_ndsolves_method: usize,
+    /// Of those, panels in which some stretch between restarts takes more than [`NDSOLVE_MAX_STEPS`] steps.
     pub panels_beyond_ndsolve_limit: usize,
 }
 
@@ -266,8 +268,8 @@ pub struct PanelReport {
     pub statistics: Statistics,
     /// The most steps between two restarts.
     pub most_steps_in_segment: u64,
-    /// Whether that is within [`NDSOLVE_MAX_STEPS`].
-    pub within_ndsolve_limit: bool,
+    /// Whether that is within [`NDSOLVE_MAX_STEPS`]; null for another method than NDSolve's.
+    pub within_ndsolve_limit: Option<bool>,
 }
 
 /// A claim, what was found, and whether they agree.

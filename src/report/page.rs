@@ -202,11 +202,11 @@ fn summary(html: &mut String, report: &Report) {
     put!(html, "</ul>\n</div>");
     put!(
         html,
-        "<div class=\"card\">\n<h3>Steps between restarts</h3>\n<p class=\"figure-of\">{} of {} <small>panels stay within NDSolve’s \
-         limit</small></p>\n<p>Mathematica’s NDSolve gives up after MaxSteps = {} steps by default; each interval between restarts is one \
-         call.</p>\n</div>\n</div>",
-        s.panels - s.panels_beyond_ndsolve_limit,
-        s.panels,
+        "<div class=\"card\">\n<h3>Steps between restarts</h3>\n<p class=\"figure-of\">{} of {} <small>panels by LSODA stay within \
+         NDSolve’s limit</small></p>\n<p>Mathematica’s NDSolve, whose method that was, stopped after MaxSteps = {} steps by default; each interval between \
+         restarts is one call.</p>\n</div>\n</div>",
+        s.panels_by_ndsolves_method - s.panels_beyond_ndsolve_limit,
+        s.panels_by_ndsolves_method,
         grouped(NDSOLVE_MAX_STEPS)
     );
     claims(html, report);
@@ -565,7 +565,7 @@ fn runs(html: &mut String, picture: &PictureReport, id: &str) {
     table_start(
         html,
         &format!(
-            "Work done, {}. NDSolve’s MaxSteps is {} for one call, that is between restarts.",
+            "Work done, {}. NDSolve’s MaxSteps was {} for one call of LSODA, that is between restarts.",
             picture.name,
             grouped(NDSOLVE_MAX_STEPS)
         ),
@@ -609,7 +609,11 @@ fn runs(html: &mut String, picture: &PictureReport, id: &str) {
         ] {
             put!(html, "<td class=\"number\">{}</td>", grouped(number));
         }
-        let limit = if p.within_ndsolve_limit { tag("good", "✓ within") } else { tag("bad", "✗ beyond") };
+        let limit = match p.within_ndsolve_limit {
+            Some(true) => tag("good", "✓ within"),
+            Some(false) => tag("bad", "✗ beyond"),
+            None => "another method".into(),
+        };
         put!(html, "<td>{limit}</td></tr>");
     }
     put!(html, "</tbody>\n</table>\n</div>\n</details>");

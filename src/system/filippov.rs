@@ -7,6 +7,7 @@ use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 use super::{PiecewiseSmooth, variables};
+use crate::num::elementary::sqrt;
 use crate::num::{Dual, Elementary};
 
 /// What happens at a point of the surface h = 0.
@@ -105,6 +106,9 @@ impl<const N: usize> TwoFold<N> {
 /// Why no two-fold was found.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum TwoFoldError {
+    /// Fewer than three states: two-folds are not generic there.
+    #[error("a system of {0} states has no isolated two-fold: it takes three")]
+    TooFewStates(usize),
     /// The Newton iteration met a singular or non-finite system.
     #[error("the two-fold's equations h = L+h = L-h = 0 are singular near this guess; start closer to the two-fold")]
     Singular,
@@ -113,30 +117,63 @@ pub enum TwoFoldError {
     NotConverged,
 }
 
-/// The two-fold near `guess`: the solution of h = L+h = L-h = 0 by Newton's method.
-pub fn two_fold<P: PiecewiseSmooth<3>>(system: &P, guess: &SVector<f64, 3>) -> Result<TwoFold<3>, TwoFoldError> {
+/// The two-fold near `guess`: a solution of h = L+h = L-h = 0 by Newton's method, each step the shortest that solves the linearised
+/// equations. In three dimensions that is the solution; in more the two-folds form a set, of which one near the guess is found.
+///
+/// # Errors
+///
+/// If there are fewer than three states, or the iteration does not converge from here.
+pub fn two_fold<P: PiecewiseSmooth<N>, const N: usize>(
+    system: &P,
+    guess: &SVector<f64, N>,
+) -> Result<TwoFold<N>, TwoFoldError> {
+    if N < 3 {
+        return Err(TwoFoldError::TooFewStates(N));
+    }
     let mut x = *guess;
     let mut last = f64::INFINITY;
-    for _ in 0..60 {
-        let at = variables(&x);
-        let (plus, minus) = lie_derivatives::<P, Dual<f64, 3>, 3>(system, &at);
-        let rows = [system.switching(&at), plus, minus];
-        let residual = SVector::<f64, 3>::from_fn(|i, _| rows[i].value);
-        let matrix = SMatrix::<f64, 3, 3>::from_fn(|i, j| rows[i].partials[j]);
-        let step = matrix.lu().solve(&residual).ok_or(TwoFoldError::Singular)?;
-        if !step.iter().all(|s| s.is_finite()) {
-            return Err(TwoFoldError::Singular);
-        }
+    for _ in 0..30 {
+        let rows = fold_conditions(system, &x);
+        let step = shortest(&rows, rows.map(|row| row.value)).ok_or(TwoFoldError::Singular)?;
         x -= step;
         let size = step.amax();
         // Quadratic convergence ends at rounding: stop when steps are tiny and no longer shrink.
-        if size <= 1e-13 * (1.0 + x.amax()) && (size == 0.0 || size >= 0.5 * last || size < 1e-15) {
+        if size <= 1e-13 * (1.0 + x.amax()) && (size >= 0.5 * last || size < 1e-15) {
             let (second_plus, second_minus) = second_lie_derivatives(system, &x);
             return Ok(TwoFold { point: x, second_plus, second_minus });
         }
         last = size;
     }
     Err(TwoFoldError::NotConverged)
+}
+
+/// h, L+h, L-h at `x`, each with its gradient: the conditions for a two-fold.
+pub(crate) fn fold_conditions<P: PiecewiseSmooth<N>, const N: usize>(
+    system: &P,
+    x: &SVector<f64, N>,
+) -> [Dual<f64, N>; 3] {
+    let at = variables(x);
+    let (p, q) = lie_derivatives::<P, Dual<f64, N>, N>(system, &at);
+    [system.switching(&at), p, q]
+}
+
+/// The shortest u with (gradient of row i) . u = `right`[i]; `None` if the gradients are dependent.
+pub(crate) fn shortest<const N: usize>(rows: &[Dual<f64, N>; 3], right: [f64; 3]) -> Option<SVector<f64, N>> {
+    let row = |i: usize| SVector::<f64, N>::from(rows[i].partials);
+    let gram = SMatrix::<f64, 3, 3>::from_fn(|i, j| row(i).dot(&row(j)));
+    let inverse_scale = SVector::<f64, 3>::from_fn(|i, _| 1.0 / sqrt(gram[(i, i)]));
+    // Scaled by rows, so that the test for dependence does not depend on units.
+    let scaled = SMatrix::<f64, 3, 3>::from_fn(|i, j| gram[(i, j)] * inverse_scale[i] * inverse_scale[j]);
+    if scaled.determinant().is_nan() || scaled.determinant() < 1e-12 {
+        return None;
+    }
+    let b = SVector::<f64, 3>::from_fn(|i, _| right[i] * inverse_scale[i]);
+    let y = scaled.lu().solve(&b)?;
+    let mut u = SVector::<f64, N>::zeros();
+    for i in 0..3 {
+        u += row(i) * (y[i] * inverse_scale[i]);
+    }
+    u.iter().all(|v| v.is_finite()).then_some(u)
 }
 
 /// The constants of the two-fold normal form (4), f+ = (-y, 1, v), f- = (z, w, 1), after rescaling:

@@ -9,7 +9,8 @@
 //!    rate of approach. A spread-out end must also pass the 0-1 test (Gottwald & Melbourne 2009).
 //! 3. Otherwise it is irregular or a ring that does not surround its mean: the 0-1 test, the divergence of nearest neighbours
 //!    (Rosenstein et al. 1993) and, when given, the largest exponent from the variational equation
-//!    ([`lyapunov`](super::lyapunov)) decide by majority.
+//!    ([`lyapunov`](super::lyapunov)) decide by majority; a tie, or an exponent consistent with zero where the points look irregular, is
+//!    [`Verdict::Undecided`].
 //!
 //! Every limit is in [`Thresholds`].
 //!
@@ -24,7 +25,7 @@ mod verdict;
 mod zero_one;
 
 pub use divergence::{Divergence, divergence};
-pub use occupancy::{Overlap, overlap};
+pub use occupancy::{Contrast, contrast};
 pub use thresholds::Thresholds;
 pub use verdict::{Cycle, CyclePoint, Evidence, Rate, Verdict};
 pub use zero_one::zero_one;
@@ -54,8 +55,8 @@ pub struct Question<'a> {
     pub kicked: bool,
     /// Largest exponent from the equations, if computed.
     pub lyapunov: Option<Exponent>,
-    /// Section of a run without noise to compare with.
-    pub reference: Option<&'a [SectionPoint]>,
+    /// Sections of runs without noise to compare with, as far as they are irregular.
+    pub reference: Option<&'a [Vec<SectionPoint>]>,
 }
 
 /// Decides what the run with this section (in time order, both directions) settles on.
@@ -87,7 +88,6 @@ pub fn classify(section: &[SectionPoint], question: &Question<'_>, thresholds: &
         zero_one: None,
         divergence: None,
         lyapunov: question.lyapunov,
-        overlap: None,
         thresholds: *th,
     };
     let last = section.last().map_or(0.0, |p| p.t);
@@ -131,13 +131,13 @@ fn noisy(
     let shown = |s: &[SectionPoint]| -> Vec<SectionPoint> {
         s.iter().filter(|p| p.t >= question.shown_from).copied().collect()
     };
-    evidence.overlap = question.reference.and_then(|r| overlap(&shown(section), &shown(r), th));
+    let contrast = question.reference.and_then(|free| contrast(&shown(section), free, th));
     let turns = Turns::find(points, times, evidence.extent, th);
     let around = turns.cloud(evidence.extent, th).map(|c| {
         // Noise sets the distance, not an approach.
         Cycle { approach: None, ..describe(&turns, &c, split, th) }
     });
-    Verdict::Noisy { share_of_structure: evidence.overlap.map(|o| o.share.clamp(0.0, 1.0)), around }
+    Verdict::Noisy { contrast, around }
 }
 
 fn deterministic(split: &Split, question: &Question<'_>, th: &Thresholds, evidence: &mut Evidence) -> Verdict {
@@ -175,24 +175,26 @@ fn deterministic(split: &Split, question: &Question<'_>, th: &Thresholds, eviden
     evidence.zero_one = tail(0, 1);
     evidence.divergence = divergence(points, evidence.return_time);
     if evidence.divergence.is_some_and(|d| d.skill < th.skill) {
-        return Verdict::Noisy { share_of_structure: None, around: None };
+        return Verdict::Noisy { contrast: None, around: None };
     }
+    let exponent = question.lyapunov.map(|l| l.value > th.exponent_significance * l.standard_error);
     let votes = [
         evidence.zero_one.map(|k| k > th.zero_one),
         evidence.divergence.map(|d| d.per_return > th.divergence),
-        question.lyapunov.map(|l| l.value > th.exponent_significance * l.standard_error),
+        exponent,
     ];
     let yes = votes.iter().filter(|v| **v == Some(true)).count();
     let no = votes.iter().filter(|v| **v == Some(false)).count();
     if yes + no == 0 {
-        return Verdict::TooFew { points: points.len() };
-    }
-    // A tie goes to chaos: regular motion that is not a ring around its mean is the rarer case.
-    if yes >= no {
+        Verdict::TooFew { points: points.len() }
+    } else if yes > no && exponent != Some(false) {
         Verdict::Chaotic { lyapunov: question.lyapunov, bands: occupancy::bands(&points[points.len() / 2..], th) }
-    } else {
+    } else if no > yes {
         let whole = Captured { from: 0, blocks: 0, settled: None };
         Verdict::QuasiPeriodic(describe(&turns, &whole, split, th))
+    } else {
+        // A tie, or points that look irregular beside an exponent that is not above zero: neither is claimed.
+        Verdict::Undecided { lyapunov: question.lyapunov }
     }
 }
 

@@ -1,99 +1,188 @@
-//! How much of one section's structure is left in another.
+//! Islands and sea: what noise washes out.
+//!
+//! Long-lived chaos of a conservative kind, or one that is nearly so, fills a sea around islands that it never enters. Noise lets the orbit leak into
+//! them, and in the end they are as dense as the sea. How much emptier the islands still are is the structure that is left.
 
 use serde::{Deserialize, Serialize};
 
 use super::{SectionPoint, Thresholds};
 use crate::num::random::RandomStream;
 
-/// Comparison of a section with a reference, on a grid of cells.
+/// How much emptier than the sea the islands of noise-free runs are in a noisy one.
 ///
-/// The measure is the overlap of two histograms, sum_i min(p_i, q_i) = 1 - (total variation distance), the form of the
-/// Sorensen (1948) coefficient for abundances (Bray & Curtis 1957). Finite samples of one density overlap by less
-/// than 1, and samples of different ones by more than 0, so it is placed between two measured ends with the same number of
-/// points:
-/// - `same`: of one half of the reference (alternate points) with the other;
-/// - `blurred`: of the reference with itself after its points were moved at random within cells `blur` times wider: the outline
-///   kept, the fine structure gone.
-///
-/// `share` = (overlap - blurred)/(same - blurred): 1 when the section is as good a sample of the reference as the reference's
-/// own half, 0 when it has no more of its structure than its outline. It falls
-/// below 0 when the outline differs as well, and is reported as computed.
+/// The sea is every cell that a noise-free run visits; an island is a hole of several cells in it. With the densities of points per cell, the
+/// contrast is 1 - (density in islands)/(density in sea): 1 when no point is in an island, 0 when islands are as dense as the sea,
+/// negative when the run stays in islands. It is calibrated on the noise-free runs themselves, each against the sea of the others.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Overlap {
-    /// Share of the structure left.
-    pub share: f64,
-    /// Overlap of the section with the reference.
-    pub overlap: f64,
-    /// Overlap of the reference with itself.
-    pub same: f64,
-    /// Overlap of the reference with its blurred self.
-    pub blurred: f64,
-    /// Share of the reference's cells that the section also visits (without regard to how often).
-    pub cells_kept: f64,
-    /// Share of the section's cells that the reference never visits.
-    pub cells_new: f64,
-    /// Points compared, of each.
+pub struct Contrast {
+    /// The contrast.
+    pub value: f64,
+    /// Its 95 % interval, from resampling blocks of time (Kunsch 1989).
+    pub interval: [f64; 2],
+    /// Smallest and largest contrast of a noise-free run against the sea of the others.
+    pub free: [f64; 2],
+    /// Noise-free runs.
+    pub free_runs: usize,
+    /// Share of islands in the area of islands and sea.
+    pub island_share: f64,
+    /// Share of the section's points that lie in neither.
+    pub outside: f64,
+    /// Points of the section.
     pub points: usize,
 }
 
-/// Compares `section` with `reference`; `None` when either has fewer than about 200 points. Directions are kept apart: a point
-/// that one section has going up and the other going down is not common to both.
-pub fn overlap(section: &[SectionPoint], reference: &[SectionPoint], thresholds: &Thresholds) -> Option<Overlap> {
-    // All upward points, then all downward ones moved out of the way; alternating directions would otherwise fall in step with
-    // the strides below.
+/// Blocks of time that are resampled: each far longer than the return time, and enough of them for an interval.
+const BLOCKS: usize = 32;
+/// Resamples.
+const RESAMPLES: usize = 2000;
+/// The share of resamples beyond each end of an interval.
+const TAIL: f64 = 0.025;
+
+/// Compares `section` with the runs of `free`; `None` with fewer than two of those, few points, or no island among them. Directions are kept
+/// apart: a point that one section has going up and the other going down is not common to both.
+pub fn contrast(section: &[SectionPoint], free: &[Vec<SectionPoint>], thresholds: &Thresholds) -> Option<Contrast> {
+    let all = || free.iter().flatten();
+    if free.len() < 2 || section.len() < 100 || all().count() < 100 {
+        return None;
+    }
+    // Upward points, and downward ones moved out of the way.
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
-    for p in section.iter().chain(reference) {
+    for p in all().chain(section) {
         (least, most) = (least.min(p.u[0]), most.max(p.u[0]));
     }
     let shift = 1.25 * (most - least);
     let apart = |s: &[SectionPoint]| -> Vec<[f64; 2]> {
-        let up = s.iter().filter(|p| p.upward).map(|p| p.u);
-        let down = s.iter().filter(|p| !p.upward).map(|p| [p.u[0] + shift, p.u[1]]);
-        up.chain(down).collect()
+        s.iter().map(|p| if p.upward { p.u } else { [p.u[0] + shift, p.u[1]] }).collect()
     };
-    overlap_of_points(&apart(section), &apart(reference), thresholds)
-}
-
-/// [`overlap`] of plain points.
-fn overlap_of_points(section: &[[f64; 2]], reference: &[[f64; 2]], thresholds: &Thresholds) -> Option<Overlap> {
-    let halves: [Vec<[f64; 2]>; 2] = std::array::from_fn(|h| reference.iter().skip(h).step_by(2).copied().collect());
-    // Equal numbers everywhere, spread over each whole run, or the finite-sample ends would not be comparable.
-    let n = section.len().min(halves[1].len());
-    if n < 100 {
+    let runs: Vec<Vec<[f64; 2]>> = free.iter().map(|run| apart(run)).collect();
+    let pooled: Vec<[f64; 2]> = runs.concat();
+    // The grid is twice as wide as one direction's picture.
+    let grid = Grid::around(&pooled, thresholds.cells);
+    let map = Map::of(&grid, &pooled, thresholds.island_cells)?;
+    let section = apart(section);
+    let value = map.contrast(&grid, &section)?;
+    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+    for i in 0..runs.len() {
+        let others: Vec<[f64; 2]> =
+            runs.iter().enumerate().filter(|(j, _)| *j != i).flat_map(|(_, r)| r.clone()).collect();
+        if let Some(one) = Map::of(&grid, &others, thresholds.island_cells).and_then(|m| m.contrast(&grid, &runs[i])) {
+            range = [range[0].min(one), range[1].max(one)];
+        }
+    }
+    if range[0] > range[1] {
         return None;
     }
-    let thin = |p: &[[f64; 2]]| -> Vec<[f64; 2]> { (0..n).map(|i| p[i * p.len() / n]).collect() };
-    let (a, b, s) = (thin(&halves[0]), thin(&halves[1]), thin(section));
-
-    let grid = Grid::around(reference, thresholds.cells);
-    let coarse = grid.width.map(|w| w * thresholds.blur as f64);
+    let length = section.len().div_ceil(BLOCKS);
+    let blocks: Vec<[f64; 2]> = section.chunks(length).map(|block| map.counts(&grid, block)).collect();
     let mut random = RandomStream::new(0x0b1, 0);
-    let smeared: Vec<[f64; 2]> = b
-        .iter()
-        .map(|q| {
-            std::array::from_fn(|k| {
-                let corner = (((q[k] - grid.low[k]) / coarse[k]).floor()) * coarse[k] + grid.low[k];
-                random.uniform_in(corner, corner + coarse[k])
-            })
+    let mut resampled: Vec<f64> = (0..RESAMPLES)
+        .filter_map(|_| {
+            let mut sum = [0.0; 2];
+            for _ in 0..blocks.len() {
+                let block = blocks[((random.uniform() * blocks.len() as f64) as usize).min(blocks.len() - 1)];
+                sum = [sum[0] + block[0], sum[1] + block[1]];
+            }
+            map.of_counts(sum)
         })
         .collect();
-
-    let (ha, hb, hs, hm) = (grid.count(&a), grid.count(&b), grid.count(&s), grid.count(&smeared));
-    let common =
-        |x: &[u32], y: &[u32]| x.iter().zip(y).map(|(p, q)| u64::from(*p.min(q))).sum::<u64>() as f64 / n as f64;
-    let (overlap, same, blurred) = (common(&ha, &hs), common(&ha, &hb), common(&ha, &hm));
-    let share = if same > blurred { (overlap - blurred) / (same - blurred) } else { f64::NAN };
-    let visited = |x: &[u32]| x.iter().filter(|c| **c > 0).count() as f64;
-    let both = ha.iter().zip(&hs).filter(|(p, q)| **p > 0 && **q > 0).count() as f64;
-    Some(Overlap {
-        share: if share.is_nan() { 0.0 } else { share },
-        overlap,
-        same,
-        blurred,
-        cells_kept: both / visited(&ha),
-        cells_new: 1.0 - both / visited(&hs),
-        points: n,
+    resampled.sort_by(f64::total_cmp);
+    let at = |q: f64| resampled.get((resampled.len().saturating_sub(1) as f64 * q) as usize).copied();
+    let counts = map.counts(&grid, &section);
+    Some(Contrast {
+        value,
+        interval: [at(TAIL)?, at(1.0 - TAIL)?],
+        free: range,
+        free_runs: free.len(),
+        island_share: map.area[0] / (map.area[0] + map.area[1]),
+        outside: 1.0 - (counts[0] + counts[1]) / section.len() as f64,
+        points: section.len(),
     })
+}
+
+/// What a cell is.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Place {
+    Island,
+    Sea,
+    Outside,
+}
+
+/// Islands and sea of a set of points.
+struct Map {
+    places: Vec<Place>,
+    /// Cells of islands and of sea.
+    area: [f64; 2],
+}
+
+impl Map {
+    /// `None` without islands.
+    fn of(grid: &Grid, points: &[[f64; 2]], island_cells: usize) -> Option<Self> {
+        let side = grid.cells + 2;
+        let visited = grid.count(points);
+        // What is not visited and can be walked to from the border is outside; other holes are islands if they are large enough.
+        let mut places: Vec<Option<Place>> = visited.iter().map(|n| (*n > 0).then_some(Place::Sea)).collect();
+        let hole = |from: usize, places: &mut Vec<Option<Place>>| -> Vec<usize> {
+            let mut found = vec![from];
+            places[from] = Some(Place::Outside);
+            let mut next = 0;
+            while let Some(&cell) = found.get(next) {
+                next += 1;
+                let (a, b) = (cell / side, cell % side);
+                let neighbours = [
+                    (a > 0).then(|| cell - side),
+                    (a + 1 < side).then(|| cell + side),
+                    (b > 0).then(|| cell - 1),
+                    (b + 1 < side).then(|| cell + 1),
+                ];
+                for neighbour in neighbours.into_iter().flatten() {
+                    if places[neighbour].is_none() {
+                        places[neighbour] = Some(Place::Outside);
+                        found.push(neighbour);
+                    }
+                }
+            }
+            found
+        };
+        for cell in 0..side * side {
+            let border = cell / side == 0 || cell / side + 1 == side || cell % side == 0 || cell % side + 1 == side;
+            if border && places[cell].is_none() {
+                hole(cell, &mut places);
+            }
+        }
+        for cell in 0..side * side {
+            if places[cell].is_none() {
+                let found = hole(cell, &mut places);
+                if found.len() >= island_cells {
+                    found.into_iter().for_each(|c| places[c] = Some(Place::Island));
+                }
+            }
+        }
+        let places: Vec<Place> = places.into_iter().map(|p| p.unwrap_or(Place::Outside)).collect();
+        let area = [Place::Island, Place::Sea].map(|kind| places.iter().filter(|p| **p == kind).count() as f64);
+        (area[0] > 0.0).then_some(Self { places, area })
+    }
+
+    /// Points in islands and in the sea.
+    fn counts(&self, grid: &Grid, points: &[[f64; 2]]) -> [f64; 2] {
+        let mut counts = [0.0; 2];
+        for q in points {
+            match self.places[grid.cell(q)] {
+                Place::Island => counts[0] += 1.0,
+                Place::Sea => counts[1] += 1.0,
+                Place::Outside => {}
+            }
+        }
+        counts
+    }
+
+    fn of_counts(&self, [islands, sea]: [f64; 2]) -> Option<f64> {
+        // Without a point in the sea all are in islands: as far from structure as can be counted.
+        (islands + sea > 0.0).then(|| 1.0 - (islands / self.area[0]) / (sea.max(1.0) / self.area[1]))
+    }
+
+    fn contrast(&self, grid: &Grid, points: &[[f64; 2]]) -> Option<f64> {
+        self.of_counts(self.counts(grid, points))
+    }
 }
 
 /// The number of separate pieces that consecutive `points` visit in turn: the largest k for which no cell of the grid holds points
@@ -168,39 +257,55 @@ impl Grid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::num::elementary::{cos, sin};
+    use crate::num::elementary::sqrt;
 
-    /// Points on a spiral curve in the unit disc, displaced by `noise` in both coordinates.
-    fn curve(n: usize, noise: f64, stream: u64) -> Vec<[f64; 2]> {
+    /// Points of a disc with a round hole, into which a share `leak` of the points that would fall there may go.
+    fn sea(n: usize, leak: f64, stream: u64) -> Vec<SectionPoint> {
         let mut r = RandomStream::new(11, stream);
-        (0..n)
-            .map(|_| {
-                let s = r.uniform();
-                let angle = 30.0 * s;
-                [s * cos(angle) + noise * r.normal(), s * sin(angle) + noise * r.normal()]
-            })
-            .collect()
+        let mut points = Vec::new();
+        while points.len() < n {
+            let u = [r.uniform_in(-1.0, 1.0), r.uniform_in(-1.0, 1.0)];
+            let from_hole = sqrt((u[0] - 0.3) * (u[0] - 0.3) + u[1] * u[1]);
+            let inside = from_hole < 0.3;
+            if u[0] * u[0] + u[1] * u[1] < 1.0 && (!inside || r.uniform() < leak) {
+                points.push(SectionPoint { t: points.len() as f64, u, upward: points.len() % 2 == 0 });
+            }
+        }
+        points
     }
 
     #[test]
-    fn share_falls_with_noise() {
-        let reference = curve(20_000, 0.0, 0);
-        let shares: Vec<f64> = [0.0, 0.01, 0.03, 0.3]
-            .iter()
-            .map(|&noise| {
-                overlap_of_points(&curve(10_000, noise, 1), &reference, &Thresholds::default()).unwrap().share
-            })
-            .collect();
-        assert!((shares[0] - 1.0).abs() < 0.03, "{shares:?}");
-        assert!(shares.windows(2).all(|w| w[1] < w[0] - 0.1), "{shares:?}");
-        assert!(shares[3] < 0.05, "{shares:?}");
+    fn contrast_is_what_has_not_leaked() {
+        let free: Vec<_> = (0..4).map(|k| sea(20_000, 0.0, k)).collect();
+        let of = |leak: f64| contrast(&sea(6_000, leak, 9), &free, &Thresholds::default()).unwrap();
+        for leak in [0.0, 0.2, 0.6, 1.0] {
+            let c = of(leak);
+            assert!((c.value - (1.0 - leak)).abs() < 0.08, "{leak}: {c:?}");
+            assert!(
+                c.interval[0] <= c.value && c.value <= c.interval[1] && c.interval[1] - c.interval[0] < 0.25,
+                "{c:?}"
+            );
+            // Noise-free runs score what they should, unlike halves of one run.
+            assert!(c.free[0] > 0.9 && c.free[1] <= 1.0, "{c:?}");
+        }
+        // The hole's area: 0.09 of the disc's.
+        assert!((of(0.0).island_share - 0.09).abs() < 0.03, "{:?}", of(0.0));
     }
 
     #[test]
-    fn another_place_shares_no_cell() {
-        let reference = curve(4000, 0.0, 0);
-        let away: Vec<[f64; 2]> = reference.iter().map(|q| [q[0] + 5.0, q[1]]).collect();
-        let o = overlap_of_points(&away, &reference, &Thresholds::default()).unwrap();
-        assert!(o.overlap == 0.0 && o.cells_kept == 0.0 && o.cells_new == 1.0, "{o:?}");
+    fn the_cells_hardly_matter() {
+        let free: Vec<_> = (0..4).map(|k| sea(40_000, 0.0, k)).collect();
+        let values = [32, 64, 96].map(|cells| {
+            let thresholds = Thresholds { cells, ..Thresholds::default() };
+            contrast(&sea(8_000, 0.4, 9), &free, &thresholds).unwrap().value
+        });
+        assert!(values.iter().all(|v| (v - 0.6).abs() < 0.08), "{values:?}");
+    }
+
+    #[test]
+    fn without_islands_there_is_nothing_to_compare() {
+        let full: Vec<_> = (0..3).map(|k| sea(40_000, 1.0, k)).collect();
+        assert_eq!(contrast(&sea(4000, 1.0, 8), &full, &Thresholds::default()), None);
+        assert_eq!(contrast(&sea(4000, 1.0, 8), &full[..1], &Thresholds::default()), None);
     }
 }

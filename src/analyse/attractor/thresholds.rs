@@ -71,11 +71,12 @@ pub struct Thresholds {
     /// Cells across the extent when structure is compared: 64 keeps several points per occupied cell of a section with 10^4 of
     /// them.
     pub cells: usize,
-    /// Cells that are merged to one to blur a reference: what remains is the outline, an eighth of the picture fine.
-    pub blur: usize,
-    /// Share of structure below which it counts as gone: five times the scatter between runs of one system (0.01 measured).
+    /// Fewest cells of an island: smaller holes in the sea are chance. (Files call it by the name of its predecessor.)
+    #[serde(rename = "blur")]
+    pub island_cells: usize,
+    /// Contrast between islands and sea below which structure counts as gone.
     pub washed_out: f64,
-    /// Share of structure above which it counts as untouched, for the same reason.
+    /// Contrast above which structure counts as untouched.
     pub untouched: f64,
 }
 
@@ -104,7 +105,7 @@ impl Default for Thresholds {
             exponent_significance: 3.0,
             skill: 0.5,
             cells: 64,
-            blur: 8,
+            island_cells: 8,
             washed_out: 0.05,
             untouched: 0.95,
         }

@@ -69,11 +69,15 @@ pub enum Verdict {
         /// Number of separate pieces visited in turn.
         bands: usize,
     },
+    /// What tells regular from irregular motion contradicts itself, or the largest exponent is consistent with zero.
+    Undecided {
+        /// The largest exponent given with the question, with its error.
+        lyapunov: Option<Exponent>,
+    },
     /// Random.
     Noisy {
-        /// How much of the reference's fine structure is left, in [0, 1]: see [`Overlap`](super::Overlap), which holds the
-        /// value before it was cut to that range. Absent without a reference.
-        share_of_structure: Option<f64>,
+        /// How much emptier than the sea the islands of noise-free runs still are; absent where there is nothing to compare with.
+        contrast: Option<super::Contrast>,
         /// The closed orbit around which the noise holds the run in small clouds, if it does.
         around: Option<Cycle>,
     },
@@ -97,6 +101,7 @@ impl Verdict {
             Self::Spiralling(_) => "spiralling",
             Self::QuasiPeriodic(_) => "quasi-periodic",
             Self::Chaotic { .. } => "chaotic",
+            Self::Undecided { .. } => "undecided",
             Self::Noisy { .. } => "noisy",
             Self::Escaped { .. } => "escaped",
             Self::TooFew { .. } => "too-few",
@@ -146,13 +151,24 @@ impl std::fmt::Display for Verdict {
                 write!(f, "chaotic, largest exponent {:.4} +- {:.4}", l.value, l.standard_error)
             }
             Self::Chaotic { lyapunov: None, .. } => write!(f, "chaotic"),
-            Self::Noisy { share_of_structure, around } => {
+            Self::Undecided { lyapunov: Some(l) } => {
+                write!(f, "undecided, largest exponent {:.4} +- {:.4}", l.value, l.standard_error)
+            }
+            Self::Undecided { lyapunov: None } => write!(f, "undecided"),
+            Self::Noisy { contrast, around } => {
                 write!(f, "noisy")?;
                 if let Some(c) = around {
                     write!(f, ", in clouds of radius {:.1e} around period {}", c.radius, c.period)?;
                 }
-                match share_of_structure {
-                    Some(s) => write!(f, ", {:.0} % of the structure left", 100.0 * s),
+                match contrast {
+                    Some(c) => {
+                        let [value, low, high, free] =
+                            [c.value, c.interval[0], c.interval[1], c.free[0]].map(|v| 100.0 * v);
+                        write!(
+                            f,
+                            ", islands {value:.0} % [{low:.0}, {high:.0}] emptier than the sea, {free:.0} % or more without noise"
+                        )
+                    }
                     None => Ok(()),
                 }
             }
@@ -173,9 +189,11 @@ pub struct Evidence {
     pub summary: String,
     /// Crossings given.
     pub crossings: usize,
-    /// Diagonal of the box around them.
+    /// Diagonal of the box around them; not a number if there are none.
+    #[serde(deserialize_with = "number_or_none")]
     pub extent: f64,
-    /// Mean time between crossings of one direction.
+    /// Mean time between crossings of one direction; not a number if there are fewer than two.
+    #[serde(deserialize_with = "number_or_none")]
     pub return_time: f64,
     /// From this time on the picture shows points.
     pub shown_from: f64,
@@ -190,8 +208,11 @@ pub struct Evidence {
     pub divergence: Option<super::Divergence>,
     /// The largest exponent given with the question.
     pub lyapunov: Option<Exponent>,
-    /// Comparison with the reference given with the question.
-    pub overlap: Option<super::Overlap>,
     /// The limits used.
     pub thresholds: Thresholds,
+}
+
+/// JSON has no not-a-number: it is written as null, and read from it.
+fn number_or_none<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }

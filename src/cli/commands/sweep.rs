@@ -1,50 +1,85 @@
-//! `twofold sweep`: the lottery, with numbers. One run from many starts that differ by almost nothing.
+//! `twofold sweep`: one run with some of its numbers varied, and where each ends. The sweep itself is [`job::sweep`](crate::job::sweep).
 
-use std::collections::BTreeMap;
-use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
-use serde_json::json;
+use serde_json::{Value, json};
 
-use crate::analyse::attractor::{Evidence, Verdict};
-use crate::cli::exit::part_of;
 use crate::cli::flags::{RunFlags, Use};
-use crate::cli::progress::Progress;
+use crate::cli::progress::{Progress, Tally};
 use crate::cli::speak::{complain, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit, in_pool};
-use crate::integrate::filippov::ExitRule;
-use crate::job::spec::{RunSpec, SwitchSpec};
-use crate::job::{Classification, Desk, JobError};
+use crate::job::question;
+use crate::job::sweep::{Axis, Coordinate, Draws, Row, Rows, Shard, Sweep, Values};
+use crate::job::table::Entry;
+use crate::record::Journal;
+use crate::record::files::read;
 
-/// The most runs of one sweep: their rows are kept in memory.
-const MOST_RUNS: u32 = 1_000_000;
+/// The most runs of --runs.
+const MOST_RUNS: u64 = 1_000_000;
+/// The runs of a sweep that names no axis.
+const RUNS: u64 = 40;
+/// By how much each of them is shifted.
+const SHIFT: f64 = 1e-9;
+/// The seed of random axes.
+const DRAW_SEED: u64 = 2013;
 
-/// Compute the same run from many starts, each shifted a little further, and say where each of them ends. A row per run on
-/// standard output (or --out), and how often each end occurred on standard error.
+/// Vary any number of a run, and say where each run ends: a row each, on standard output (or --out), and how often each end
+/// occurred on standard error. Without --over, 40 starts whose first component is shifted a little further each time.
 ///
-/// A run that fails has a row that says why; the exit code is then 3. Ctrl-C keeps the rows that are finished: on standard output,
-/// or beside --out under the name FILE.part.
+/// Rows are written to FILE.journal as they finish; --resume goes on with it after a kill, and `twofold sweep merge` puts parts together:
+/// the same bytes, whatever the parts, their order and how often they were interrupted. A run that fails is a row that says why; the
+/// exit code is then 3. Random numbers of kicks and exits differ from row to row.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  \
+#[command(
+    args_conflicts_with_subcommands = true,
+    after_help = "What can be varied: params.NAME, start.NAME, shift.NAME (added to the start), rtol, atol, tolerance (both), max-step, t-end,\n\
+    interval (between restarts), eps, eps-prime, sigma, kick-every, kick-size, seed, stream, method.\n\
+    Values: a,b,c; FROM..TO:COUNT; FROM..TO:log:COUNT; STEP*COUNT; FROM..TO and FROM..TO:log drawn at random; seed=FIRST..LAST.\n\n\
+    Examples:\n  \
     twofold sweep --alpha 0.1 --beta 1e-4 --restart 100 --t-end 1e5 --method dopri5 --out lottery.csv\n  \
-    twofold sweep --runs 8 --shift 1e-6 --t-end 2000 --json")]
+    twofold sweep --t-end 2e5 --over params.alpha=1e-3..1:log:13 --over interval=20,40,100 --out map.parquet\n  \
+    twofold sweep --t-end 2e5 --over method=lsoda,dopri5 --over shift.x=-1e-9..1e-9 --random 100 --shard 2/8 --out part2.parquet\n  \
+    twofold sweep merge part*.parquet --out whole.parquet"
+)]
 pub struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
     #[command(flatten)]
     flags: RunFlags,
-    /// Number of runs.
-    #[arg(long, default_value_t = 40, allow_negative_numbers = true)]
-    runs: u32,
-    /// The first component of the start is shifted by this, twice this, three times this ...
-    #[arg(long, default_value_t = 1e-9, allow_hyphen_values = true)]
-    shift: f64,
+    /// Vary this; may be repeated, and rows then run over all combinations, the last axis fastest.
+    #[arg(long, value_name = "NAME=VALUES", allow_hyphen_values = true)]
+    over: Vec<Axis>,
+    /// Draw axes given as FROM..TO this many times for each combination of the others.
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    random: Option<u64>,
+    /// Seed of those draws [default: 2013].
+    #[arg(long, value_name = "SEED", allow_negative_numbers = true)]
+    random_seed: Option<u64>,
+    /// Number of runs: short for --over shift.NAME=SHIFT*RUNS with the first component's name [default: 40].
+    #[arg(long, allow_negative_numbers = true)]
+    runs: Option<u64>,
+    /// With --runs: the first component of the start is shifted by this, twice this, three times this ... [default: 1e-9].
+    #[arg(long, allow_hyphen_values = true)]
+    shift: Option<f64>,
+    /// Compute only every Nth row, from the Kth on.
+    #[arg(long, value_name = "K/N", default_value = "1/1")]
+    shard: Shard,
+    /// Go on with the rows that FILE and FILE.journal hold.
+    #[arg(long)]
+    resume: bool,
+    /// With --resume: rows of another version of the program are kept if this many of them, spread evenly, come out the same again.
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    recheck: Option<u64>,
     /// Threads; 0 is one per core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
-    /// File to write instead of standard output (-).
+    /// File to write instead of standard output (-): Parquet if its name ends in .parquet, else CSV.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Spec, rows and counts as JSON instead of CSV.
+    /// Spec, rows and counts as JSON.
     #[arg(long)]
     json: bool,
     /// No progress and no summary on standard error.
@@ -52,154 +87,297 @@ pub struct Arguments {
     quiet: bool,
 }
 
-/// What became of one run.
-struct Row {
-    shift: f64,
-    end: Result<Evidence, JobError>,
+#[derive(Debug, clap::Subcommand)]
+enum Command {
+    Merge(Merge),
 }
 
-impl Row {
-    /// Which orbit a run ends on is the question; whether it has arrived is a detail.
-    fn kind(&self) -> String {
-        match self.end.as_ref().map(|e| &e.verdict) {
-            Ok(Verdict::Periodic(c) | Verdict::Spiralling(c) | Verdict::QuasiPeriodic(c)) => {
-                format!("period {}", c.period)
-            }
-            Ok(other) => other.name().to_owned(),
-            Err(_) => "failed".to_owned(),
-        }
-    }
+/// Put the rows of several parts of one sweep together: files that `twofold sweep` wrote, or journals that it left.
+#[derive(Debug, clap::Args)]
+struct Merge {
+    /// The parts: .parquet, .csv or .journal.
+    #[arg(required = true, value_name = "FILE")]
+    parts: Vec<PathBuf>,
+    /// File to write instead of standard output (-): Parquet if its name ends in .parquet, else CSV.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Spec, rows and counts as JSON.
+    #[arg(long)]
+    json: bool,
+    /// No summary on standard error.
+    #[arg(long)]
+    quiet: bool,
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
+    match &arguments.command {
+        Some(Command::Merge(merge)) => merged(merge),
+        None => computed(arguments),
+    }
+}
+
+/// The sweep that the flags describe.
+fn sweep(arguments: &Arguments) -> Result<Sweep, CliError> {
+    let usage = |text: String| Err(CliError::Usage(text));
+    if let Some((flag, axis)) = arguments.flags.replaced_by(&arguments.over) {
+        return Err(CliError::no_effect(
+            flag,
+            format!("--over {axis} gives every row its own; leave one of the two out"),
+        ));
+    }
     let spec = arguments.flags.spec(Use::Passages)?;
-    if !arguments.shift.is_finite() {
-        return Err(CliError::Usage(format!("--shift is {}: give a finite number", arguments.shift)));
+    let mut over = arguments.over.clone();
+    let given = [("--runs", arguments.runs.is_some()), ("--shift", arguments.shift.is_some())];
+    if let (false, Some((flag, _))) = (over.is_empty(), given.iter().find(|(_, given)| *given)) {
+        return Err(CliError::no_effect(
+            *flag,
+            "--over says what is varied; give --over shift.NAME=STEP*COUNT beside the other axes",
+        ));
     }
-    if !(1..=MOST_RUNS).contains(&arguments.runs) {
-        let text =
-            format!("--runs is {}: give a number from 1 to {MOST_RUNS}, and more in several sweeps", arguments.runs);
-        return Err(CliError::Usage(text));
+    if over.is_empty() {
+        let runs = arguments.runs.unwrap_or(RUNS);
+        if !(1..=MOST_RUNS).contains(&runs) {
+            return usage(format!("--runs is {runs}: give a number from 1 to {MOST_RUNS}, or more by --over"));
+        }
+        let shift = arguments.shift.unwrap_or(SHIFT);
+        if !shift.is_finite() {
+            return usage(format!("--shift is {shift}: give a finite number"));
+        }
+        let first = spec.system.coordinates().first().map_or(String::new(), |s| (*s).to_owned());
+        over.push(Axis { coordinate: Coordinate::Shift(first), values: Values::Multiples { of: shift, count: runs } });
     }
-    let out = arguments.out.as_deref();
+    if let (Some(_), None) = (arguments.random_seed, arguments.random) {
+        return Err(CliError::no_effect(
+            "--random-seed",
+            "no axis is drawn at random; leave it out, or give --random N",
+        ));
+    }
+    let random = arguments.random.map(|count| Draws { count, seed: arguments.random_seed.unwrap_or(DRAW_SEED) });
+    Sweep::new(spec, over, random).map_err(|e| match e {
+        crate::job::sweep::SweepError::Spec(spec) => spec.into(),
+        other => CliError::Usage(format!("--over: {other}")),
+    })
+}
+
+/// The name of the journal of a file.
+fn journal_of(file: &Path) -> PathBuf {
+    let mut name = file.as_os_str().to_owned();
+    name.push(".journal");
+    name.into()
+}
+
+fn computed(arguments: &Arguments) -> Result<Exit, CliError> {
+    let sweep = sweep(arguments)?;
+    let out = arguments.out.as_deref().filter(|f| !is_standard_output(f));
     try_delivery(out)?;
-    let progress = Progress::with_grace(arguments.quiet);
-    let rows: Vec<Option<Box<Row>>> = in_pool(arguments.threads, || {
-        (1..=arguments.runs)
-            .into_par_iter()
-            .map(|k| {
-                if progress.asked_to_stop().is_some() {
-                    None
-                } else {
-                    one(&spec, f64::from(k) * arguments.shift, k, &progress)
-                }
-            })
-            .collect()
-    })?;
-    let rows: Vec<Row> = rows.into_iter().flatten().map(|row| *row).collect();
-    let mut counts: BTreeMap<String, u32> = BTreeMap::new();
-    for row in &rows {
-        *counts.entry(row.kind()).or_default() += 1;
+    if arguments.recheck.is_some() && !arguments.resume {
+        return Err(CliError::no_effect("--recheck", "it belongs to --resume; leave it out, or go on with a file"));
     }
-    let bytes = if arguments.json { as_json(&spec, &rows, &counts, arguments) } else { as_csv(&rows).into_bytes() };
-    if (rows.len() as u64) < u64::from(arguments.runs)
+    let empty = Rows::of(sweep.clone());
+    // A name that does not fit what is to be written is noticed now.
+    bytes_of(&empty, out, arguments.json)?;
+    let mut rows = empty;
+    let mut journal = None;
+    if let Some(out) = out {
+        journal = Some(open(arguments, out, &mut rows)?);
+    } else if arguments.resume {
+        return Err(CliError::no_effect("--resume", "there is no file to go on with; give --out FILE"));
+    }
+    let pending = rows.missing(arguments.shard);
+    let progress = Progress::with_grace(arguments.quiet);
+    if arguments.resume {
+        progress.line(&format!("{} rows are there, {} to compute", rows.len(), pending.len()));
+    }
+    let shared = Mutex::new((rows, &mut journal, None::<CliError>));
+    let tally = Tally::new(&progress, pending.len() as u64);
+    let next = AtomicUsize::new(0);
+    in_pool(arguments.threads, || {
+        (0..rayon::current_num_threads()).into_par_iter().with_max_len(1).for_each(|_| {
+            // Rows are taken in order, so that what is finished at any moment is a fair part of the whole.
+            while let Some(number) = pending.get(next.fetch_add(1, Ordering::Relaxed)) {
+                if progress.asked_to_stop().is_some() {
+                    break;
+                }
+                let Ok(row) = sweep.row(*number, &tally) else { break };
+                let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
+                let (rows, journal, trouble) = &mut *shared;
+                if trouble.is_some() {
+                    break;
+                }
+                if let Some(journal) = journal.as_mut()
+                    && let Err(error) = journal.append(&row.line())
+                {
+                    *trouble = Some(error.into());
+                    break;
+                }
+                tally.done(row.reason().is_some());
+                // A row of this number is not there: it was missing.
+                let _ = rows.insert(row);
+            }
+        });
+    })?;
+    tally.finish();
+    let (rows, _, trouble) = shared.into_inner().unwrap_or_else(PoisonError::into_inner);
+    if let Some(trouble) = trouble {
+        return Err(trouble);
+    }
+    let wanted = arguments.shard.rows(&sweep).count();
+    let left = rows.missing(arguments.shard).len();
+    if left > 0
         && let Some(exit) = progress.asked_to_stop()
     {
-        let part = out.filter(|f| !is_standard_output(f)).map(part_of);
-        deliver(part.as_deref(), &bytes)?;
-        let place = part.map_or("standard output".to_owned(), |p| p.display().to_string());
-        let said =
-            format!("interrupted: {} of {} runs are finished, their rows are in {place}", rows.len(), arguments.runs);
+        let place = match out {
+            Some(out) => format!("{}; --resume goes on with them", journal_of(out).display()),
+            None => {
+                deliver(None, &bytes_of(&rows, None, arguments.json)?)?;
+                "standard output".to_owned()
+            }
+        };
+        let said = format!("interrupted: {} of {wanted} runs are finished, their rows are in {place}", wanted - left);
         return Err(CliError::Stopped { said, exit });
     }
-    deliver(out, &bytes)?;
-    for (end, count) in &counts {
-        progress.line(&format!("{count:>4} of {} end: {end}", arguments.runs));
+    deliver(out, &bytes_of(&rows, out, arguments.json)?)?;
+    if let Some(journal) = journal {
+        journal.remove()?;
     }
-    match rows.iter().find_map(|row| row.end.as_ref().err().map(|error| (row.shift, error))) {
-        None => Ok(Exit::Fine),
-        Some((shift, error)) => {
-            complain(&format!(
-                "error: {} of {} runs failed; the first, shifted by {shift:?}: {error}",
-                counts["failed"],
-                rows.len()
-            ));
-            Ok(Exit::Failed)
+    summary(&rows, &progress)
+}
+
+/// Opens the journal beside `out` and takes in what is there.
+fn open(arguments: &Arguments, out: &Path, rows: &mut Rows) -> Result<Journal, CliError> {
+    let path = journal_of(out);
+    let (mut journal, lines) = Journal::open(&path)?;
+    let refuse = |file: &Path, why: String| CliError::Usage(format!("{}: {why}", file.display()));
+    if !arguments.resume && !lines.is_empty() {
+        let rows = lines.iter().filter(|line| line.starts_with('[')).count();
+        let why =
+            format!("it holds {rows} rows of a sweep that was not finished; --resume goes on with it, or remove it");
+        return Err(refuse(&path, why));
+    }
+    if lines.is_empty() {
+        journal.append(&rows.journal_heading())?;
+    } else {
+        let heading = rows.journal_heading();
+        let old = Rows::from_journal(&lines).map_err(|e| refuse(&path, e.to_string()))?;
+        take(arguments, rows, old, &path)?;
+        if !lines.contains(&heading) {
+            journal.append(&heading)?;
         }
     }
+    if arguments.resume && out.exists() && !arguments.json {
+        let old = read_rows(out)?;
+        take(arguments, rows, old, out)?;
+    }
+    Ok(journal)
 }
 
-/// One run, or nothing if it was interrupted.
-fn one(spec: &RunSpec, shift: f64, k: u32, progress: &Progress) -> Option<Box<Row>> {
-    let mut shifted = spec.clone();
-    shifted.start[0] += shift;
-    // Chance of its own in every row: the same kicks from neighbouring starts would not be independent runs.
-    if let Some(kick) = &mut shifted.schedule.kick {
-        kick.stream += u64::from(k);
-    }
-    if let SwitchSpec::Filippov { exit: ExitRule::Random { stream, .. }, .. } = &mut shifted.switch {
-        *stream += u64::from(k);
-    }
-    // A desk of its own: what it has computed is forgotten with it, however many runs there are.
-    match Classification::of(shifted).ask(&Desk::new(None, progress)) {
-        Err(JobError::Interrupted) => None,
-        end => Some(Box::new(Row { shift, end })),
-    }
-}
-
-fn as_csv(rows: &[Row]) -> String {
-    let mut text = String::from("shift,verdict,period,captured_at,rate,summary\n");
-    for Row { shift, end } in rows {
-        // Writing to a String cannot fail.
-        let _ = match end {
-            Ok(evidence) => {
-                let cycle = evidence.verdict.cycle();
-                let field = |value: Option<String>| value.unwrap_or_default();
-                writeln!(
-                    text,
-                    "{shift:?},{},{},{},{},\"{}\"",
-                    evidence.name,
-                    field(cycle.map(|c| c.period.to_string())),
-                    field(cycle.map(|c| format!("{:?}", c.captured_at))),
-                    field(cycle.and_then(|c| c.approach).map(|r| format!("{:?}", r.per_time))),
-                    evidence.summary.replace('"', "\"\"")
-                )
-            }
-            Err(error) => writeln!(text, "{shift:?},failed,,,,\"{}\"", error.to_string().replace('"', "\"\"")),
+/// Takes rows in that were computed before, if they may be mixed with today's.
+fn take(arguments: &Arguments, rows: &mut Rows, old: Rows, file: &Path) -> Result<(), CliError> {
+    let refuse = |why: String| CliError::Usage(format!("{}: {why}", file.display()));
+    let foreign: Vec<String> = old.numerics().filter(|n| *n != question::NUMERICS).map(str::to_owned).collect();
+    if !foreign.is_empty() && old.sweep().hash() == rows.sweep().hash() && !old.is_empty() {
+        let Some(wanted) = arguments.recheck else {
+            return Err(refuse(format!(
+                "its rows were computed by another version of the numerics ({}); --recheck N keeps them if N of them come out the same again",
+                foreign.join(", ")
+            )));
         };
+        let there: Vec<Row> = old.iter().collect();
+        let step = (there.len() / usize::try_from(wanted.max(1)).unwrap_or(usize::MAX)).max(1);
+        for row in there.iter().step_by(step) {
+            match old.sweep().row(row.number(), &()) {
+                Ok(again) if again.line() == row.line() => {}
+                Ok(_) => return Err(refuse(format!("row {} comes out otherwise now; start anew", row.number()))),
+                Err(error) => return Err(error.into()),
+            }
+        }
     }
-    text
+    rows.merge(old).map_err(|e| refuse(e.to_string()))
 }
 
-fn as_json(spec: &RunSpec, rows: &[Row], counts: &BTreeMap<String, u32>, arguments: &Arguments) -> Vec<u8> {
-    let rows: Vec<_> = rows
+/// The rows of a file of ours.
+fn read_rows(file: &Path) -> Result<Rows, CliError> {
+    let ending = file.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let found = match ending.as_str() {
+        "journal" => Rows::from_journal(&Journal::read(file)?),
+        "parquet" => Rows::from_parquet(&read(file)?),
+        _ => Rows::from_csv(&read(file)?),
+    };
+    found.map_err(|e| CliError::Usage(format!("{}: {e}", file.display())))
+}
+
+fn merged(arguments: &Merge) -> Result<Exit, CliError> {
+    let out = arguments.out.as_deref().filter(|f| !is_standard_output(f));
+    try_delivery(out)?;
+    let mut parts = arguments.parts.iter();
+    let first = parts.next().ok_or_else(|| CliError::Usage("give the parts to merge".into()))?;
+    let mut rows = read_rows(first)?;
+    for part in parts {
+        rows.merge(read_rows(part)?).map_err(|e| CliError::Usage(format!("{}: {e}", part.display())))?;
+    }
+    deliver(out, &bytes_of(&rows, out, arguments.json)?)?;
+    let progress = Progress::new(arguments.quiet);
+    progress.line(&format!("{} of {} rows", rows.len(), rows.sweep().rows()));
+    summary(&rows, &progress)
+}
+
+fn bytes_of(rows: &Rows, out: Option<&Path>, as_json: bool) -> Result<Vec<u8>, CliError> {
+    let is_parquet = out.and_then(|f| f.extension()).is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
+    match (as_json, is_parquet) {
+        (true, true) => {
+            Err(CliError::Usage("--json writes JSON: give --out a name that does not end in .parquet".into()))
+        }
+        (true, false) => Ok(json_of(rows)),
+        (false, true) => Ok(rows.parquet()),
+        (false, false) => Ok(rows.csv()),
+    }
+}
+
+fn json_of(rows: &Rows) -> Vec<u8> {
+    let table = rows.table();
+    let cell = |entry: &Entry| match entry {
+        Entry::Number(v) => json!(v),
+        Entry::Integer(v) => json!(v),
+        Entry::Word(w) => json!(w),
+    };
+    let list: Vec<Value> = table
+        .rows()
         .iter()
-        .map(|row| match &row.end {
-            Ok(evidence) => {
-                let cycle = evidence.verdict.cycle();
-                json!({
-                    "shift": row.shift,
-                    "end": row.kind(),
-                    "verdict": evidence.name,
-                    "period": cycle.map(|c| c.period),
-                    "captured_at": cycle.map(|c| c.captured_at),
-                    "rate": cycle.and_then(|c| c.approach).map(|r| r.per_time),
-                    "summary": evidence.summary,
-                })
-            }
-            Err(error) => json!({ "shift": row.shift, "end": row.kind(), "error": error.to_string() }),
-        })
+        .map(|row| table.columns.iter().zip(row).map(|(c, e)| (c.name.clone(), cell(e))).collect())
         .collect();
     let whole = json!({
         "format": "twofold-sweep",
-        "version": 1,
-        "spec": spec,
-        "runs": arguments.runs,
+        "version": 2,
+        "sweep": rows.sweep().hash(),
+        "spec": rows.sweep().run(),
+        "over": rows.sweep().axes(),
+        "runs": rows.sweep().rows(),
         "finished": rows.len(),
-        "ends": counts,
-        "rows": rows,
+        "ends": rows.counts(),
+        "rows": list,
     });
     let mut bytes = serde_json::to_vec_pretty(&whole).expect("rows are plain data");
     bytes.push(b'\n');
     bytes
+}
+
+/// How often each end occurred; and the first failure, if there is one.
+fn summary(rows: &Rows, progress: &Progress) -> Result<Exit, CliError> {
+    let counts = rows.counts();
+    for (end, count) in &counts {
+        progress.line(&format!("{count:>4} of {} end: {end}", rows.len()));
+    }
+    match rows.iter().find(|row| row.reason().is_some()) {
+        None => Ok(Exit::Fine),
+        Some(row) => {
+            let failed = rows.iter().filter(|row| row.reason().is_some()).count();
+            complain(&format!(
+                "error: {failed} of {} runs failed; the first, row {}: {}",
+                rows.len(),
+                row.number(),
+                row.reason().unwrap_or_default()
+            ));
+            Ok(Exit::Failed)
+        }
+    }
 }

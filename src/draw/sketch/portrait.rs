@@ -25,6 +25,10 @@ pub fn system(v: f64, w: f64) -> Caricature {
 }
 
 /// Computed orbits: single flights of f+ and f- between two crossings, and sliding orbits in both sliding regions.
+///
+/// # Errors
+///
+/// If an orbit of the sketch cannot be followed.
 pub fn tables(v: f64, w: f64) -> Result<Vec<Table>, JobError> {
     let system = system(v, w);
     let settings = Settings::default();

@@ -4,14 +4,14 @@ use nalgebra::SVector;
 
 use super::exit::{Chooser, Plan};
 use super::flow::{FreeFlow, InPhysicalTime, SlidingFlow, Straight, Truncated, project};
-use super::two_fold::{AlongCurve, SlidingAtTwoFold, locate};
+use super::two_fold::{AlongCurve, SlidingAtTwoFold};
 use super::{EventKind, ExitRule, FilippovError, FilippovObserver, FilippovSummary, Mode, ModeEvent, Settings, Side};
 use crate::integrate::dopri5::Dopri5;
 use crate::integrate::driver::Watch;
 use crate::integrate::roots::{Start, Zero, brent, first_zero};
 use crate::integrate::step::{Failure, Flow, Interpolant, Statistics, Step, Stepper, StopReason, Tolerance, finite};
 use crate::num::Dual;
-use crate::system::filippov::{gradient, lie_derivatives};
+use crate::system::filippov::{TwoFold, gradient, lie_derivatives, two_fold};
 use crate::system::{PiecewiseSmooth, VectorField, variables};
 
 /// Runs the Filippov motion of `system` from (0, x0) to `t_end`. `M` is `N + 1` and is inferred.
@@ -222,7 +222,7 @@ impl<const N: usize> TwoFoldAhead<N> {
         }
         self.tried_at = size;
         // From far away Newton's method may have found another two-fold: trust only the latest answer.
-        if let Some(point) = locate(system, x)
+        if let Ok(TwoFold { point, .. }) = two_fold(system, x)
             && self.local.as_ref().is_none_or(|l| (l.point - point).amax() > LIMITS.same_point * (1.0 + point.amax()))
         {
             self.local = SlidingAtTwoFold::at(system, point);

@@ -131,6 +131,10 @@ impl std::fmt::Display for ExitRule {
 
 impl ExitRule {
     /// Whether the rule's numbers make sense; the message says what to change.
+    ///
+    /// # Errors
+    ///
+    /// In words: which number is wrong and what it should be.
     pub fn validate(&self) -> Result<(), String> {
         let positive = |name: &str, v: f64| {
             if v.is_finite() && v >= 0.0 {

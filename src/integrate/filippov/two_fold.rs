@@ -23,12 +23,11 @@ use nalgebra::{SMatrix, SVector};
 use super::flow::desingularised;
 use crate::integrate::roots::brent;
 use crate::integrate::step::Interpolant;
-use crate::num::Dual;
 use crate::num::elementary::{pow, sqrt};
 use crate::num::jet::Jet;
 use crate::num::linear::solve;
 use crate::system::PiecewiseSmooth;
-use crate::system::filippov::lie_derivatives;
+use crate::system::filippov::{fold_conditions, lie_derivatives, shortest, two_fold};
 use crate::system::variables;
 
 /// Terms kept in the series of the invariant curve.
@@ -122,65 +121,15 @@ impl<const N: usize> Interpolant<N> for AlongCurve<'_, N> {
     }
 }
 
-/// h, L+h, L-h at `x` and their gradients as rows.
-fn conditions<P: PiecewiseSmooth<N>, const N: usize>(system: &P, x: &SVector<f64, N>) -> [Dual<f64, N>; 3] {
-    let at = variables(x);
-    let (p, q) = lie_derivatives::<P, Dual<f64, N>, N>(system, &at);
-    [system.switching(&at), p, q]
-}
-
-/// The shortest solution u of (row_i . u) = right_i.
-fn shortest<const N: usize>(rows: &[Dual<f64, N>; 3], right: [f64; 3]) -> Option<SVector<f64, N>> {
-    let row = |i: usize| SVector::<f64, N>::from(rows[i].partials);
-    let gram = SMatrix::<f64, 3, 3>::from_fn(|i, j| row(i).dot(&row(j)));
-    let inverse_scale = SVector::<f64, 3>::from_fn(|i, _| 1.0 / sqrt(gram[(i, i)]));
-    // Scaled by rows, so that the test for dependence does not depend on units.
-    let scaled = SMatrix::<f64, 3, 3>::from_fn(|i, j| gram[(i, j)] * inverse_scale[i] * inverse_scale[j]);
-    if scaled.determinant().is_nan() || scaled.determinant() < 1e-12 {
-        return None;
-    }
-    let b = SVector::<f64, 3>::from_fn(|i, _| right[i] * inverse_scale[i]);
-    let y = scaled.lu().solve(&b)?;
-    let mut u = SVector::<f64, N>::zeros();
-    for i in 0..3 {
-        u += row(i) * (y[i] * inverse_scale[i]);
-    }
-    u.iter().all(|v| v.is_finite()).then_some(u)
-}
-
-/// The two-fold near `guess`, by Newton's method with shortest steps (in more than three dimensions the two-folds form a
-/// set). `None` if it does not converge. In two dimensions a two-fold is not generic, and none is found.
-pub(super) fn locate<P: PiecewiseSmooth<N>, const N: usize>(
-    system: &P,
-    guess: &SVector<f64, N>,
-) -> Option<SVector<f64, N>> {
-    if N < 3 {
-        return None;
-    }
-    let mut x = *guess;
-    let mut last = f64::INFINITY;
-    for _ in 0..30 {
-        let rows = conditions(system, &x);
-        let step = shortest(&rows, [rows[0].value, rows[1].value, rows[2].value])?;
-        x -= step;
-        let size = step.amax();
-        if size <= 1e-13 * (1.0 + x.amax()) && (size >= 0.5 * last || size < 1e-15) {
-            return Some(x);
-        }
-        last = size;
-    }
-    None
-}
-
 impl<const N: usize> SlidingAtTwoFold<N> {
     /// The sliding flow at the two-fold near `guess`; `None` if there is none that Newton's method finds from there.
     pub fn near<P: PiecewiseSmooth<N>>(system: &P, guess: &SVector<f64, N>) -> Option<Self> {
-        locate(system, guess).and_then(|point| Self::at(system, point))
+        two_fold(system, guess).ok().and_then(|fold| Self::at(system, fold.point))
     }
 
     /// The sliding flow at the two-fold `point`.
     pub fn at<P: PiecewiseSmooth<N>>(system: &P, point: SVector<f64, N>) -> Option<Self> {
-        let rows = conditions(system, &point);
+        let rows = fold_conditions(system, &point);
         let (plus, minus) = (system.plus(&point), system.minus(&point));
         let along = |i: usize, f: &SVector<f64, N>| (0..N).map(|j| rows[i].partials[j] * f[j]).sum::<f64>();
         let second = [along(1, &plus), along(1, &minus), along(2, &plus), along(2, &minus)];

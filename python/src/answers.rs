@@ -1,0 +1,196 @@
+//! Jobs asked from Python, and their answers as NumPy arrays.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use rayon::prelude::*;
+use serde_json::{Value, json};
+use twofold::integrate::filippov::ExitRule;
+use twofold::job::question::question_hash;
+use twofold::job::spec::{RunSpec, SwitchSpec};
+use twofold::job::sweep::{Axis, Draws, Fate, Outcome, Rows, Shard, Sweep};
+use twofold::job::table::Cells;
+use twofold::job::{Answer, Classification, Desk, JobError, Question, Run, Stop, Table, encode};
+
+use crate::errors;
+use crate::supervise::{Work, supervise};
+
+/// A spec from its JSON.
+fn spec(text: &str) -> PyResult<RunSpec> {
+    let spec: RunSpec = serde_json::from_str(text).map_err(|e| errors::SpecError::new_err((e.to_string(), "spec")))?;
+    spec.validate().map_err(|e| errors::spec(&e))?;
+    Ok(spec)
+}
+
+/// The answer to a run, moved out of the desk that asked.
+fn ask(run: RunSpec, work: &Work) -> Result<Answer, JobError> {
+    let answer = Desk::new(None, work).ask(&Run(run))?;
+    let answer = Arc::try_unwrap(answer).unwrap_or_else(|shared| (*shared).clone());
+    if answer.stop == Stop::Interrupted { Err(JobError::Interrupted) } else { Ok(answer) }
+}
+
+/// A run: its tables as arrays, and everything else as JSON.
+#[pyfunction]
+#[pyo3(signature = (text, show=None))]
+pub fn run<'py>(py: Python<'py>, text: &str, show: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyDict>> {
+    let spec = spec(text)?;
+    let question = question_hash(&Run(spec.clone()));
+    let (answer, hash) = supervise(py, show, move |work| {
+        let answer = ask(spec, work)?;
+        let hash = answer.hash();
+        Ok((answer, hash))
+    })?;
+    let result = PyDict::new(py);
+    result.set_item("question", question.as_str())?;
+    result.set_item("hash", hash.as_str())?;
+    result.set_item("facts", json!(answer.facts).to_string())?;
+    result.set_item("statistics", json!(answer.statistics).to_string())?;
+    result.set_item("stop", answer.stop.word())?;
+    let tables = PyDict::new(py);
+    for table in answer.tables {
+        let name = table.name.clone();
+        tables.set_item(name, arrays(py, table)?)?;
+    }
+    result.set_item("tables", tables)?;
+    Ok(result)
+}
+
+/// A table's columns by name. The vectors themselves change hands; words are their codes and a vocabulary.
+fn arrays(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
+    let columns = PyDict::new(py);
+    for column in table.columns {
+        match column.cells {
+            Cells::Numbers(values) => columns.set_item(column.name, PyArray1::from_vec(py, values))?,
+            Cells::Integers(values) => columns.set_item(column.name, PyArray1::from_vec(py, values))?,
+            Cells::Words(words) => {
+                let vocabulary = PyList::new(py, words.vocabulary)?;
+                columns.set_item(column.name, (PyArray1::from_vec(py, words.codes), vocabulary))?;
+            }
+        }
+    }
+    Ok(columns)
+}
+
+/// A run as the bytes that `twofold run` writes: `format` is "csv" or "json".
+#[pyfunction]
+#[pyo3(signature = (text, format, show=None))]
+pub fn written(py: Python<'_>, text: &str, format: &str, show: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<u8>> {
+    let spec = spec(text)?;
+    let as_csv = match format {
+        "csv" => true,
+        "json" => false,
+        other => {
+            let text = format!("format is {other:?}: give \"csv\" or \"json\"");
+            return Err(errors::SpecError::new_err((text, "format")));
+        }
+    };
+    supervise(py, show, move |work| {
+        let run = Run(spec);
+        let answer = ask(run.0.clone(), work)?;
+        let about = json!({ "kind": run.kind(), "question": run.json(), "stop": answer.stop });
+        Ok(if as_csv { encode::csv(&answer.tables[0], &about) } else { encode::json(&answer, &about) })
+    })
+}
+
+/// What a run settles on: the evidence as JSON.
+#[pyfunction]
+#[pyo3(signature = (text, show=None))]
+pub fn classify(py: Python<'_>, text: &str, show: Option<&Bound<'_, PyAny>>) -> PyResult<String> {
+    let spec = spec(text)?;
+    supervise(py, show, move |work| {
+        let evidence = Classification::of(spec).ask(&Desk::new(None, work))?;
+        Ok(json!(evidence).to_string())
+    })
+}
+
+/// A sweep over axes: its rows as arrays, and as the bytes that `twofold sweep` writes. `random` is how often random axes are drawn, and their seed.
+#[pyfunction]
+#[pyo3(signature = (text, over, random, threads, show=None))]
+pub fn sweep<'py>(
+    py: Python<'py>,
+    text: &str,
+    over: Vec<String>,
+    random: Option<(u64, u64)>,
+    threads: usize,
+    show: Option<&Bound<'py, PyAny>>,
+) -> PyResult<(Bound<'py, PyDict>, Vec<u8>)> {
+    let wrong = |what: String| errors::SpecError::new_err((what, "over"));
+    let axes =
+        over.iter().map(|axis| axis.parse::<Axis>().map_err(|e| wrong(e.to_string()))).collect::<PyResult<_>>()?;
+    let random = random.map(|(count, seed)| Draws { count, seed });
+    let sweep = Sweep::new(spec(text)?, axes, random).map_err(|e| wrong(e.to_string()))?;
+    let rows = supervise(py, show, move |work| {
+        let numbers: Vec<u64> = Shard::WHOLE.rows(&sweep).collect();
+        let made = side_by_side(numbers, threads, work, |_, number| sweep.row(number, work))?;
+        let mut rows = Rows::of(sweep);
+        for row in made {
+            rows.insert(row).map_err(|e| JobError::Other(e.to_string()))?;
+        }
+        Ok(rows)
+    })?;
+    Ok((arrays(py, rows.table())?, rows.csv()))
+}
+
+/// Where runs from these starts end, in their order: a JSON object each, with "outcome" or "error".
+#[pyfunction]
+#[pyo3(signature = (text, starts, threads, show=None))]
+pub fn fates(
+    py: Python<'_>,
+    text: &str,
+    starts: Vec<Vec<f64>>,
+    threads: usize,
+    show: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Vec<String>> {
+    let spec = spec(text)?;
+    for start in &starts {
+        RunSpec { start: start.clone(), ..spec.clone() }.validate().map_err(|e| errors::spec(&e))?;
+    }
+    supervise(py, show, move |work| {
+        side_by_side(starts, threads, work, |k, start| Ok(fate(&spec, k, start, work)?.to_string()))
+    })
+}
+
+/// Independent jobs on a pool of threads, their results in order. The pool is made for the call: a global one would not survive a fork.
+fn side_by_side<A: Send, B: Send>(
+    jobs: Vec<A>,
+    threads: usize,
+    work: &Work,
+    job: impl Fn(usize, A) -> Result<B, JobError> + Sync,
+) -> Result<Vec<B>, JobError> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|e| JobError::Other(format!("{threads} threads could not be started: {e}")))?;
+    let (all, done) = (jobs.len(), AtomicUsize::new(0));
+    work.says(&format!("{all} runs"));
+    work.finished(0, all);
+    let one = |(k, asked): (usize, A)| {
+        if work.stopped() {
+            return Err(JobError::Interrupted);
+        }
+        let answer = job(k, asked)?;
+        work.finished(done.fetch_add(1, Ordering::Relaxed) + 1, all);
+        Ok(answer)
+    };
+    pool.install(|| jobs.into_par_iter().enumerate().map(one).collect())
+}
+
+/// What becomes of start number `k`, counted from 0.
+fn fate(spec: &RunSpec, k: usize, start: Vec<f64>, work: &Work) -> Result<Value, JobError> {
+    let mut run = RunSpec { start, ..spec.clone() };
+    // Chance of its own in every run, as the rows of a sweep have it.
+    let more = k as u64;
+    if let Some(kick) = &mut run.schedule.kick {
+        kick.stream = kick.stream.wrapping_add(more);
+    }
+    if let SwitchSpec::Filippov { exit: ExitRule::Random { stream, .. }, .. } = &mut run.switch {
+        *stream = stream.wrapping_add(more);
+    }
+    let answer = Desk::new(None, work).ask(&Fate(Classification::of(run)));
+    match answer.and_then(|a| Ok(a.fact::<Outcome>("outcome")?)) {
+        Ok(outcome) => Ok(json!({ "outcome": outcome })),
+        Err(JobError::Interrupted) => Err(JobError::Interrupted),
+        Err(error) => Ok(json!({ "error": error.to_string() })),
+    }
+}

@@ -1,0 +1,35 @@
+//! The native half of the Python package `twofold`: systems, jobs and verdicts of the library, handed to Python.
+//!
+//! Nothing is computed here. What a call means (defaults, names, shapes) is said in Python (`twofold/`), which hands a run over as the same
+//! JSON spec that `twofold run --spec` reads; so both ask the same question and get the same bytes. Numbers go back as the very
+//! vectors in which the job recorded them.
+
+mod answers;
+mod errors;
+mod paper;
+mod supervise;
+mod system;
+
+/// The native half of `twofold`; use `import twofold`.
+#[pyo3::pymodule]
+mod _native {
+    #[pymodule_export]
+    use super::answers::{classify, fates, run, sweep, written};
+    #[pymodule_export]
+    use super::paper::{panels, verdict_table};
+    #[pymodule_export]
+    use super::system::{Definition, builtin_names};
+
+    use pyo3::prelude::*;
+    use twofold::job::question::NUMERICS;
+    use twofold::job::spec::{DEFAULT_MAX_STEPS, Method, MethodSpec};
+
+    #[pymodule_init]
+    fn constants(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("VERSION", env!("CARGO_PKG_VERSION"))?;
+        // The digest of the sources that numbers depend on.
+        module.add("NUMERICS", NUMERICS)?;
+        module.add("DEFAULT_TOLERANCE", MethodSpec::ndsolve_defaults(Method::Dopri5).tolerance.rtol)?;
+        module.add("DEFAULT_MAX_STEPS", DEFAULT_MAX_STEPS)
+    }
+}

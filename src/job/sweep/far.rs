@@ -1,0 +1,89 @@
+//! Where a run of the caricature never comes back from.
+//!
+//! With w = |x|^2 the caricature's y and z obey y' >= -m + (alpha - beta y) w and the same for z, where m is the most that the constant parts
+//! can take away. On the edge y = c of the quadrant y, z >= c is w >= 2 c^2, so wherever (alpha - beta c) 2 c^2 > m no orbit leaves the
+//! quadrant, whatever its x. Inside, x falls where it is positive and rises where it is negative: the orbit slides to the stiff
+//! state near (0, alpha/beta, alpha/beta), where an explicit method needs some 10^4 steps per unit of time. A run that enters
+//! the quadrant has its fate; following it further would only look like a hang.
+
+use crate::job::spec::{RunSpec, SwitchSpec};
+use crate::num::elementary::sqrt;
+use crate::system::caricature::MinusSign;
+use crate::system::{Compiled, Transition};
+
+/// The corner c of the largest quadrant y, z >= c that no orbit of the run's system leaves; `None` if there is none, or the system is
+/// another one. Kicks are taken to be too small to throw an orbit out again.
+pub(super) fn corner(run: &RunSpec) -> Option<f64> {
+    let Some(Compiled::Caricature(c)) = run.system.compiled() else { return None };
+    if c.first_component_of_minus != MinusSign::Equation4 || !(c.alpha > 0.0 && c.beta > 0.0) {
+        return None;
+    }
+    // A perturbed transition function exceeds [0, 1] by this much at most.
+    let excess = match run.switch {
+        SwitchSpec::Smoothed { eps, transition: Transition::PerturbedTanh { sigma } } => sigma.abs() * sqrt(eps),
+        _ => 0.0,
+    };
+    // The smaller of each field's two constants, weighted as badly as the transition allows.
+    let worst = |v: f64| (1.0 + excess) * v.min(1.0) - excess * v.max(1.0);
+    let most = (-worst(c.v_plus)).max(-worst(c.v_minus)).max(0.0);
+    let push = |y: f64| (c.alpha - c.beta * y) * 2.0 * y * y;
+    let mut high = 2.0 * c.alpha / (3.0 * c.beta);
+    if push(high) <= most {
+        return None;
+    }
+    let mut low = 0.0;
+    // The push grows up to there: halving finds the smallest place where it is enough.
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if push(middle) > most { high = middle } else { low = middle }
+    }
+    Some(high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::Schedule;
+    use crate::job::spec::*;
+    use crate::num::random::RandomStream;
+    use crate::system::{Caricature, PiecewiseSmooth};
+    use nalgebra::SVector;
+
+    fn run(alpha: f64, beta: f64) -> RunSpec {
+        RunSpec {
+            system: Caricature::with_reinjection(alpha, beta).into(),
+            switch: SwitchSpec::tanh(1e-3),
+            start: vec![0.2, 0.0, -1.0],
+            t_end: 20.0,
+            method: MethodSpec::ndsolve_defaults(Method::Dopri5),
+            schedule: Schedule::default(),
+            observe: Observation::Section { coordinate: 1, value: 0.0 },
+        }
+    }
+
+    #[test]
+    fn no_orbit_leaves_the_quadrant() {
+        for (alpha, beta) in [(1e-3, 1e-5), (1e-1, 1e-5), (1e-1, 1e-4)] {
+            let corner = corner(&run(alpha, beta)).unwrap();
+            assert!(corner < alpha / beta);
+            let system = Caricature::with_reinjection(alpha, beta);
+            let mut random = RandomStream::new(5, 0);
+            for _ in 0..2000 {
+                let x = random.uniform_in(-30.0, 30.0);
+                let other = corner + random.uniform() * 2.0 * alpha / beta;
+                let (at_y, at_z) = (SVector::from([x, corner, other]), SVector::from([x, other, corner]));
+                for (at_y, at_z) in
+                    [(system.plus(&at_y), system.plus(&at_z)), (system.minus(&at_y), system.minus(&at_z))]
+                {
+                    assert!(at_y[1] >= 0.0 && at_z[2] >= 0.0, "{alpha} {beta} {x} {other}");
+                }
+                assert!(system.plus(&at_y)[0] < 0.0 && system.minus(&at_y)[0] > 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn without_room_there_is_no_far_state() {
+        assert_eq!(corner(&run(1e-3, 1e-4)), None);
+    }
+}

@@ -1,0 +1,152 @@
+//! What becomes of one cell of a sweep.
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use super::far;
+use crate::analyse::attractor::{Evidence, Verdict};
+use crate::integrate::Watch;
+use crate::job::answer::{Answer, Stop};
+use crate::job::classification::Classification;
+use crate::job::desk::Desk;
+use crate::job::question::{JobError, Question};
+use crate::job::run::Run;
+use crate::job::simulate::simulate_until;
+use crate::job::spec::SwitchSpec;
+
+/// What a run settles on, as [`Classification`] has it, or that it goes to the far state: see [`corner`](far::corner). Fact: `outcome`
+/// ([`Outcome`]).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fate(pub Classification);
+
+/// Where a run ends, in a row's worth of numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Outcome {
+    /// In a word: `period-1`, `leaving-period-1` (turns around it and moves away), `quasi-periodic`, `irregular`, `undecided`, `noisy`,
+    /// `noisy-around-period-1`, `far`, `escaped`, `too-few`.
+    pub word: String,
+    /// Period of the closed orbit, 0 where there is none.
+    pub period: u64,
+    /// From then on the run only turns around that orbit; of a far run, when it entered the region without return.
+    pub captured_at: Option<f64>,
+    /// From then on it is there.
+    pub settled_at: Option<f64>,
+    /// Mean distance from the orbit at the end.
+    pub radius: Option<f64>,
+    /// Rate of the approach per unit time ...
+    pub rate: Option<f64>,
+    /// ... and its standard error.
+    pub rate_error: Option<f64>,
+    /// Time for one turn.
+    pub turn: Option<f64>,
+    /// Largest exponent per unit time, where it was needed ...
+    pub exponent: Option<f64>,
+    /// ... and the standard error of its block means.
+    pub exponent_error: Option<f64>,
+    /// Passages through the section.
+    pub crossings: u64,
+    /// Time reached.
+    pub end: f64,
+    /// Steps made.
+    pub steps: u64,
+}
+
+impl Outcome {
+    fn of(evidence: &Evidence, answer: &Answer) -> Result<Self, JobError> {
+        let cycle = evidence.verdict.cycle();
+        let approach = cycle.and_then(|c| c.approach);
+        let word = match &evidence.verdict {
+            Verdict::Spiralling(c) if approach.is_some_and(|r| r.per_time < 0.0) => {
+                format!("leaving-period-{}", c.period)
+            }
+            Verdict::Periodic(c) | Verdict::Spiralling(c) => format!("period-{}", c.period),
+            Verdict::QuasiPeriodic(_) => "quasi-periodic".to_owned(),
+            Verdict::Chaotic { .. } => "irregular".to_owned(),
+            Verdict::Noisy { around: Some(c), .. } => format!("noisy-around-period-{}", c.period),
+            other => other.name().to_owned(),
+        };
+        Ok(Self {
+            word,
+            period: cycle.map_or(0, |c| c.period as u64),
+            captured_at: cycle.map(|c| c.captured_at),
+            settled_at: cycle.and_then(|c| c.settled_at),
+            radius: cycle.map(|c| c.radius),
+            rate: approach.map(|r| r.per_time),
+            rate_error: approach.map(|r| r.standard_error),
+            turn: cycle.map(|c| c.duration),
+            exponent: evidence.lyapunov.map(|l| l.value),
+            exponent_error: evidence.lyapunov.map(|l| l.standard_error),
+            crossings: evidence.crossings as u64,
+            end: answer.fact("t")?,
+            steps: steps(answer),
+        })
+    }
+
+    fn far(answer: &Answer) -> Result<Self, JobError> {
+        let end: f64 = answer.fact("t")?;
+        Ok(Self {
+            word: "far".into(),
+            period: 0,
+            captured_at: Some(end),
+            settled_at: None,
+            radius: None,
+            rate: None,
+            rate_error: None,
+            turn: None,
+            exponent: None,
+            exponent_error: None,
+            crossings: answer.rows() as u64,
+            end,
+            steps: steps(answer),
+        })
+    }
+}
+
+fn steps(answer: &Answer) -> u64 {
+    answer.statistics.as_ref().map_or(0, |s| s.steps)
+}
+
+impl Question for Fate {
+    fn kind(&self) -> &'static str {
+        "fate"
+    }
+
+    fn json(&self) -> Value {
+        json!({ "classification": self.0.json(), "far": far::corner(&self.0.run) })
+    }
+
+    fn label(&self) -> String {
+        self.0.label()
+    }
+
+    fn extent(&self) -> f64 {
+        self.0.run.t_end
+    }
+
+    fn cost(&self) -> f64 {
+        self.0.cost()
+    }
+
+    fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+        let run = &self.0.run;
+        let is_far = far::corner(run).map(|c| move |x: &[f64]| x[1] > c && x[2] > c);
+        let answer = match (&is_far, run.switch) {
+            // Filippov motion has no layer to be stiff in: it gets to its end.
+            (Some(is_far), SwitchSpec::Smoothed { .. } | SwitchSpec::Hysteretic { .. }) => {
+                simulate_until(run, is_far, watch)?.to_answer(run)
+            }
+            _ => Run(run.clone()).compute(desk, watch)?,
+        };
+        if answer.stop == Stop::Interrupted {
+            return Err(JobError::Interrupted);
+        }
+        let state: Vec<f64> = answer.fact("state")?;
+        let outcome = if is_far.is_some_and(|far| far(&state)) {
+            Outcome::far(&answer)?
+        } else {
+            Outcome::of(&self.0.evidence_of(desk, &answer)?, &answer)?
+        };
+        Ok(Answer::of_tables(Vec::new()).with_fact("outcome", &outcome))
+    }
+}

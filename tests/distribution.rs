@@ -1,0 +1,122 @@
+//! What carries the project to others: workflows are pinned and may do little, versions agree, the package holds what it embeds.
+//!
+//! A package made of this repository has no workflows; there nothing is tested here.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn text(path: impl AsRef<Path>) -> String {
+    let path = root().join(path);
+    fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+/// Every YAML file under `.github`.
+fn workflows() -> Vec<(PathBuf, String)> {
+    fn collect(folder: &Path, found: &mut Vec<(PathBuf, String)>) {
+        for entry in fs::read_dir(folder).into_iter().flatten() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                collect(&path, found);
+            } else if path.extension().is_some_and(|e| e == "yml") {
+                found.push((path.clone(), fs::read_to_string(path).unwrap()));
+            }
+        }
+    }
+    let mut found = Vec::new();
+    collect(&root().join(".github"), &mut found);
+    found.sort();
+    found
+}
+
+#[test]
+fn actions_are_pinned_to_commits_and_each_to_one() {
+    let mut pins: BTreeMap<String, String> = BTreeMap::new();
+    for (path, text) in workflows() {
+        for line in text.lines().map(str::trim) {
+            let Some(used) = line.strip_prefix("- uses:").or(line.strip_prefix("uses:")) else { continue };
+            let wrong = || format!("{}: {line}: give an action as OWNER/NAME@COMMIT # vRELEASE", path.display());
+            let (action, pin) = used.trim().split_once('@').unwrap_or_else(|| panic!("{}", wrong()));
+            let (commit, release) = pin.split_once(" # v").unwrap_or_else(|| panic!("{}", wrong()));
+            let hexadecimal = |c: char| c.is_ascii_digit() || ('a'..='f').contains(&c);
+            assert!(commit.len() == 40 && commit.chars().all(hexadecimal), "{}", wrong());
+            assert!(release.split('.').count() == 3, "{}", wrong());
+            let first = pins.entry(action.to_owned()).or_insert(pin.to_owned());
+            assert_eq!(first, pin, "{action} is used at two commits");
+        }
+    }
+    assert!(pins.len() >= 5 || workflows().is_empty(), "{pins:?}");
+}
+
+#[test]
+fn workflows_may_do_little() {
+    for (path, text) in workflows().iter().filter(|(p, _)| p.parent().is_some_and(|p| p.ends_with("workflows"))) {
+        let path = path.display();
+        assert!(text.lines().any(|l| l == "permissions: {}"), "{path}: begin with `permissions: {{}}`");
+        let jobs = text.matches("    runs-on:").count();
+        assert_eq!(text.matches("\n    permissions:").count(), jobs, "{path}: every job says what it may do");
+        assert_eq!(text.matches("    timeout-minutes:").count(), jobs, "{path}: every job has an end");
+        let checkouts = text.matches("actions/checkout@").count();
+        assert_eq!(text.matches("persist-credentials: false").count(), checkouts, "{path}: no job keeps a token");
+        for line in text.lines().filter(|l| l.contains(": write")) {
+            assert!(line.contains(" # "), "{path}: {line}: say what for");
+        }
+        for line in text.lines().filter(|l| l.contains("run:") && l.contains("${{")) {
+            panic!("{path}: {line}: values reach a shell as variables, never as code");
+        }
+    }
+}
+
+#[test]
+fn versions_agree() {
+    if workflows().is_empty() {
+        return;
+    }
+    let version = format!("version = \"{}\"", env!("CARGO_PKG_VERSION"));
+    assert!(text("python/Cargo.toml").lines().any(|l| l == version), "python/Cargo.toml has no line {version}");
+    let toolchain = text("rust-toolchain.toml");
+    let channel = toolchain.lines().find_map(|l| l.strip_prefix("channel = \"")?.strip_suffix('"')).unwrap();
+    assert!(text("Containerfile").contains(&format!("ARG RUST={channel}\n")));
+    assert!(text(".github/workflows/ci.yml").contains(&format!("rust-version: {channel}\n")));
+}
+
+/// A crate that is published must build: every file that sources embed is in its archive.
+#[test]
+fn the_package_holds_what_it_embeds() {
+    if workflows().is_empty() {
+        return;
+    }
+    let list =
+        Command::new(env!("CARGO")).args(["package", "--list", "--allow-dirty"]).current_dir(root()).output().unwrap();
+    assert!(list.status.success(), "{}", String::from_utf8_lossy(&list.stderr));
+    let list = String::from_utf8(list.stdout).unwrap();
+    let packed: Vec<&str> = list.lines().collect();
+    // A file that is named by a macro and stands outside src.
+    let mut embedded = 0;
+    for source in packed.iter().filter(|f| f.starts_with("src/") && f.ends_with(".rs")) {
+        for quoted in text(source).split('"').skip(1).step_by(2).filter(|q| q.starts_with("../../") && !q.contains(' '))
+        {
+            let path = Path::new(source).parent().unwrap().join(quoted);
+            let mut plain = PathBuf::new();
+            for part in path.components() {
+                if part.as_os_str() == ".." {
+                    plain.pop();
+                } else {
+                    plain.push(part);
+                }
+            }
+            let plain = plain.to_str().unwrap().replace('\\', "/");
+            assert!(packed.contains(&plain.as_str()), "{source} embeds {plain}, which the package has not");
+            embedded += 1;
+        }
+    }
+    assert!(embedded > 30, "only {embedded} embedded files were found");
+    for name in ["README.md", "LICENSE-MIT", "LICENSE-APACHE", "Cargo.lock", "build.rs", "rust-toolchain.toml"] {
+        assert!(packed.contains(&name), "{name}");
+    }
+}
