@@ -7,7 +7,7 @@ PROOFS  := printed-cycle coexistence sensitivity crossings
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help figures report check bless test elementary rigor-test census proofs browser-test lint bench bench-peers torture ci clean
+.PHONY: help figures report check bless test elementary rigor-test census proofs browser-test lint bench bench-keep bench-peers bench-cost torture ci clean
 
 help: ## this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -81,11 +81,21 @@ torture: ## kill the program at random moments and look for losses: make torture
 	@$(CARGO) build --release --locked --bin twofold
 	@scripts/torture.sh $(or $(KILLS),100)
 
-bench-peers: ## the units of work of benches/README.md by Boost.odeint and by us, in turn, with ratios (needs g++ and Boost's headers)
+bench-peers: ## W1 and W2 of benches/README.md by the peers and by us, in turn: table, ratios, picture (needs g++, Boost, SUNDIALS, python3)
 	@sh benches/peers/run.sh
 
-bench: ## benchmarks
-	@$(CARGO) bench --locked
+bench-cost: ## cost against end time, layer and tolerance: benches/cost.csv, cost.md and cost.svg
+	@$(CARGO) build --release --locked --quiet --manifest-path benches/peers/ours/Cargo.toml --target-dir target --bin twofold-cost
+	@target/release/twofold-cost > benches/cost.csv
+	@python3 benches/cost.py
+
+bench: ## benchmarks, compared with the last kept ones (make bench-keep)
+	@if ls target/criterion/*/*/kept >/dev/null 2>&1; then flags="--baseline kept"; fi; \
+	$(CARGO) bench --locked --bench steppers -- $$flags && $(CARGO) bench --locked --bench render -- $$flags
+
+bench-keep: ## benchmarks, kept as what `make bench` compares with
+	@$(CARGO) bench --locked --bench steppers -- --save-baseline kept
+	@$(CARGO) bench --locked --bench render -- --save-baseline kept
 
 ci: lint test ## what CI runs; nothing in it rests on a store
 	@$(MAKE) --no-print-directory figures FIGURE_FLAGS=--fresh

@@ -1,0 +1,124 @@
+"""Runs the peers and our methods beside each other (make bench-peers): one table with ratios, and its picture.
+
+    python run.py BUILD [ROUNDS]
+
+BUILD holds the programs (run.sh makes them). Every program is run in each round, one after the other, and of each the least processor time is
+taken: other work on the machine then costs little. A program that is not there is said to be not run. Writes results.csv, results.md, results.svg
+beside this file.
+"""
+
+import csv
+import os
+import pathlib
+import platform
+import subprocess
+import sys
+import datetime
+
+HERE = pathlib.Path(__file__).parent
+BUILD = pathlib.Path(sys.argv[1])
+ROUNDS = int(sys.argv[2]) if len(sys.argv) > 2 else 3
+PYTHON = BUILD / "python/bin/python"
+OURS = BUILD / "units"
+
+# What is asked of whom: name, command, units of work, the row that it is measured against and the most that the ratio should be.
+W1 = ["W1 A", "W1 B"]
+PEERS = [
+    ("Boost.odeint dopri5", [BUILD / "boost_dopri5"], W1 + ["W2 B"]),
+    ("CVODE Adams", [BUILD / "cvode_adams"], W1),
+    ("SciPy LSODA, compiled field, no crossings", [PYTHON, HERE / "scipy_lsoda.py"], W1),
+    ("heyoka Taylor, layer's edge as event", [PYTHON, HERE / "heyoka_taylor.py"], W1),
+]
+METHODS = {
+    "dopri5": (W1 + ["W2 B"], "Boost.odeint dopri5", 0.8),
+    "dopri5-lanes-avx2": (["W2 B"], "Boost.odeint dopri5", 1 / 12),
+    "dopri5-lanes-avx512": (["W2 B"], "Boost.odeint dopri5", 1 / 12),
+    "lsoda": (W1, "CVODE Adams", 1 / 7),
+    "radau5": (W1, None, None),
+    "taylor": (W1, "heyoka Taylor, layer's edge as event", 1 / 1.2),
+}
+
+
+def run(command):
+    """What the program printed, and its processor time."""
+    before = os.times()
+    try:
+        done = subprocess.run(command, capture_output=True, text=True)
+    except OSError as error:
+        return None, str(error)
+    after = os.times()
+    if done.returncode != 0:
+        return None, (done.stderr.strip().splitlines() or ["no reason given"])[-1]
+    return done.stdout.split(), after.children_user - before.children_user
+
+
+def main():
+    jobs = [(name, [*command, *unit.split(), "1"], unit, False) for name, command, units in PEERS for unit in units]
+    for method, (units, _, _) in METHODS.items():
+        jobs += [(f"ours, {method}", [OURS, *unit.split(), method, "1"], unit, True) for unit in units]
+    best, missing = {}, {}
+    for _ in range(ROUNDS):
+        for name, command, unit, ours in jobs:
+            words, seconds = run([str(c) for c in command])
+            if words is None:
+                missing[name, unit] = seconds
+                continue
+            # Ours whole, from start to exit; the others by their own clock, without compilation at run time.
+            seconds = seconds if ours else float(words[3])
+            if (name, unit) not in best or seconds < best[name, unit][0]:
+                best[name, unit] = (seconds, int(words[4]), int(words[5]))
+    rows = []
+    for name, _, unit, ours in jobs:
+        if (name, unit) not in best:
+            rows.append([unit, name, "", "", "", "", "", "", "not run: " + missing.get((name, unit), "")])
+            continue
+        seconds, steps, crossings = best[name, unit]
+        boost = best.get(("Boost.odeint dopri5", unit))
+        against, target = METHODS[name.removeprefix("ours, ")][1:] if ours else (None, None)
+        other = best.get((against, unit))
+        ratio = seconds / other[0] if other else None
+        verdict = "" if ratio is None or target is None else ("met" if ratio <= target else "missed")
+        to_boost = f"{seconds / boost[0]:.2f}" if boost else ""
+        rows.append([unit, name, f"{seconds:.3f}", to_boost, against or "", f"{ratio:.3f}" if ratio else "",
+                     f"{target:.3f}" if target else "", verdict, f"{steps} steps, {crossings} crossings"])
+    rows.sort(key=lambda row: ["W1 A", "W1 B", "W2 B"].index(row[0]))
+    head = ["unit", "program", "seconds", "to Boost", "against", "ratio", "target", "verdict", "work"]
+    with open(HERE / "results.csv", "w", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([head, *rows])
+    model = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), "?")
+    compiler = subprocess.run(["g++", "--version"], capture_output=True, text=True).stdout.splitlines()[0]
+    rust = subprocess.run(["rustc", "--version"], capture_output=True, text=True).stdout.strip()
+    text = [f"{datetime.date.today()}, {model}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}; {compiler}; {rust}. "
+            f"Least processor seconds of {ROUNDS} rounds, every program in each.", ""]
+    text += ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    text += ["| " + " | ".join(row) + " |" for row in rows]
+    (HERE / "results.md").write_text("\n".join(text) + "\n")
+    print("\n".join(text))
+    draw(rows)
+
+
+def draw(rows):
+    """Bars of seconds, by unit of work, on one logarithmic scale."""
+    import math
+
+    rows = [row for row in rows if row[2]]
+    width, left, line = 900, 330, 18
+    low, high = 0.05, max(float(row[2]) for row in rows) * 1.5
+    scale = (width - left - 70) / math.log10(high / low)
+    parts, y, unit = [], 10, None
+    for row in rows:
+        if row[0] != unit:
+            unit, y = row[0], y + 24
+            parts.append(f'<text x="8" y="{y}" font-weight="bold">{unit}</text>')
+        y += line
+        length = max(1.0, math.log10(max(float(row[2]), low) / low) * scale)
+        colour = "#b03060" if row[1].startswith("ours") else "#8090a0"
+        parts.append(f'<text x="{left - 8}" y="{y}" text-anchor="end">{row[1]}</text>')
+        parts.append(f'<rect x="{left}" y="{y - 11}" width="{length:.1f}" height="13" fill="{colour}"/>')
+        parts.append(f'<text x="{left + length + 6:.1f}" y="{y}">{row[2]} s</text>')
+    style = 'font-family="sans-serif" font-size="12"'
+    svg = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{y + 20}" {style}>' + "\n".join(parts) + "</svg>\n"
+    (HERE / "results.svg").write_text(svg)
+
+
+main()
