@@ -7,7 +7,7 @@ PROOFS  := printed-cycle coexistence sensitivity crossings
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help figures report check bless test elementary rigor-test census proofs browser-test lint bench bench-keep bench-peers bench-cost torture ci clean
+.PHONY: help figures gallery report check bless test elementary rigor-test census proofs browser-test lint bench bench-peers torture ci clean bench-keep bench-cost
 
 help: ## this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -16,6 +16,10 @@ figures: ## compute every figure at full length into target/figures
 	@$(CARGO) build --release --locked --bins
 	@$(RUN) --bin twofold -- figure $(FIGURE_FLAGS)
 	@$(RUN) --bin twofold -- report
+
+gallery: ## a picture of every system that ships into target/gallery
+	@$(CARGO) build --release --locked --bin twofold
+	@scripts/gallery.sh target/release/twofold target/gallery
 
 report: ## one page about what stands in target/figures: target/figures/index.html
 	@$(RUN) --bin twofold -- report
@@ -54,7 +58,7 @@ census: ## go on with the census, the audit and the basins (hours; Ctrl-C keeps 
 
 proofs: ## prove the theorems anew (proofs/README.md), write their certificates and check those (minutes)
 	@set -e; for p in $(PROOFS); do $(RUN) --package twofold-proofs --bin $$p; done
-	@python3 proofs/check.py
+	@$(RUN) --bin twofold -- verify proofs/certificates/*.json
 
 browser-test: ## the report in a headless Chromium, if there is one (needs Node)
 	@$(CARGO) build --release --locked --bins

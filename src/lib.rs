@@ -11,6 +11,7 @@
 //! - [`integrate`]: time stepping. One file a method; a step carries its interpolant; one driver loop; restarts and kicks
 //!   are a schedule around a run.
 //! - [`rigor`]: validated steps, sets, Poincaré maps, closed orbits: enclosures that are theorems. The theorems: `proofs/`.
+//! - [`verify`]: checks the theorems' certificates in exact arithmetic; shares nothing with [`rigor`].
 //! - [`analyse`]: what is made of steps: paths, Poincaré sections, exponents, closed orbits.
 //! - [`job`]: a question as data, its computation, its answer.
 //! - [`paper`]: what speaks of this paper: readings, claims, figures as data.
@@ -83,3 +84,4 @@ pub mod render;
 pub mod report;
 pub mod rigor;
 pub mod system;
+pub mod verify;

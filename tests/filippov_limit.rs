@@ -1,8 +1,9 @@
 //! eps -> 0: the smoothed system against the Filippov motion.
 
 use twofold::analyse::limit::{AfterVisitQuestion, ConvergenceQuestion, after_visit, convergence, observed_rate};
+use twofold::analyse::passage::{PassageQuestion, passage};
 use twofold::integrate::filippov::{FilippovError, FunnelGrid, Mode, Settings};
-use twofold::system::Caricature;
+use twofold::system::{Caricature, Smoothed, Transition};
 
 fn before(times: &[f64], eps: &[f64]) -> ConvergenceQuestion {
     ConvergenceQuestion {
@@ -60,7 +61,12 @@ fn smoothed_orbits_leave_inside_the_funnel() {
     };
     for alpha in [1e-1, 1e-3] {
         let c = Caricature::with_reinjection(alpha, 1e-5);
-        let found = after_visit(&c, &question).unwrap();
+        let far = PassageQuestion::far([0.2, 0.0, -1.0], question.beyond, question.t_end);
+        let crossing = |eps: f64| {
+            let field = Smoothed { system: c, transition: Transition::Tanh, eps };
+            Ok(passage(&field, eps, &far)?.far.map(Vec::from))
+        };
+        let found = after_visit(&c, &question, crossing).unwrap();
         assert_eq!(found.rows.len(), question.eps.len());
         // Smoothing blurs a two-fold over a distance sqrt(eps): the orbit goes out within that of some member, in a
         // funnel that is much wider.

@@ -4,7 +4,6 @@
 use nalgebra::{SVector, vector};
 use twofold::analyse::Direction;
 use twofold::analyse::digits::{Agreement, agreement};
-use twofold::analyse::growth::{GrowthQuestion, growth};
 use twofold::analyse::reference::{ExtendedCrossing, Plane, reference};
 use twofold::integrate::*;
 use twofold::num::{Arithmetic, DoubleDouble, Scalar};
@@ -167,33 +166,27 @@ fn equations_with_other_layers_need_no_telling() {
 }
 
 #[test]
-fn a_visit_amplifies_by_digits_per_decade_of_eps() {
-    let question = GrowthQuestion {
-        start: START,
-        section: SECTION,
-        near: 0.05,
-        offsets: vec![-100.0, -0.1, 0.0],
-        at_start: 1e-8,
-        exit_by: 40.0,
+fn a_run_by_name_is_the_reference() {
+    use twofold::job::spec::{Method, MethodSpec, Observation, RunSpec, SwitchSpec};
+    use twofold::job::{Desk, Run};
+    // Through the first visit, which multiplies by 1e12 whatever the default tolerance or 0.1 as a binary number leave out.
+    let run = RunSpec {
+        system: Caricature::with_reinjection(1e-1, 1e-5).into(),
+        switch: SwitchSpec::tanh(1e-3),
+        start: vec![0.2, 0.0, -1.0],
+        t_end: 20.0,
+        method: MethodSpec::defaults(Method::TaylorExtended),
+        schedule: Schedule::default(),
+        observe: Observation::Section { coordinate: 1, value: 0.0 },
     };
-    let growth = [1e-2, 1e-3].map(|eps| {
-        let found = growth(&smoothed(1e-1, eps), &question).unwrap();
-        let visit = found.visit.unwrap();
-        // Two ways to disturb the start: a size that gives a response in the linear range, and the size asked for.
-        for (a, b) in visit.rows[0].factors.iter().zip(found.from_start.unwrap()) {
-            assert!((a / b.unwrap() - 1.0).abs() < 0.02, "{a} {b:?}");
+    let answer = Desk::quiet().ask(&Run(run)).unwrap();
+    let table = answer.table("section").unwrap();
+    let wanted = rows(include_str!("data/crossings-reconstructed.csv"));
+    assert!(table.len() >= 5, "{} crossings", table.len());
+    for (i, want) in wanted.iter().take(table.len()).enumerate() {
+        for (column, w) in [("t", want.t), ("x", want.x[0]), ("z", want.x[2])] {
+            let got = table.numbers(column)[i];
+            assert!((got - w).abs() < 1e-13 * (1.0 + w.abs()), "row {i}, {column}: {got} {w}");
         }
-        for r in &visit.rows {
-            println!("eps {eps} t {} x {:?} factors {:?}", r.t, r.x, r.factors);
-        }
-        assert!((visit.t - 13.2).abs() < 0.05, "the first visit, SCIENCE.md section 5");
-        assert_eq!(visit.rows[0].t, 0.0);
-        visit.rows
-    });
-    for i in [1, 2] {
-        let digits = growth[1][i].log10_factor - growth[0][i].log10_factor;
-        assert!((2.0..5.0).contains(&digits), "{digits} digits per decade");
     }
-    // Brought in from outside, a disturbance is contracted first: two digits at most.
-    assert!(growth.iter().all(|rows| rows[0].factor < 1e2 && rows[2].factor > 1e6));
 }

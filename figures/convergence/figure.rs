@@ -7,6 +7,7 @@ use twofold::analyse::limit::{AfterVisitQuestion, ConvergenceQuestion, observed_
 use twofold::integrate::filippov::{FunnelGrid, Settings};
 use twofold::job::table::{Entry, Table};
 use twofold::job::{AfterVisit, AnyQuestion, SmoothingLimit};
+use twofold::num::elementary::exp10;
 use twofold::paper::wording::number;
 use twofold::paper::{Figure, Reading, Study};
 use twofold::render::sheet::*;
@@ -17,8 +18,10 @@ use twofold::system::System;
 const START: [f64; 3] = [0.2, 0.0, -1.0];
 /// Stiffness parameters before the visit.
 const BEFORE: [f64; 6] = [1.6e-2, 8e-3, 4e-3, 2e-3, 1e-3, 5e-4];
-/// Stiffness parameters after the visit.
-const AFTER: [f64; 5] = [1e-2, 3e-3, 1e-3, 3e-4, 1e-4];
+/// Stiffness parameters after the visit: from 1e-2 down, so many a decade, over so many decades: two periods of the far exit.
+const PER_DECADE: usize = 10;
+/// See [`PER_DECADE`].
+const DECADES: usize = 3;
 /// Exits are compared where they cross the surface x = 0 farther than this from the singularity.
 const BEYOND: f64 = 0.6;
 /// The crossing comes before this time.
@@ -59,7 +62,7 @@ fn after_question() -> AfterVisitQuestion {
     AfterVisitQuestion {
         start: START.into(),
         t_end: T_END,
-        eps: AFTER.into(),
+        eps: (0..=PER_DECADE * DECADES).map(|k| exp10(-2.0 - k as f64 / PER_DECADE as f64)).collect(),
         beyond: BEYOND,
         grid: GRID,
         refinements: REFINEMENTS,
@@ -103,6 +106,7 @@ fn draw(tables: &[Table]) -> Sheet {
     let visit = after.first().map_or(f64::NAN, |r| value(&r[7]));
     let nearest: Vec<String> = after
         .iter()
+        .step_by(PER_DECADE)
         .map(|r| format!("{} for *ε* = {}", number((value(&r[3]) * 1e3).round() / 1e3), number(value(&r[0]))))
         .collect();
     Sheet::new(ColumnWidth::Double, 3, "")
@@ -118,13 +122,14 @@ fn draw(tables: &[Table]) -> Sheet {
         ))
         .footer(format!(
             "(b) Where the Filippov orbits that leave the singularity after a time of repelling sliding of {} … {} first cross upwards \
-             farther than {} from it, and where smoothed orbits do (labels: *ε*), followed in double-double arithmetic.",
+             farther than {} from it, and where smoothed orbits do, followed in double-double arithmetic through the visit: {PER_DECADE} values of *ε* a decade (labels: whole \
+             decades). They wander along the funnel and jump back, periodically in ln *ε*: figure law.",
             number(GRID.shortest),
             number(GRID.longest),
             number(BEYOND)
         ))
         .footer(format!(
-            "(c) Distance in (b) to the nearest Filippov orbit, measured power of *ε* {:.2}. Its time of repelling sliding: {}.",
+            "(c) Distance in (b) to the nearest Filippov orbit: measured power of *ε*, least squares, {:.2}. That orbit’s time of repelling sliding: {}.",
             observed_rate(distances),
             nearest.join(", ")
         ))
@@ -174,9 +179,9 @@ fn crossings(members: &[Vec<Entry>], after: &[Vec<Entry>]) -> PlanePanel {
         let marker = MarkerStyle { shape: MarkerShape::Dot, colour, size: 2.6 };
         panel = panel.markers(of(name), marker).legend(LegendKey::Marker(marker), words);
     }
-    let ring = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::INK, size: 5.0 };
+    let ring = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::INK, size: 4.0 };
     panel = panel.markers(exits.clone(), ring).legend(LegendKey::Marker(ring), "smoothed");
-    for (row, &[y, z]) in after.iter().zip(&exits) {
+    for (row, &[y, z]) in after.iter().zip(&exits).step_by(PER_DECADE) {
         // To the right above the lowest branch, below on it, but not across the frame.
         let mut places = members.iter().map(|r| [value(&r[2]), value(&r[3])]);
         let lowest = !places.any(|m| (m[0] - y).abs() < 0.08 * wide && m[1] < z - 0.06 * high);

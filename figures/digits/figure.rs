@@ -6,19 +6,19 @@
 use std::sync::Arc;
 
 use twofold::analyse::digits::{Contender, DigitsQuestion};
-use twofold::analyse::growth::GrowthQuestion;
+use twofold::analyse::passage::{PassageQuestion, Predicted};
 use twofold::analyse::reference::Plane;
 use twofold::integrate::StepCap;
 use twofold::job::spec::Method;
 use twofold::job::table::{Entry, Table};
-use twofold::job::{Answer, AnyQuestion, DisturbanceGrowth, MethodDigits};
+use twofold::job::{Answer, AnyQuestion, MethodDigits, TwoFoldPassage};
 use twofold::num::elementary::{exp10, log10};
 use twofold::num::fit::line;
 use twofold::paper::wording::number;
 use twofold::paper::{Figure, Reading, Study};
 use twofold::render::sheet::*;
 use twofold::render::style;
-use twofold::system::System;
+use twofold::system::{System, Transition};
 
 /// The start of the paper's runs.
 const START: [f64; 3] = [0.2, 0.0, -1.0];
@@ -34,22 +34,19 @@ const NEAR: f64 = 0.05;
 const MAX_STEP: f64 = 2.0;
 /// Most steps of a compared method.
 const MAX_STEPS: u64 = 10_000_000;
-/// When disturbances are made, relative to the passage.
-const OFFSETS: [f64; 3] = [-0.1, 0.0, 0.1];
+/// When disturbances are made, relative to the passage, in units of sqrt(eps).
+const OFFSETS: [f64; 3] = [-3.0, 0.0, 3.0];
+/// The exit is the first passage through y = 0 beyond so many sqrt(eps).
+const BEYOND: f64 = 3.0;
 /// Size of disturbances made at t = 0; they are contracted before they grow, so that it need not be tiny.
-const AT_START: f64 = 1e-8;
+const AT_START: f64 = 1e-3;
 /// The exit of the first visit must come before this time.
-const EXIT_BY: f64 = 60.0;
+const EXIT_BY: f64 = 80.0;
 /// Growth of a disturbance made across the layer at the singularity, reconstructed reading, measured by another program: (eps, factor).
 const OUTSIDE: [(f64, f64); 3] = [(1e-2, 3.36e9), (1e-3, 7.67e12), (1e-4, 5.49e16)];
 
-/// Stiffness parameters of the right panel. The printed reading's first visit comes four times as late and is followed for fewer.
-fn ladder(reading: Reading) -> &'static [f64] {
-    match reading {
-        Reading::Printed => &[1e-2, 3e-3, 1e-3],
-        Reading::Reconstructed => &[1e-2, 3e-3, 1e-3, 3e-4, 1e-4],
-    }
-}
+/// Stiffness parameters of the right panel.
+const LADDER: [f64; 7] = [1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5];
 
 /// The methods of the left panel, with their tolerances and looks.
 fn methods() -> [(Method, f64, Colour, MarkerShape); 6] {
@@ -82,25 +79,26 @@ fn digits_question() -> DigitsQuestion {
     }
 }
 
-fn growth_question() -> GrowthQuestion {
-    GrowthQuestion {
+fn growth_question() -> PassageQuestion {
+    PassageQuestion {
         start: START,
-        section: SECTION,
-        near: NEAR,
+        beyond: BEYOND,
         offsets: OFFSETS.into(),
-        at_start: AT_START,
-        exit_by: EXIT_BY,
+        carried: AT_START,
+        far: 0.0,
+        by: EXIT_BY,
     }
 }
 
 /// What the figure asks: the digits first, then the growth for each eps.
 fn questions(reading: Reading) -> Vec<AnyQuestion> {
     let system = System::from(reading.caricature());
-    let mut all: Vec<AnyQuestion> = vec![Arc::new(MethodDigits { system: system.clone(), eps: EPS, compared: digits_question() })];
-    for &eps in ladder(reading) {
-        all.push(Arc::new(DisturbanceGrowth { system: system.clone(), eps, disturbances: growth_question() }));
-    }
-    all
+    let digits = MethodDigits { system: system.clone(), eps: EPS, compared: digits_question() };
+    let growth = LADDER.map(|eps| -> AnyQuestion {
+        let (system, transition) = (system.clone(), Transition::Tanh);
+        Arc::new(TwoFoldPassage { system, transition, eps, followed: growth_question() })
+    });
+    std::iter::once(Arc::new(digits) as AnyQuestion).chain(growth).collect()
 }
 
 fn value(entry: &Entry) -> f64 {
@@ -118,28 +116,29 @@ struct Series {
 
 /// The series of the right panel.
 fn series(growth: &[Vec<Entry>]) -> [Series; 3] {
-    let pick = |made: &str, components: &[usize]| {
-        let rows = growth.iter().filter(|r| r[1] == Entry::from(made));
-        rows.map(|r| [value(&r[0]), components.iter().map(|c| value(&r[5 + c])).fold(0.0, f64::max)]).collect()
+    // A row: eps, moment (minus infinity is the start), growth by component.
+    let pick = |at_start: bool, components: &[usize]| {
+        let rows = growth.iter().filter(|r| value(&r[1]).is_infinite() == at_start);
+        rows.map(|r| [value(&r[0]), components.iter().map(|c| value(&r[2 + c])).fold(0.0, f64::max)]).collect()
     };
     [
         Series {
-            words: "near it, across the layer (*x*)",
+            words: "at it, across the layer (*x*)",
             colour: style::VERMILLION,
             shape: MarkerShape::Dot,
-            points: pick("near", &[0]),
+            points: pick(false, &[0]),
         },
         Series {
-            words: "near it, along the layer (*y*, *z*)",
+            words: "at it, along the layer (*y*, *z*)",
             colour: style::BLUE,
             shape: MarkerShape::Square,
-            points: pick("near", &[1, 2]),
+            points: pick(false, &[1, 2]),
         },
         Series {
             words: "at the start, *t* = 0",
             colour: style::GREEN,
             shape: MarkerShape::Triangle,
-            points: pick("start", &[0, 1, 2]),
+            points: pick(true, &[0, 1, 2]),
         },
     ]
 }
@@ -166,8 +165,8 @@ impl Series {
 
 fn draw(reading: Reading, answers: &[Arc<Answer>]) -> Sheet {
     let tables = Study::tables(answers);
-    let [rows, visits, growth @ ..] = &tables[..] else { unreachable!("the first question has two tables") };
-    let growth: Vec<Vec<Entry>> = growth.iter().flat_map(Table::rows).collect();
+    let [rows, visits, passages @ ..] = &tables[..] else { unreachable!("the first question has two tables") };
+    let growth: Vec<Vec<Entry>> = passages.iter().filter(|t| t.name == "growth").flat_map(Table::rows).collect();
     let mut digits =
         PlanePanel::new(Axis::linear("*t*", 0.0, T_END), Axis::linear("digits that are right", -2.0, 17.0));
     for visit in visits.rows() {
@@ -192,14 +191,14 @@ fn draw(reading: Reading, answers: &[Arc<Answer>]) -> Sheet {
     let series = series(&growth);
     let outside: Vec<[f64; 2]> = outside(reading).iter().map(|&(eps, growth)| [eps, growth]).collect();
     let mut amplified =
-        PlanePanel::new(Axis::log("*ε*", 6e-5, 1.6e-2), Axis::log("growth of a disturbance", 1e-4, 1e27));
+        PlanePanel::new(Axis::log("*ε*", 6e-6, 1.6e-2), Axis::log("growth of a disturbance", 1e-4, 1e30));
     for (level, words, at, anchor) in [
-        (1.0, "neither grows nor shrinks", 6.6e-5, Anchor::Left),
-        (1e8, "10^{−8} becomes 1", 6.6e-5, Anchor::Left),
+        (1.0, "neither grows nor shrinks", 6.6e-6, Anchor::Left),
+        (1e8, "10^{−8} becomes 1", 6.6e-6, Anchor::Left),
         (1e16, "10^{−16} becomes 1", 1.45e-2, Anchor::Right),
     ] {
         amplified = amplified
-            .line(vec![[6e-5, level], [1.6e-2, level]], LineStyle::new(style::SOFT_INK, style::FRAME_PT).dotted())
+            .line(vec![[6e-6, level], [1.6e-2, level]], LineStyle::new(style::SOFT_INK, style::FRAME_PT).dotted())
             .note([at, level * 5.0], words, anchor);
     }
     for s in &series {
@@ -246,14 +245,17 @@ fn footer(rows: &Table, visits: &Table, series: &[Series; 3]) -> Vec<String> {
         ));
     }
     let slopes: Vec<String> =
-        series.iter().map(|s| format!("{:.1} ({})", s.digits_per_decade(), s.words).replace('-', "−")).collect();
+        series.iter().map(|s| format!("{:.2} ({})", s.digits_per_decade(), s.words).replace('-', "−")).collect();
+    let law = Predicted::of(-1.2, -1.4);
     lines.push(format!(
-        "(b) Distance at the exit over the size of the disturbance; the exit is the first passage beyond {}. Made near it: {} before, at \
-         and {} after the passage; the line joins the largest. Digits by which the growth rises for each decade that *ε* falls, least squares: {}.",
-        number(NEAR),
-        number(-OFFSETS[0]),
+        "(b) Distance at the exit over the size of the disturbance; the exit is the first passage beyond {}√*ε*. Made at it: {}√*ε* before, at \
+         and as much after the passage; the line joins the largest. Digits by which the growth rises for each decade that *ε* falls, least squares: {}; \
+         in the limit {:.2}, {:.2} and −0.5, from *v*_{{+}} and *v*_{{−}} alone (figure law).",
+        number(BEYOND),
         number(OFFSETS[2]),
         slopes.join(", "),
+        -law.across(),
+        -law.along(),
     ));
     lines
 }

@@ -28,7 +28,7 @@ class DefinitionError(TwofoldError, ValueError):
     """A system's definition is wrong. Its text shows the place::
 
         unknown name `alhpa`
-          --> <expressions>:3:13
+          --> <expressions>:3:14
           |
         3 | plus = ["1 + alhpa*x", "y"]
           |              ^^^^^

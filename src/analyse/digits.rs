@@ -2,7 +2,7 @@
 //! double-double arithmetic ([`reference()`]).
 //!
 //! A smoothed two-fold is an ordinary differential equation and has one solution, but near the singularity that
-//! amplifies whatever disturbs it; [`growth`](super::growth) measures by how much. This is what that does to a method.
+//! amplifies whatever disturbs it; [`passage`](super::passage) measures by how much. This is what that does to a method.
 
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};

@@ -12,7 +12,7 @@ use super::tangent::Tangent;
 use crate::integrate::roots::{self, Passages};
 use crate::integrate::{Dopri5, Failure, Stepper, Tolerance};
 use crate::num::elementary::{ln, sqrt};
-use crate::num::linear::solve;
+use crate::num::linear::{eigenvalues, solve};
 use crate::system::VectorField;
 
 /// The plane `x[axis] = value`, crossed in one direction.
@@ -144,7 +144,7 @@ where
     u[plane.axis] = plane.value;
     let mut residual = f64::INFINITY;
     for iteration in 0..settings.iterations {
-        let r = returned::<N, M, F>(field, plane, returns, u, settings)?;
+        let r = returned::<N, M, _>(&Tangent::<F, N>(field), plane, returns, u, settings)?;
         let difference = r.point - u;
         residual = difference.norm();
         if residual <= settings.closed {
@@ -174,18 +174,51 @@ where
     Err(Error::NotConverged { residual, iterations: settings.iterations })
 }
 
-fn returned<const N: usize, const M: usize, F>(
-    field: &F,
+/// Where an orbit from a plane comes back to it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Returned {
+    /// The state there, in the order of the states.
+    pub point: Vec<f64>,
+    /// The time it took.
+    pub time: f64,
+    /// The derivative of the return map, row by row; the row and the column of the plane's coordinate are zero. Empty where none was
+    /// asked for.
+    pub derivative: Vec<f64>,
+    /// Passages in the plane's direction, the last of them `point` as the dense output has it.
+    pub same: Vec<Vec<f64>>,
+    /// Passages in the other direction.
+    pub opposite: Vec<Vec<f64>>,
+}
+
+/// The return from `u`, a point of `plane`, after `returns` passages in its direction, with the derivative of the return map: `tangent` is an
+/// equation with its variational equation for `N` vectors, in `M` = `N` (`N` + 1) dimensions.
+///
+/// # Errors
+/// If the orbit cannot be followed, or does not return.
+pub fn return_map<const N: usize, const M: usize, T: VectorField<M>>(
+    tangent: &T,
+    plane: Plane,
+    returns: usize,
+    u: &SVector<f64, N>,
+    settings: &Settings,
+) -> Result<Returned, Error> {
+    const { assert!(M == N * (N + 1)) };
+    if returns == 0 {
+        return Err(Error::NoReturns);
+    }
+    let Return { point, time, derivative, same, opposite } =
+        returned::<N, M, T>(tangent, plane, returns, *u, settings)?;
+    let derivative = (0..N * N).map(|k| derivative[(k / N, k % N)]).collect();
+    Ok(Returned { point: Failure::state(&point), time, derivative, same, opposite })
+}
+
+fn returned<const N: usize, const M: usize, T: VectorField<M>>(
+    tangent: &T,
     plane: Plane,
     returns: usize,
     u: SVector<f64, N>,
     settings: &Settings,
-) -> Result<Return<N>, Error>
-where
-    F: VectorField<N>,
-    for<'a> Tangent<'a, F, N>: VectorField<M>,
-{
-    let tangent = Tangent::<F, N>(field);
+) -> Result<Return<N>, Error> {
     let mut stepper = Dopri5::<M>::new(settings.tolerance);
     // x, then the columns of the identity.
     let mut state =
@@ -193,9 +226,9 @@ where
     let mut t = 0.0;
     let (mut same, mut opposite) = (Vec::new(), Vec::new());
     let mut passages = Passages::default();
-    stepper.restart(&tangent, t, state, settings.longest_return, settings.max_step)?;
+    stepper.restart(tangent, t, state, settings.longest_return, settings.max_step)?;
     while t < settings.longest_return {
-        let step = stepper.step(&tangent)?;
+        let step = stepper.step(tangent)?;
         let (t0, state0) = (step.t0, step.x0);
         let found = passages.through_plane(&step, plane.axis, plane.value);
         let found: Vec<_> = found.iter().map(|p| (step.time(p.theta), step.at(p.theta), p.upward)).collect();
@@ -214,10 +247,10 @@ where
             let mut landing = state0;
             if tc > t0 {
                 let mut to = Dopri5::<M>::new(settings.tolerance);
-                to.restart(&tangent, t0, state0, tc, settings.max_step)?;
+                to.restart(tangent, t0, state0, tc, settings.max_step)?;
                 let mut now = t0;
                 while now < tc {
-                    let s = to.step(&tangent)?;
+                    let s = to.step(tangent)?;
                     (now, landing) = (s.t1, s.x1);
                 }
             }
@@ -242,13 +275,20 @@ where
     Err(Error::NoReturn { from: Failure::state(&u), within: settings.longest_return })
 }
 
-/// Eigenvalues of the matrix without row and column `axis`, by falling modulus, from its characteristic polynomial (dimension at most
-/// three). The large ones, which decide stability, are accurate; a strongly contracted one is lost below rounding of the
-/// largest.
+/// Eigenvalues of the derivative of a return map without row and column `axis`, by falling modulus: Floquet multipliers. In a section of at
+/// most three dimensions they are zeros of the characteristic polynomial: the large ones, which decide stability, are accurate; a strongly
+/// contracted one is lost below rounding of the largest. In more dimensions by [`eigenvalues`].
 fn multipliers<const N: usize>(m: &SMatrix<f64, N, N>, axis: usize) -> Vec<[f64; 2]> {
-    let kept: Vec<usize> = (0..N).filter(|i| *i != axis).collect();
-    let a = |i: usize, j: usize| m[(kept[i], kept[j])];
+    let rows: Vec<f64> = (0..N * N).map(|k| m[(k / N, k % N)]).collect();
+    multipliers_of(&rows, N, axis)
+}
+
+/// The multipliers of a [`Returned::derivative`] of `n` states.
+pub fn multipliers_of(derivative: &[f64], n: usize, axis: usize) -> Vec<[f64; 2]> {
+    let kept: Vec<usize> = (0..n).filter(|i| *i != axis).collect();
+    let a = |i: usize, j: usize| derivative[kept[i] * n + kept[j]];
     let mut found = match kept.len() {
+        0 => Vec::new(),
         1 => vec![[a(0, 0), 0.0]],
         2 => quadratic(a(0, 0) + a(1, 1), a(0, 0) * a(1, 1) - a(0, 1) * a(1, 0)).to_vec(),
         3 => {
@@ -265,7 +305,11 @@ fn multipliers<const N: usize>(m: &SMatrix<f64, N, N>, axis: usize) -> Vec<[f64;
             all.push([real, 0.0]);
             all
         }
-        n => unreachable!("no model has {n} dimensions in its section"),
+        size => {
+            let rows: Vec<f64> = (0..size * size).map(|k| a(k / size, k % size)).collect();
+            // A matrix that is not finite has none; it is told apart by its own error before.
+            eigenvalues(&rows, size).unwrap_or_default()
+        }
     };
     found.sort_by(|x, y| (y[0] * y[0] + y[1] * y[1]).total_cmp(&(x[0] * x[0] + x[1] * x[1])));
     found

@@ -9,7 +9,6 @@
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
-use super::reference::{ExtendedCrossing, SwitchingSurface, first_crossing};
 use crate::integrate::dopri5::Dopri5;
 use crate::integrate::filippov::{
     EventKind, ExitRule, FilippovError, FilippovObserver, Funnel, FunnelGrid, FunnelMember, Mode, Settings, Side,
@@ -18,8 +17,6 @@ use crate::integrate::filippov::{
 use crate::integrate::{Failure, Flow, Statistics, Step, Stepper};
 use crate::num::elementary::{ln, pow};
 use crate::num::fit::line;
-use crate::num::{Arithmetic, DoubleDouble, Scalar};
-use crate::system::filippov::{Region, region};
 use crate::system::{PiecewiseSmooth, Smoothed, Transition, VectorField};
 
 fn smooth<P: Clone>(system: &P, eps: f64) -> Smoothed<P> {
@@ -154,8 +151,8 @@ pub struct AfterVisitQuestion {
     pub t_end: f64,
     /// The smoothing parameters (tanh).
     pub eps: Vec<f64>,
-    /// Orbits are compared where they first cross h = 0 upwards, in the crossing region, farther than this from the
-    /// singularity; within the grid's horizon after the visit.
+    /// Orbits are compared where they first cross h = 0 upwards, farther than this from the singularity; within the grid's horizon
+    /// after the visit.
     pub beyond: f64,
     /// The members that are computed first.
     pub grid: FunnelGrid,
@@ -281,49 +278,26 @@ impl<P, const N: usize> Futures<'_, P, N> {
     }
 }
 
-/// The smoothed orbit's crossing, and its work. A visit multiplies local errors by up to 10^20
-/// ([`growth`](super::growth)): only extended precision says where the exit is.
-fn smoothed_crossing<P, const N: usize>(
-    system: &P,
-    x0: SVector<f64, N>,
-    eps: f64,
-    (t_visit, point): (f64, SVector<f64, N>),
-    beyond: f64,
-    until: f64,
-) -> Result<(Option<SVector<f64, N>>, Statistics), Failure>
-where
-    P: PiecewiseSmooth<N> + Clone,
-{
-    let start = (DoubleDouble::zero(), x0.map(DoubleDouble::from_f64));
-    let nearest = |c: &ExtendedCrossing<N>| c.x.map(|v| v.to_f64());
-    let wanted = |c: &ExtendedCrossing<N>| {
-        let x = nearest(c);
-        c.t.to_f64() > t_visit && (x - point).norm() > beyond && region(system, &x) == Region::CrossingUp
-    };
-    let mut work = Statistics::default();
-    let found = first_crossing(&smooth(system, eps), start, SwitchingSurface(system), wanted, until, &mut work)?;
-    Ok((found.as_ref().map(nearest), work))
-}
-
-/// Follows the smoothed orbit of each eps through its first visit to the next crossing, and looks for the member of the
-/// funnel that crosses nearest.
+/// Looks for the member of the funnel that crosses nearest to where the smoothed orbit of each eps does. Where that is, `crossing` says: a visit multiplies
+/// local errors by up to 10^28, only extended precision knows ([`passage`](super::passage)).
 ///
 /// # Errors
 /// Those of [`funnel`] and of the methods.
 pub fn after_visit<P, const N: usize, const M: usize>(
     system: &P,
     question: &AfterVisitQuestion,
+    mut crossing: impl FnMut(f64) -> Result<Option<Vec<f64>>, FilippovError>,
 ) -> Result<AfterVisit, FilippovError>
 where
     P: PiecewiseSmooth<N> + Clone + Sync,
     for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
 {
-    let AfterVisitQuestion { start, t_end, eps, beyond, grid, settings, .. } = question;
+    let AfterVisitQuestion { start, t_end, eps, grid, settings, .. } = question;
     let x0 = state::<N>(start)?;
     let family = funnel(system, x0, *t_end, settings, grid)?;
     let mut statistics = family.statistics.clone();
     family.members.iter().for_each(|m| statistics += &m.summary.statistics);
-    let (visit, until) = ((family.t, family.point), family.t + grid.horizon);
+    let visit = (family.t, family.point);
     let mut futures = Futures { system, question, family, statistics };
     let first = futures.crossings(&futures.family.members);
     let mut width = 0.0_f64;
@@ -334,9 +308,8 @@ where
     }
     let mut rows = Vec::with_capacity(eps.len());
     for &eps in eps {
-        let (crossing, work) = smoothed_crossing(system, x0, eps, visit, *beyond, until)?;
-        futures.statistics += &work;
-        let Some(crossing) = crossing else { continue };
+        let Some(crossing) = crossing(eps)? else { continue };
+        let crossing = state::<N>(&crossing)?;
         let Some((member, distance)) = futures.nearest(&first, &crossing)? else { continue };
         rows.push(AfterVisitRow { eps, crossing: Failure::state(&crossing), nearest: member.record(), distance });
     }

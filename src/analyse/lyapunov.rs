@@ -16,7 +16,7 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use super::tangent::Tangent;
-use crate::integrate::{Dopri5, Failure, Kick, Kicker, Stepper, Tolerance};
+use crate::integrate::{Dopri5, Failure, Kick, Kicker, Stepper, Tolerance, Watch};
 use crate::num::elementary::{ln, sqrt};
 use crate::num::fit::mean;
 use crate::system::VectorField;
@@ -99,6 +99,21 @@ pub fn largest_along<const N: usize, const M: usize, T: VectorField<M>>(
     kicked_states: usize,
     settings: &Settings,
 ) -> Result<Exponent, Failure> {
+    largest_watched(tangent, x0, kicked_states, settings, &())
+}
+
+/// [`largest_along`], reporting to `watch` how far it has come. Where `watch` refuses, the mean is over the blocks that are finished: its
+/// duration says how long that was. There is no number if they are fewer than eight of the 64.
+///
+/// # Errors
+/// If the orbit cannot be followed.
+pub fn largest_watched<const N: usize, const M: usize, T: VectorField<M>>(
+    tangent: &T,
+    x0: SVector<f64, N>,
+    kicked_states: usize,
+    settings: &Settings,
+    watch: &dyn Watch,
+) -> Result<Exponent, Failure> {
     const { assert!(M == 2 * N) };
     let mut stepper = Dopri5::<M>::new(settings.tolerance);
     let mut kicker = settings.kick.map(|kick| Kicker::new(kick, kicked_states));
@@ -130,6 +145,9 @@ pub fn largest_along<const N: usize, const M: usize, T: VectorField<M>>(
                         stepper.restart(tangent, t, state, stop, settings.max_step)?;
                     }
                 }
+                if stepper.statistics().steps.is_multiple_of(4096) && !watch.reached(t) {
+                    return Ok(mean_of(&rates, settings));
+                }
                 if stepper.statistics().steps >= settings.max_steps {
                     let x: Vec<f64> = state.iter().take(N).copied().collect();
                     return Err(Failure::TooManySteps { t, limit: settings.max_steps, state: x });
@@ -148,8 +166,16 @@ pub fn largest_along<const N: usize, const M: usize, T: VectorField<M>>(
             rates.push(growth / (t - start));
         }
     }
-    let (value, _) = mean(&rates);
-    Ok(Exponent { value, standard_error: blocked_error(&rates), duration: settings.duration })
+    Ok(mean_of(&rates, settings))
+}
+
+/// The mean of the finished blocks.
+fn mean_of(rates: &[f64], settings: &Settings) -> Exponent {
+    // Of fewer there is no error, and of a mean without error no use.
+    let value = if rates.len() < FEWEST_BLOCKS { f64::NAN } else { mean(rates).0 };
+    let duration =
+        if rates.len() == BLOCKS { settings.duration } else { settings.duration * rates.len() as f64 / BLOCKS as f64 };
+    Exponent { value, standard_error: blocked_error(rates), duration }
 }
 
 /// Length of the tangent vector.

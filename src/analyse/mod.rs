@@ -28,14 +28,16 @@
 //! ```
 
 pub mod attractor;
+pub mod branch;
 pub mod counts;
 pub mod digits;
 pub mod divider;
+pub mod filippov_return;
 pub mod floquet;
-pub mod growth;
 pub mod limit;
 pub mod lyapunov;
 pub mod motion;
+pub mod passage;
 pub mod path;
 pub mod reference;
 pub mod section;
@@ -43,6 +45,6 @@ pub mod tangent;
 
 pub mod work_precision;
 
-pub use motion::{Motion, MotionRecorder};
-pub use path::{PathRecorder, Sample};
+pub use motion::{Motion, MotionRecorder, TimedMotion};
+pub use path::{PathRecorder, Sample, TimesRecorder};
 pub use section::{Crossing, Direction, SectionRecorder};

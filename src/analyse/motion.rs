@@ -3,7 +3,7 @@
 use crate::integrate::filippov::{FilippovObserver, Mode, ModeEvent};
 use crate::integrate::{Flow, Observer, Step};
 
-use super::path::MOST_POINTS;
+use super::path::{MOST_POINTS, TimesRecorder};
 use super::{PathRecorder, Sample};
 
 /// A recorded Filippov motion of a system with `D` states.
@@ -55,10 +55,86 @@ impl<const D: usize> MotionRecorder<D> {
         Self { chord, pieces: Vec::new(), events: Vec::new(), new_piece: true, points: 0 }
     }
 
+    /// Number of points that are kept now.
+    pub fn kept(&self) -> usize {
+        self.pieces.iter().map(|(_, path)| path.len()).sum()
+    }
+
+    /// What was recorded so far, which is forgotten but for the mode of the piece that is not finished: it goes on as the first one.
+    pub fn take(&mut self) -> Motion<D> {
+        let unfinished = self.pieces.pop().map(|(mode, mut path)| ((mode, path.take()), (mode, path)));
+        let mut pieces: Vec<(Mode, Vec<Sample<D>>)> =
+            std::mem::take(&mut self.pieces).into_iter().map(|(mode, path)| (mode, path.into_samples())).collect();
+        if let Some((done, rest)) = unfinished {
+            pieces.push(done);
+            self.pieces.push(rest);
+        }
+        self.points = 0;
+        Motion { pieces, events: std::mem::take(&mut self.events) }
+    }
+
     /// What was recorded.
     pub fn into_motion(self) -> Motion<D> {
         let pieces = self.pieces.into_iter().map(|(mode, path)| (mode, path.into_samples())).collect();
         Motion { pieces, events: self.events }
+    }
+}
+
+/// Records a Filippov motion at the multiples of an interval, with its events.
+#[derive(Clone, Debug)]
+pub struct TimedMotion<const D: usize = 3> {
+    times: TimesRecorder<D>,
+    /// Mode of each sample, in runs: (mode, how many).
+    modes: Vec<(Mode, usize)>,
+    start: bool,
+    new_piece: bool,
+    events: Vec<ModeEvent<D>>,
+}
+
+impl<const D: usize> TimedMotion<D> {
+    /// A recorder that begins with `x0` at time 0.
+    pub fn new(x0: &nalgebra::SVector<f64, D>, every: f64) -> Self {
+        let times = TimesRecorder::new(x0, every);
+        Self { times, modes: Vec::new(), start: true, new_piece: true, events: Vec::new() }
+    }
+
+    /// Number of points that are kept now.
+    pub fn kept(&self) -> usize {
+        self.modes.iter().map(|(_, count)| count).sum()
+    }
+
+    /// What was recorded so far, which is forgotten but for the mode of the piece that is not finished.
+    pub fn take(&mut self) -> Motion<D> {
+        let last = self.modes.last().map(|(mode, _)| (*mode, 0));
+        let modes = std::mem::replace(&mut self.modes, last.into_iter().collect());
+        let mut samples = self.times.take().into_iter();
+        let pieces = modes.into_iter().map(|(mode, count)| (mode, samples.by_ref().take(count).collect())).collect();
+        Motion { pieces, events: std::mem::take(&mut self.events) }
+    }
+
+    /// What was recorded. Pieces between two samples leave nothing.
+    pub fn into_motion(mut self) -> Motion<D> {
+        self.take()
+    }
+}
+
+impl<const D: usize> FilippovObserver<D> for TimedMotion<D> {
+    fn step(&mut self, mode: Mode, step: &Step<'_, D>) -> Flow {
+        let more = self.times.record(step) + usize::from(std::mem::take(&mut self.start));
+        if more > 0 {
+            match self.modes.last_mut() {
+                Some((last, count)) if *last == mode && !self.new_piece => *count += more,
+                _ => self.modes.push((mode, more)),
+            }
+            self.new_piece = false;
+        }
+        if self.kept() < MOST_POINTS { Flow::Continue } else { Flow::Stop }
+    }
+
+    fn event(&mut self, event: &ModeEvent<D>) -> Flow {
+        self.events.push(*event);
+        self.new_piece = true;
+        Flow::Continue
     }
 }
 

@@ -47,14 +47,20 @@ impl<const D: usize> PathRecorder<D> {
         self
     }
 
-    /// Number of points so far.
-    pub(super) fn len(&self) -> usize {
+    /// Number of points that are kept now.
+    #[allow(clippy::len_without_is_empty)] // a recorder begins with a point
+    pub fn len(&self) -> usize {
         self.samples.len()
     }
 
     /// The path.
     pub fn into_samples(self) -> Vec<Sample<D>> {
         self.samples
+    }
+
+    /// The path so far, which is forgotten: what comes next is recorded as if it were still there.
+    pub fn take(&mut self) -> Vec<Sample<D>> {
+        std::mem::take(&mut self.samples)
     }
 
     /// Adds interior points of `step` between the fractions `a` and `b` where the chord misses the curve.
@@ -98,6 +104,69 @@ impl<const N: usize, const D: usize> Observer<N> for PathRecorder<D> {
     }
 }
 
+/// Records the state at the multiples of an interval, on the dense output. Times are multiples, not running sums. After a kick at such a
+/// moment the state is the one before it.
+#[derive(Clone, Debug)]
+pub struct TimesRecorder<const D: usize = 3> {
+    every: f64,
+    next: u64,
+    samples: Vec<Sample<D>>,
+}
+
+impl<const D: usize> TimesRecorder<D> {
+    /// A recorder that begins with `x0` at time 0.
+    pub fn new<const N: usize>(x0: &SVector<f64, N>, every: f64) -> Self {
+        Self { every, next: 1, samples: vec![Sample { t: 0.0, x: leading(x0) }] }
+    }
+
+    /// The first of the interval's multiples that is not recorded yet, where it lies in this step.
+    fn due<const N: usize>(&mut self, step: &Step<'_, N>) -> Option<Sample<D>> {
+        let t = self.next as f64 * self.every;
+        if t > step.t1 {
+            return None;
+        }
+        self.next += 1;
+        let length = step.length();
+        let theta = if length > 0.0 { ((t - step.t0) / length).clamp(0.0, 1.0) } else { 1.0 };
+        Some(Sample { t, x: leading(&step.at(theta)) })
+    }
+
+    /// The samples.
+    pub fn into_samples(self) -> Vec<Sample<D>> {
+        self.samples
+    }
+
+    /// The samples so far, which are forgotten.
+    pub fn take(&mut self) -> Vec<Sample<D>> {
+        std::mem::take(&mut self.samples)
+    }
+
+    /// Number of samples that are kept now.
+    #[allow(clippy::len_without_is_empty)]
+    pub fn len(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// Takes in a step, and says how many samples came of it.
+    pub(super) fn record<const N: usize>(&mut self, step: &Step<'_, N>) -> usize {
+        let before = self.samples.len();
+        while let Some(sample) = self.due(step) {
+            self.samples.push(sample);
+            if self.samples.len() >= MOST_POINTS {
+                break;
+            }
+        }
+        self.samples.len() - before
+    }
+}
+
+impl<const N: usize, const D: usize> Observer<N> for TimesRecorder<D> {
+    fn step(&mut self, step: &Step<'_, N>) -> Flow {
+        self.record(step);
+        if self.samples.len() < MOST_POINTS { Flow::Continue } else { Flow::Stop }
+    }
+}
+
 /// The first `D` components; missing ones are zero.
 pub(crate) fn leading<const N: usize, const D: usize>(x: &SVector<f64, N>) -> [f64; D] {
     std::array::from_fn(|i| if i < N { x[i] } else { 0.0 })
@@ -133,6 +202,27 @@ mod tests {
             assert!(1.0 - (m[0] * m[0] + m[1] * m[1]).sqrt() < 2e-3, "{w:?}");
         }
         assert!(samples.len() < 200);
+    }
+
+    #[test]
+    fn samples_lie_at_multiples() {
+        let step = |t0: f64, t1: f64| Step {
+            t0,
+            t1,
+            x0: HalfCircle.at(0.0),
+            x1: HalfCircle.at(1.0),
+            interpolant: &HalfCircle,
+        };
+        let mut r = TimesRecorder::<3>::new(&HalfCircle.at(0.0), 0.1);
+        for (a, b) in [(0.0, 0.25), (0.25, 0.27), (0.27, 1.0)] {
+            assert_eq!(r.step(&step(a, b)), Flow::Continue);
+        }
+        let samples = r.into_samples();
+        let times: Vec<f64> = samples.iter().map(|s| s.t).collect();
+        assert_eq!(times, (0..=10).map(|k| f64::from(k) * 0.1).collect::<Vec<_>>());
+        // 0.2 is four fifths into the first step.
+        assert_eq!(samples[2].x, <[f64; 3]>::from(HalfCircle.at(0.2 / 0.25)));
+        assert_eq!(samples[10].x, <[f64; 3]>::from(HalfCircle.at(1.0)));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use super::section::Direction;
 use crate::integrate::{Failure, Statistics, Stepper, StopReason, Taylor, Tolerance, roots::Passages};
 use crate::num::Arithmetic;
 use crate::num::{DoubleDouble, Elementary, Scalar};
-use crate::system::{PiecewiseSmooth, VectorField};
+use crate::system::VectorField;
 
 /// A point in double-double precision.
 pub type ExtendedPoint<const N: usize = 3> = SVector<DoubleDouble, N>;
@@ -34,16 +34,6 @@ pub trait Surface<const N: usize> {
 impl<const N: usize> Surface<N> for Plane {
     fn height<S: Elementary>(&self, x: &SVector<S, N>) -> S {
         x[self.coordinate] - S::from_f64(self.value)
-    }
-}
-
-/// The switching surface h = 0 of a system.
-#[derive(Clone, Copy, Debug)]
-pub struct SwitchingSurface<'a, P>(pub &'a P);
-
-impl<P: PiecewiseSmooth<N>, const N: usize> Surface<N> for SwitchingSurface<'_, P> {
-    fn height<S: Elementary>(&self, x: &SVector<S, N>) -> S {
-        self.0.switching(x)
     }
 }
 
@@ -158,7 +148,7 @@ fn next_crossings<F: VectorField<N>, const N: usize>(
 }
 
 /// The crossing near the fraction `theta` of the last step, by the secant method: from 16 digits to all.
-fn refine<const N: usize>(
+pub(super) fn refine<const N: usize>(
     stepper: &Taylor<N, DoubleDouble>,
     surface: &impl Surface<N>,
     theta: f64,

@@ -66,6 +66,11 @@ impl<const D: usize> SectionRecorder<D> {
         &self.crossings
     }
 
+    /// The passages so far, which are forgotten.
+    pub fn take(&mut self) -> Vec<Crossing<D>> {
+        std::mem::take(&mut self.crossings)
+    }
+
     /// The passages, in time order.
     pub fn into_crossings(self) -> Vec<Crossing<D>> {
         self.crossings

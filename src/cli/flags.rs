@@ -25,8 +25,8 @@ use crate::system::{self, Definition, ParameterError, System, library};
 /// The flags that describe a run. What is not given has the default that its help names.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct RunFlags {
-    /// Piecewise-smooth system: a built-in one (caricature, caricature-as-printed, two-fold, wheel, relay-linear, relay-parabolic,
-    /// stick-slip) or a file that defines one (.toml, .json) [default: caricature].
+    /// Piecewise-smooth system: a built-in one (caricature, wheel, two-fold, chua ...; `twofold new --list` names all) or a file that
+    /// defines one (.toml, .json) [default: caricature].
     #[arg(long, value_name = "NAME|FILE", help_heading = "System")]
     pub system: Option<String>,
     /// Give a parameter of the system another value; may be repeated.
@@ -68,16 +68,16 @@ pub struct RunFlags {
     /// Initial state, one number for each of the system's [default: the one that the system suggests].
     #[arg(long, value_name = "X,Y,...", value_delimiter = ',', allow_hyphen_values = true, help_heading = "System")]
     pub start: Option<Vec<f64>>,
-    /// Final time [default: 150].
+    /// Final time [default: 150; of an exponent 10000].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub t_end: Option<f64>,
     /// Integration method [default: lsoda; dopri5 with --switch filippov].
     #[arg(long, value_enum, help_heading = "Method")]
     pub method: Option<Method>,
-    /// Relative tolerance [default: 10^-7.97727, NDSolve's].
+    /// Relative tolerance [default: 10^-7.97727, NDSolve's; 1e-32 with taylor-extended; of exponents 1e-9, of closed orbits 1e-11].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub rtol: Option<f64>,
-    /// Absolute tolerance [default: 10^-7.97727, NDSolve's].
+    /// Absolute tolerance [default: that of --rtol's default].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub atol: Option<f64>,
     /// Longest step [default: a tenth of the time between restarts or kicks, NDSolve's].
@@ -126,9 +126,12 @@ pub struct RunFlags {
     /// Record passages through a plane instead of the path, such as y=0.
     #[arg(long, value_name = "COORDINATE=VALUE", help_heading = "Recording")]
     pub section: Option<String>,
-    /// Largest distance between the path's polyline and the dense output [default: 0.001].
+    /// Largest distance between the path's polyline and the dense output [default: 0.001; of a picture 0.0001].
     #[arg(long, allow_hyphen_values = true, help_heading = "Recording")]
     pub chord: Option<f64>,
+    /// Record the state at the multiples of this time, on the dense output, instead of the path that follows it.
+    #[arg(long, value_name = "DT", allow_hyphen_values = true, help_heading = "Recording")]
+    pub every: Option<f64>,
     /// Take the whole run from a file made with --print-spec, or from standard input (-); other flags of the run are then refused.
     #[arg(long, value_name = "FILE")]
     pub spec: Option<PathBuf>,
@@ -151,8 +154,26 @@ pub enum Switch {
 pub enum Use {
     /// `twofold run`: the path, or passages if a section is given.
     Any,
+    /// `twofold plot`: the same, the path by default ten times closer to the dense output.
+    Picture,
     /// `twofold sweep`: passages in any case.
     Passages,
+    /// `twofold orbit`: a closed orbit through the plane that --section gives.
+    Orbit,
+    /// `twofold lyapunov`: an average along the orbit.
+    Exponent,
+}
+
+impl Use {
+    /// Whether the command follows an orbit as `twofold run` does.
+    fn is_a_run(self) -> bool {
+        matches!(self, Use::Any | Use::Picture | Use::Passages)
+    }
+
+    /// Whether it records the orbit's path.
+    fn records_a_path(self) -> bool {
+        matches!(self, Use::Any | Use::Picture)
+    }
 }
 
 /// A flag and the runs on which it has an effect.
@@ -199,12 +220,12 @@ const OF_THE_CARICATURE: &str = "it belongs to the caricature, and --set NAME=VA
 const OF_FUNNELS: &str =
     "it describes the futures that --switch filippov --exit all follows; leave it out, or follow them";
 const OF_RANDOM: &str = "nothing in this run is random; leave it out, or give --kick-every or a random --exit";
-const NOT_FILIPPOV: &str =
-    "restarts and kicks belong to smoothed and hysteretic runs; leave it out, or choose another --switch";
+const NOT_FILIPPOV: &str = "restarts and kicks belong to smoothed and hysteretic runs (kicks to exponents, too); leave it out, or choose another --switch";
+const OF_ORBITS: &str = "a closed orbit's steps are chosen by its tolerance alone; leave it out";
 const OF_KICKS: &str = "there are no kicks; leave it out, or give --kick-every";
 
 /// The table. Every flag of [`RunFlags`] but --spec stands in it once.
-const EFFECTS: [Effect; 34] = {
+const EFFECTS: [Effect; 35] = {
     const fn always(flag: &'static str, given: fn(&RunFlags) -> bool) -> Effect {
         Effect { flag, given, works: |_, _| true, why: "" }
     }
@@ -264,40 +285,76 @@ const EFFECTS: [Effect; 34] = {
             "it is a reading of the hysteretic switch; leave it out, or use --switch hysteretic",
         ),
         always("--start", |f| f.start.is_some()),
-        always("--t-end", |f| f.t_end.is_some()),
-        always("--method", |f| f.method.is_some()),
+        when(
+            "--t-end",
+            |f| f.t_end.is_some(),
+            |_, c| c != Use::Orbit,
+            "a closed orbit has its own period; leave it out, and see --settle",
+        ),
+        when(
+            "--method",
+            |f| f.method.is_some(),
+            |_, c| c.is_a_run(),
+            "closed orbits and exponents are computed by Dormand-Prince, together with tangent vectors; leave it out",
+        ),
         always("--rtol", |f| f.rtol.is_some()),
         always("--atol", |f| f.atol.is_some()),
-        always("--max-step", |f| f.max_step.is_some()),
-        always("--max-steps", |f| f.max_steps.is_some()),
-        when("--restart", |f| f.restart.is_some(), |f, _| !f.filippov(), NOT_FILIPPOV),
-        when("--kick-every", |f| f.kick_every.is_some(), |f, _| !f.filippov(), NOT_FILIPPOV),
-        when("--kick-size", |f| f.kick_size.is_some(), |f, _| f.kicked(), OF_KICKS),
-        when("--kick-law", |f| f.kick_law.is_some(), |f, _| f.kicked(), OF_KICKS),
+        when("--max-step", |f| f.max_step.is_some(), |_, c| c != Use::Orbit, OF_ORBITS),
+        when("--max-steps", |f| f.max_steps.is_some(), |_, c| c != Use::Orbit, OF_ORBITS),
+        when("--restart", |f| f.restart.is_some(), |f, c| !f.filippov() && c.is_a_run(), NOT_FILIPPOV),
+        when("--kick-every", |f| f.kick_every.is_some(), |f, c| !f.filippov() && c != Use::Orbit, NOT_FILIPPOV),
+        when("--kick-size", |f| f.kick_size.is_some(), |f, c| f.kicked() && c != Use::Orbit, OF_KICKS),
+        when("--kick-law", |f| f.kick_law.is_some(), |f, c| f.kicked() && c != Use::Orbit, OF_KICKS),
         when(
             "--exit",
             |f| f.exit.is_some(),
-            |f, _| f.filippov(),
-            "smoothed and hysteretic motion leaves repelling sliding by itself; leave it out, or use --switch filippov",
+            |f, c| f.filippov() && c.is_a_run(),
+            "smoothed and hysteretic motion leaves repelling sliding by itself, and a closed orbit has no repelling sliding; leave it out, or use --switch filippov",
         ),
         when(
             "--plus-probability",
             |f| f.plus_probability.is_some(),
-            |f, _| f.exit_begins("random"),
+            |f, c| f.exit_begins("random") && c.is_a_run(),
             "it belongs to a random --exit; leave it out, or give one such as random:exponential:0.5",
         ),
-        when("--funnel-times", |f| f.funnel_times.is_some(), |f, _| f.exit_begins("all"), OF_FUNNELS),
-        when("--funnel-shortest", |f| f.funnel_shortest.is_some(), |f, _| f.exit_begins("all"), OF_FUNNELS),
-        when("--funnel-longest", |f| f.funnel_longest.is_some(), |f, _| f.exit_begins("all"), OF_FUNNELS),
-        when("--funnel-horizon", |f| f.funnel_horizon.is_some(), |f, _| f.exit_begins("all"), OF_FUNNELS),
-        when("--seed", |f| f.seed.is_some(), |f, _| f.random(), OF_RANDOM),
-        when("--stream", |f| f.stream.is_some(), |f, _| f.random(), OF_RANDOM),
-        always("--section", |f| f.section.is_some()),
+        when("--funnel-times", |f| f.funnel_times.is_some(), |f, c| f.exit_begins("all") && c.is_a_run(), OF_FUNNELS),
+        when(
+            "--funnel-shortest",
+            |f| f.funnel_shortest.is_some(),
+            |f, c| f.exit_begins("all") && c.is_a_run(),
+            OF_FUNNELS,
+        ),
+        when(
+            "--funnel-longest",
+            |f| f.funnel_longest.is_some(),
+            |f, c| f.exit_begins("all") && c.is_a_run(),
+            OF_FUNNELS,
+        ),
+        when(
+            "--funnel-horizon",
+            |f| f.funnel_horizon.is_some(),
+            |f, c| f.exit_begins("all") && c.is_a_run(),
+            OF_FUNNELS,
+        ),
+        when("--seed", |f| f.seed.is_some(), |f, c| f.random() && c != Use::Orbit, OF_RANDOM),
+        when("--stream", |f| f.stream.is_some(), |f, c| f.random() && c != Use::Orbit, OF_RANDOM),
+        when(
+            "--section",
+            |f| f.section.is_some(),
+            |_, c| c != Use::Exponent,
+            "an exponent is an average along the whole orbit; leave it out",
+        ),
         when(
             "--chord",
             |f| f.chord.is_some(),
-            |f, command| command == Use::Any && f.section.is_none() && !f.exit_begins("all"),
-            "it belongs to a recorded path; passages have none, and futures of a funnel are recorded at fixed points of each step",
+            |f, command| command.records_a_path() && f.section.is_none() && f.every.is_none() && !f.exit_begins("all"),
+            "it belongs to a recorded path; passages and --every have none, and futures of a funnel are recorded at fixed points of each step",
+        ),
+        when(
+            "--every",
+            |f| f.every.is_some(),
+            |f, command| command.records_a_path() && f.section.is_none() && !f.exit_begins("all"),
+            "it belongs to a recorded path; passages are not thinned, and futures of a funnel are recorded at fixed points of each step",
         ),
     ]
 };
@@ -329,6 +386,12 @@ enum Misuse {
     Start { found: usize, wanted: usize, states: String },
     #[error("--section \"{text}\": {problem}; give one of {known} and a number, such as {example}=0")]
     Section { text: String, problem: &'static str, known: String, example: String },
+    #[error("a closed orbit is looked for through a plane: give one by --section, such as {example}=0")]
+    NoPlane { example: String },
+    #[error(
+        "the motion of a discontinuous system has no tangent flow where its future is a set: give --switch smoothed, with a small --eps"
+    )]
+    NoTangentFlow,
     #[error("--exit all follows many futures and records their paths; a sweep needs passages: give another rule")]
     FunnelInSweep,
     #[error("{file} is not a spec of one run: {reason}; make one with `--only PANEL --reading READING --print-spec`")]
@@ -429,11 +492,11 @@ impl RunFlags {
                 if let Some(idle) = EFFECTS.iter().find(|e| (e.given)(self) && !(e.works)(self, command)) {
                     return Err(CliError::no_effect(idle.flag, idle.why));
                 }
-                self.unchecked()?
+                self.unchecked(command)?
             }
         };
         if command == Use::Passages
-            && let Observation::Path { .. } = spec.observe
+            && let Observation::Path { .. } | Observation::Times { .. } = spec.observe
         {
             if let SwitchSpec::Filippov { funnel: Some(_), .. } = spec.switch {
                 return Err(Misuse::FunnelInSweep.into());
@@ -444,7 +507,13 @@ impl RunFlags {
         Ok(spec)
     }
 
-    fn unchecked(&self) -> Result<RunSpec, Misuse> {
+    /// The first flag that is given, --spec among them.
+    pub fn first_given(&self) -> Option<&'static str> {
+        let spec = self.spec.as_ref().map(|_| "--spec");
+        spec.or_else(|| EFFECTS.iter().find(|e| (e.given)(self)).map(|e| e.flag))
+    }
+
+    fn unchecked(&self, command: Use) -> Result<RunSpec, Misuse> {
         let system = self.described_system()?;
         let eps = self.eps.unwrap_or(1e-3);
         let switch = match self.switch() {
@@ -464,8 +533,11 @@ impl RunFlags {
                 relaxation: self.hysteresis.unwrap_or(Relaxation::Literal).into(),
                 phi0: 1.0,
             },
+            Switch::Filippov if command == Use::Exponent => return Err(Misuse::NoTangentFlow),
             Switch::Filippov => {
-                let exit = self.exit_rule()?;
+                // A closed orbit never comes to where a rule would be asked.
+                let at_once = ExitRule::AtOnce { side: Side::Plus };
+                let exit = if command == Use::Orbit { at_once } else { self.exit_rule()? };
                 let funnel = (exit == ExitRule::All).then_some(FunnelSpec {
                     shortest: self.funnel_shortest.unwrap_or(0.05),
                     longest: self.funnel_longest.unwrap_or(2.0),
@@ -488,7 +560,19 @@ impl RunFlags {
             Some(numbers) => numbers.clone(),
         };
         let method = self.method.unwrap_or(if self.filippov() { Method::Dopri5 } else { Method::Lsoda });
-        let defaults = MethodSpec::ndsolve_defaults(integrate::Method::from(method));
+        let mut defaults = MethodSpec::defaults(integrate::Method::from(method));
+        match command {
+            Use::Orbit => defaults.tolerance = Tolerance { rtol: 1e-11, atol: 1e-11 },
+            Use::Exponent => {
+                defaults = MethodSpec {
+                    name: integrate::Method::Dopri5,
+                    tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
+                    step_cap: StepCap::None,
+                    max_steps: DEFAULT_MAX_STEPS,
+                }
+            }
+            Use::Any | Use::Picture | Use::Passages => {}
+        }
         let method = MethodSpec {
             name: defaults.name,
             tolerance: Tolerance {
@@ -506,14 +590,21 @@ impl RunFlags {
             stream: self.stream.unwrap_or(0),
         });
         let observe = match &self.section {
-            None => Observation::Path { chord: self.chord.unwrap_or(1e-3) },
+            None if command == Use::Orbit => {
+                let names = system.coordinates();
+                return Err(Misuse::NoPlane { example: names[1.min(names.len() - 1)].into() });
+            }
+            None if self.every.is_some() => Observation::Times { every: self.every.unwrap_or(f64::NAN) },
+            None => {
+                Observation::Path { chord: self.chord.unwrap_or(if command == Use::Picture { 1e-4 } else { 1e-3 }) }
+            }
             Some(text) => section(text, &system)?,
         };
         Ok(RunSpec {
             system,
             switch,
             start,
-            t_end: self.t_end.unwrap_or(150.0),
+            t_end: self.t_end.unwrap_or(if command == Use::Exponent { 10_000.0 } else { 150.0 }),
             method,
             schedule: Schedule { restart_every: self.restart, kick },
             observe,
@@ -631,7 +722,7 @@ mod tests {
 
     /// Every flag with a value that no default has and that every run allows on which the flag has an effect; several, if
     /// none differs from every default.
-    const SAMPLES: [(&str, &[&str]); 34] = [
+    const SAMPLES: [(&str, &[&str]); 35] = [
         ("--system", &["wheel", "two-fold"]),
         ("--set", &["alpha=0.3", "omega0=1.1"]),
         ("--switch", &["smoothed", "hysteretic", "filippov"]),
@@ -666,6 +757,7 @@ mod tests {
         ("--stream", &["6"]),
         ("--section", &["x=0.1", "r=0.1"]),
         ("--chord", &["0.01"]),
+        ("--every", &["0.25"]),
     ];
 
     /// One run of each kind.
@@ -710,10 +802,23 @@ mod tests {
     #[test]
     fn no_flag_is_ignored_on_any_run() {
         let (mut tried, mut refused) = (0, 0);
-        for command in [Use::Any, Use::Passages] {
-            for kind in kinds() {
+        for command in [Use::Any, Use::Picture, Use::Passages, Use::Orbit, Use::Exponent] {
+            let mut kinds = kinds();
+            kinds.extend([vec!["--every", "0.5"], vec!["--switch", "filippov", "--section", "y=0"]]);
+            for kind in kinds {
                 let Ok(plain) = parse(&kind).spec(command) else {
-                    assert!(command == Use::Passages && kind.contains(&"all"), "{kind:?}");
+                    // Refused by name as it stands; what these commands do take is among the others.
+                    let fine = match command {
+                        Use::Any | Use::Picture => kind.contains(&"filippov") && !kind.contains(&"--exit"),
+                        Use::Passages => {
+                            kind.contains(&"all") || kind.contains(&"--every") || !kind.contains(&"--exit")
+                        }
+                        Use::Orbit => {
+                            !kind.contains(&"--section") || kind.contains(&"--kick-every") || kind.contains(&"--exit")
+                        }
+                        Use::Exponent => kind.iter().any(|k| ["filippov", "--section", "--every"].contains(k)),
+                    };
+                    assert!(fine, "{command:?} {kind:?}");
                     continue;
                 };
                 for (flag, values) in SAMPLES.iter().filter(|(flag, _)| !kind.contains(flag)) {
@@ -721,6 +826,7 @@ mod tests {
                     let mut errors = Vec::new();
                     for value in *values {
                         match parse(&[&kind[..], &[flag, value]].concat()).spec(command) {
+                            // A closed orbit has no method: of a spec it takes what its question holds.
                             Ok(spec) => changed |= spec != plain,
                             // The wheel has its own coordinates, and a change of system or switch asks for other flags: each error names what
                             // does not go together.
@@ -736,7 +842,7 @@ mod tests {
                 }
             }
         }
-        assert!(tried > 1500 && refused > 500, "{tried} pairs, {refused} refused");
+        assert!(tried > 2500 && refused > 900, "{tried} pairs, {refused} refused");
     }
 
     /// Every flag beside every axis of a sweep: some row asks something else because of the flag, or the flag is refused.

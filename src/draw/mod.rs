@@ -9,5 +9,8 @@
 //! assert!(at.iter().all(|x| x.abs() < 1e-12));
 //! ```
 
+pub mod level;
+pub mod plot;
+pub mod scan;
 pub mod sketch;
 pub mod surface;

@@ -2,6 +2,7 @@
 
 use nalgebra::{SVector, vector};
 
+use super::level::Level;
 use crate::render::sheet::{Colour, Patch};
 use crate::render::style;
 use crate::system::filippov::{Region, TwoFold, Visibility, lie_derivatives, normal_form_constants, region, two_fold};
@@ -18,12 +19,12 @@ pub fn colour(region: Region) -> Colour {
 
 /// The patches of h = 0 inside the box `ranges` (one (low, high) per coordinate), in the state's order of coordinates.
 ///
-/// None for a system whose surface is not known as a graph over two coordinates.
+/// The surfaces of the systems that are compiled are graphs over two coordinates; any other one is found as [`Level`] finds it.
 pub fn patches(system: &System, ranges: &[(f64, f64); 3], cells: usize) -> Vec<Patch> {
     match system.compiled() {
         Some(Compiled::Caricature(c)) => caricature(&c, ranges, cells),
         Some(Compiled::Wheel(w)) => wheel(&w, ranges, cells),
-        None => Vec::new(),
+        None => Level::new(system, &[0, 1, 2], &[]).map_or(Vec::new(), |level| level.patches(ranges)),
     }
 }
 

@@ -17,7 +17,8 @@ pub enum Method {
     Radau5,
     /// Taylor series that resolve the layer, in f64.
     Taylor,
-    /// The same in double-double arithmetic, about 32 digits: the reference.
+    /// The same in double-double arithmetic, about 32 digits: the reference. The equation's constants and the start are the decimal numbers that
+    /// they are written as: 0.1 is one tenth.
     TaylorExtended,
 }
 
@@ -52,7 +53,7 @@ impl Method {
             Method::Dopri5 => user.with(Dopri5::new(tolerance)),
             Method::Radau5 => user.with(Radau5::new(tolerance)),
             Method::Taylor => user.with(Taylor::new(tolerance)),
-            Method::TaylorExtended => user.with(Taylor::extended(tolerance)),
+            Method::TaylorExtended => user.with(Taylor::extended(tolerance).with_decimal_constants()),
         }
     }
 }

@@ -4,7 +4,7 @@
 //!
 //! **Layers.** A smoothed switch, tanh(h/eps), is constant to working precision outside a layer |h/eps| < w. There all
 //! its derivatives vanish, so that a high-order method with long steps jumps across the layer and its own error
-//! estimate sees nothing. (Adaptive Taylor methods without a cure get even a first crossing wrong at
+//! estimate sees nothing (erf(h/eps) is constant sooner; it is treated alike). (Adaptive Taylor methods without a cure get even a first crossing wrong at
 //! every tolerance.) This one knows the arguments of every tanh in the equation, because it computes their series:
 //! outside a layer, a step ends before the argument has come nearer than the layer's edge, with certainty (a bound on
 //! the argument's speed over the step, not a sample); inside, a step may change the argument by at most
@@ -103,7 +103,7 @@ impl<const N: usize> Taylor<N, DoubleDouble> {
         Self::with_tolerance(tolerance)
     }
 
-    /// Reads the equation's constants as decimal numbers ([`Constants::Decimal`]), from the next restart on.
+    /// Reads the equation's constants, and a start at t = 0, as decimal numbers ([`Constants::Decimal`]), from the next restart on.
     pub fn with_decimal_constants(mut self) -> Self {
         self.constants = Constants::Decimal;
         self
@@ -212,7 +212,7 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
     /// The longest step up to `h` that respects every layer.
     fn resolved_step(&self, mut h: f64) -> f64 {
         let mut series = Vec::with_capacity(self.order);
-        for w in self.solution.tanh_arguments() {
+        for w in self.solution.layer_arguments() {
             series.clear();
             series.extend(w.iter().map(|c| c.to_f64()));
             h = if series[0].abs() >= S::TANH_SATURATION + EDGE_MARGIN {
@@ -286,7 +286,12 @@ impl<const N: usize, S: Precision> Stepper<N> for Taylor<N, S> {
         t_end: f64,
         max_step: f64,
     ) -> Result<(), Failure> {
-        self.restart_from(field, S::from_f64(t), x.map(S::from_f64), t_end, max_step)
+        // A start is given in decimal, like the constants; later states are what they are.
+        let exact = |x: f64| match self.constants {
+            Constants::Decimal if t == 0.0 && x.is_finite() => S::from_decimal(&x.into()),
+            _ => S::from_f64(x),
+        };
+        self.restart_from(field, S::from_f64(t), x.map(exact), t_end, max_step)
     }
 
     fn step<F: VectorField<N>>(&mut self, _: &F) -> Result<Step<'_, N>, Failure> {

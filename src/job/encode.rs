@@ -185,14 +185,27 @@ fn headings(table: &Table) -> Vec<ColumnHeading> {
 const COMMENT: &str = "# ";
 
 /// CSV: a comment line of metadata as JSON (`about` is whatever its maker wants to say), a line of column names, then a row per line with
-/// shortest round-trip numbers; blanks are empty.
+/// shortest round-trip numbers; blanks are empty. A file that was cut short can say so in a last comment line ([`cut_short`]).
 pub fn csv(table: &Table, about: &Value) -> Vec<u8> {
+    let mut bytes = csv_head(table, about);
+    bytes.extend(csv_rows(table));
+    bytes
+}
+
+/// The first two lines of [`csv()`]: metadata and column names.
+pub fn csv_head(table: &Table, about: &Value) -> Vec<u8> {
     let mut bytes = COMMENT.as_bytes().to_vec();
     bytes.extend(canonical_json(&heading(table, about)));
     bytes.push(b'\n');
     let mut writer = csv::Writer::from_writer(bytes);
+    writer.write_record(table.columns.iter().map(|c| &c.name)).expect("memory takes what is written to it");
+    writer.into_inner().expect("memory takes what is written to it")
+}
+
+/// The rest of [`csv()`]: a line for each row.
+pub fn csv_rows(table: &Table) -> Vec<u8> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
     let written = (|| {
-        writer.write_record(table.columns.iter().map(|c| &c.name))?;
         let mut text = String::new();
         for row in 0..table.len() {
             for column in &table.columns {
@@ -212,6 +225,21 @@ pub fn csv(table: &Table, about: &Value) -> Vec<u8> {
     })();
     written.expect("memory takes what is written to it");
     writer.into_inner().expect("memory takes what is written to it")
+}
+
+/// The last line of a CSV file whose computation did not come to its end.
+pub fn cut_short(stop: super::answer::Stop) -> Vec<u8> {
+    format!("{COMMENT}{STOP}{}\n", stop.word()).into_bytes()
+}
+
+const STOP: &str = "stop: ";
+
+/// Why the computation of which this is the CSV file ended before its time; none if it did not.
+pub fn stop_of_csv(bytes: &[u8]) -> Option<super::answer::Stop> {
+    let text = bytes.strip_suffix(b"\n").unwrap_or(bytes);
+    let last = text.rsplit(|b| *b == b'\n').next()?;
+    let word = last.strip_prefix(COMMENT.as_bytes())?.strip_prefix(STOP.as_bytes())?;
+    serde_json::from_value(Value::String(String::from_utf8_lossy(word).into_owned())).ok()
 }
 
 /// The shortest text that reads as this number; nothing for a blank.
@@ -235,7 +263,11 @@ pub fn from_csv(bytes: &[u8]) -> Result<(Heading, Table), Malformed> {
     };
     let heading: Heading = serde_json::from_slice(text).map_err(|e| Malformed(format!("its metadata: {e}")))?;
     let mut table = Table::new(&heading.table, heading.columns.iter().map(|c| Column::new(&c.name, &c.unit, c.kind)));
-    let mut reader = csv::Reader::from_reader(&bytes[end + 1..]);
+    let mut body = &bytes[end + 1..];
+    if let Some(stop) = stop_of_csv(bytes) {
+        body = &body[..body.len().saturating_sub(cut_short(stop).len())];
+    }
+    let mut reader = csv::Reader::from_reader(body);
     let names = reader.headers().map_err(|e| Malformed(e.to_string()))?;
     if !names.iter().eq(table.columns.iter().map(|c| c.name.as_str())) {
         return malformed("its column names are not those of its metadata");
@@ -288,6 +320,54 @@ pub fn json(answer: &Answer, about: &Value) -> Vec<u8> {
     bytes
 }
 
+/// The answer of which [`json()`] made this file, and what it says about itself.
+///
+/// # Errors
+///
+/// If the file is anything else.
+pub fn from_json(bytes: &[u8]) -> Result<(Value, Answer), Malformed> {
+    #[derive(Deserialize)]
+    struct File {
+        about: Value,
+        stop: super::answer::Stop,
+        facts: serde_json::Map<String, Value>,
+        statistics: Option<crate::integrate::Statistics>,
+        tables: Vec<FileTable>,
+    }
+    #[derive(Deserialize)]
+    struct FileTable {
+        name: String,
+        columns: Vec<ColumnHeading>,
+        rows: Vec<Vec<Value>>,
+    }
+    let file: File = serde_json::from_slice(bytes).map_err(|e| Malformed(e.to_string()))?;
+    let mut tables = Vec::new();
+    for t in file.tables {
+        let mut table = Table::new(&t.name, t.columns.iter().map(|c| Column::new(&c.name, &c.unit, c.kind)));
+        for (number, row) in t.rows.iter().enumerate() {
+            if row.len() != table.columns.len() {
+                return malformed(format!("table {}, row {}: {} cells", t.name, number + 1, row.len()));
+            }
+            for (column, value) in table.columns.iter_mut().zip(row) {
+                let fits = match (&mut column.cells, value) {
+                    (Cells::Numbers(v), Value::Null) => Some(v.push(f64::NAN)),
+                    (Cells::Numbers(v), Value::String(s)) if s == "inf" => Some(v.push(f64::INFINITY)),
+                    (Cells::Numbers(v), Value::String(s)) if s == "-inf" => Some(v.push(f64::NEG_INFINITY)),
+                    (Cells::Numbers(v), value) => value.as_f64().map(|x| v.push(x)),
+                    (Cells::Integers(v), value) => value.as_i64().map(|n| v.push(n)),
+                    (Cells::Words(w), value) => value.as_str().map(|word| w.push(word)),
+                };
+                if fits.is_none() {
+                    let what = format!("table {}, row {}, column {}: {value}", t.name, number + 1, column.name);
+                    return malformed(what);
+                }
+            }
+        }
+        tables.push(table);
+    }
+    Ok((file.about, Answer { tables, facts: file.facts, statistics: file.statistics, stop: file.stop }))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -323,6 +403,15 @@ mod tests {
             let (heading, back) = from_csv(&csv(&t, &about)).unwrap();
             prop_assert_eq!(heading.about, about);
             prop_assert_eq!(bits(&[back]), bits(&[t]));
+        }
+
+        #[test]
+        fn json_comes_back(a in any_table(), b in any_table()) {
+            let answer = Answer::of_tables(vec![a, b]).with_fact("t", &0.1);
+            let about = json!({"question": "?"});
+            let (said, back) = from_json(&json(&answer, &about)).unwrap();
+            prop_assert_eq!(said, about);
+            prop_assert_eq!(back.hash(), answer.hash());
         }
 
         #[test]
@@ -367,6 +456,16 @@ mod tests {
         let lines: Vec<&str> = text.lines().collect();
         assert!(lines[0].starts_with("# {") && lines[0].contains("\"made_by\":\"twofold "), "{}", lines[0]);
         assert_eq!(lines[1..], ["x,word,n", "0.1,up,-3", ",,-2", "1e300,\"a,b\",-1"]);
+    }
+
+    #[test]
+    fn a_file_that_was_cut_short_says_so() {
+        let t = table(vec![0.1, 0.2], vec!["up".into(), "up".into()]);
+        let mut bytes = csv(&t, &Value::Null);
+        assert_eq!(stop_of_csv(&bytes), None);
+        bytes.extend(cut_short(crate::job::Stop::Interrupted));
+        assert_eq!(stop_of_csv(&bytes), Some(crate::job::Stop::Interrupted));
+        assert_eq!(from_csv(&bytes).unwrap().1, t);
     }
 
     #[test]

@@ -4,11 +4,12 @@ use nalgebra::SVector;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::answer::Answer;
+use super::answer::{Answer, Stop};
 use super::desk::Desk;
 use super::question::{JobError, Question};
 use super::spec::SwitchSpec;
 use crate::analyse::lyapunov::{self, Exponent};
+use crate::analyse::tangent::Tangent;
 use crate::integrate::Watch;
 use crate::num::tape::Program;
 use crate::system::{Compiled, Field, Hysteretic, Smoothed, System};
@@ -28,7 +29,7 @@ pub struct LargestExponent {
 }
 
 impl LargestExponent {
-    fn exponent(&self) -> Result<Exponent, String> {
+    fn exponent(&self, watch: &dyn Watch) -> Result<Exponent, String> {
         let start = |i: usize| self.start.get(i).copied().unwrap_or(f64::NAN);
         let dimension = self.system.dimension();
         if self.start.len() != dimension {
@@ -38,12 +39,16 @@ impl LargestExponent {
             (SwitchSpec::Smoothed { eps, transition }, Some(Compiled::Caricature(system))) => {
                 let field = Smoothed { system, transition, eps };
                 let x = SVector::from_fn(|i, _| start(i));
-                return lyapunov::largest::<3, 6, _>(&field, x, &self.settings).map_err(|e| e.to_string());
+                let tangent = Tangent::<_, 1>(&field);
+                return lyapunov::largest_watched::<3, 6, _>(&tangent, x, 3, &self.settings, watch)
+                    .map_err(|e| e.to_string());
             }
             (SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. }, Some(Compiled::Caricature(system))) => {
                 let field = Hysteretic { system, eps, eps_prime, relaxation };
                 let x = SVector::from_fn(|i, _| if i < 3 { start(i) } else { self.phi() });
-                return lyapunov::largest::<4, 8, _>(&field, x, &self.settings).map_err(|e| e.to_string());
+                let tangent = Tangent::<_, 1>(&field);
+                return lyapunov::largest_watched::<4, 8, _>(&tangent, x, 3, &self.settings, watch)
+                    .map_err(|e| e.to_string());
             }
             (SwitchSpec::Smoothed { eps, transition }, _) => Field::smoothed(&self.system, transition, eps),
             (SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. }, _) => {
@@ -53,24 +58,25 @@ impl LargestExponent {
         };
         let tangent = field.variational(1);
         match field.dimension() {
-            1 => self.along::<1, 2>(&tangent),
-            2 => self.along::<2, 4>(&tangent),
-            3 => self.along::<3, 6>(&tangent),
-            4 => self.along::<4, 8>(&tangent),
-            5 => self.along::<5, 10>(&tangent),
-            6 => self.along::<6, 12>(&tangent),
-            7 => self.along::<7, 14>(&tangent),
-            8 => self.along::<8, 16>(&tangent),
-            9 => self.along::<9, 18>(&tangent),
+            1 => self.along::<1, 2>(&tangent, watch),
+            2 => self.along::<2, 4>(&tangent, watch),
+            3 => self.along::<3, 6>(&tangent, watch),
+            4 => self.along::<4, 8>(&tangent, watch),
+            5 => self.along::<5, 10>(&tangent, watch),
+            6 => self.along::<6, 12>(&tangent, watch),
+            7 => self.along::<7, 14>(&tangent, watch),
+            8 => self.along::<8, 16>(&tangent, watch),
+            9 => self.along::<9, 18>(&tangent, watch),
             n => Err(format!("exponents are computed for up to nine states, not for {n}")),
         }
     }
 
     /// By the recorded equation and its variational equation.
-    fn along<const N: usize, const M: usize>(&self, tangent: &Field) -> Result<Exponent, String> {
+    fn along<const N: usize, const M: usize>(&self, tangent: &Field, watch: &dyn Watch) -> Result<Exponent, String> {
         let tangent = tangent.bind::<M>().map_err(|e| e.to_string())?;
         let x = SVector::<f64, N>::from_fn(|i, _| self.start.get(i).copied().unwrap_or_else(|| self.phi()));
-        lyapunov::largest_along::<N, M, _>(&tangent, x, self.start.len(), &self.settings).map_err(|e| e.to_string())
+        lyapunov::largest_watched::<N, M, _>(&tangent, x, self.start.len(), &self.settings, watch)
+            .map_err(|e| e.to_string())
     }
 
     /// phi at the start: within its relaxation time of the side that h says.
@@ -99,9 +105,21 @@ impl Question for LargestExponent {
         3.0 * stiff * (self.settings.transient + self.settings.duration)
     }
 
-    fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
-        let found = self.exponent();
-        let answer = Answer::of_tables(Vec::new());
+    fn extent(&self) -> f64 {
+        self.settings.transient + self.settings.duration
+    }
+
+    fn compute(&self, _: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+        let found = self.exponent(watch);
+        let mut answer = Answer::of_tables(Vec::new());
+        if let Ok(exponent) = &found
+            && exponent.duration < self.settings.duration
+        {
+            if !exponent.value.is_finite() {
+                return Err(JobError::Interrupted);
+            }
+            answer.stop = Stop::Interrupted;
+        }
         Ok(match found {
             Ok(exponent) => answer.with_fact("exponent", &exponent),
             Err(failure) => answer.with_fact("failure", &failure),

@@ -5,13 +5,15 @@ use serde_json::Value;
 
 use super::answer::{Answer, Stop};
 use super::desk::Desk;
+use super::passage::TwoFoldPassage;
 use super::question::{JobError, Question};
 use super::recording::side_word;
 use super::table::{Column, Entry, Table};
 use crate::analyse::limit::{AfterVisitQuestion, ConvergenceQuestion, after_visit, convergence};
+use crate::analyse::passage::PassageQuestion;
 use crate::integrate::Watch;
 use crate::integrate::filippov::Mode;
-use crate::system::{Compiled, System};
+use crate::system::{Compiled, System, Transition};
 
 /// Distance of smoothed orbits from the Filippov orbit before its first visit to a two-fold. Table `before`: a row per eps and time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -65,6 +67,29 @@ pub struct AfterVisit {
     pub compared: AfterVisitQuestion,
 }
 
+/// An eps, and where its smoothed orbit crosses.
+type Smoothed = (f64, Option<Vec<f64>>);
+
+impl AfterVisit {
+    /// Where the smoothed orbits cross: a question of its own.
+    fn smoothed(&self, desk: &Desk<'_>) -> Result<Vec<Smoothed>, JobError> {
+        let AfterVisitQuestion { start, eps, beyond, t_end, .. } = &self.compared;
+        let [x, y, z] = start[..] else {
+            return Err(JobError::Other(format!("the start has {} components, not three", start.len())));
+        };
+        let followed = PassageQuestion::far([x, y, z], *beyond, *t_end);
+        let mut found = Vec::with_capacity(eps.len());
+        for &eps in eps {
+            let (system, transition) = (self.system.clone(), Transition::Tanh);
+            let answer = desk.ask(&TwoFoldPassage { system, transition, eps, followed: followed.clone() })?;
+            let far = |c: &str| answer.table("passage").and_then(|t| t.numbers(c).first().copied());
+            let place: Option<Vec<f64>> = ["far_x", "far_y", "far_z"].into_iter().map(far).collect();
+            found.push((eps, place.filter(|p| p.iter().all(|c| c.is_finite()))));
+        }
+        Ok(found)
+    }
+}
+
 impl Question for AfterVisit {
     fn kind(&self) -> &'static str {
         "after-visit"
@@ -79,13 +104,15 @@ impl Question for AfterVisit {
     }
 
     fn cost(&self) -> f64 {
-        self.compared.eps.iter().map(|eps| 600.0 / eps.max(1e-9)).sum()
+        1e5 + self.compared.eps.iter().map(|eps| 3e3 + 0.1 / eps.max(1e-12)).sum::<f64>()
     }
 
-    fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, desk: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        let crossings = self.smoothed(desk)?;
+        let crossing = |eps: f64| Ok(crossings.iter().find(|c| c.0 == eps).and_then(|c| c.1.clone()));
         let found = match self.system.compiled() {
-            Some(Compiled::Caricature(system)) => after_visit(&system, &self.compared),
-            _ => after_visit(&self.system.bind::<3>()?, &self.compared),
+            Some(Compiled::Caricature(system)) => after_visit(&system, &self.compared, crossing),
+            _ => after_visit(&self.system.bind::<3>()?, &self.compared, crossing),
         }?;
         let kinds = |name: &str| if name.ends_with("side") { Column::words(name) } else { Column::numbers(name) };
         let names = self.system.coordinates();

@@ -10,9 +10,11 @@
 //! | [`Classification`] | what a run settles on |
 //! | [`Fate`](sweep::Fate) | the same, or that the run leaves for good: a cell of a [`Sweep`](sweep::Sweep) |
 //! | [`LargestExponent`] | how fast neighbours part |
+//! | [`ClosedOrbit`] | where an orbit closes up, its stability, and its branch along a parameter |
 //! | [`PathComparison`] | how alike two paths are |
 //! | [`MethodDigits`] | how many digits of an orbit methods get right |
-//! | [`DisturbanceGrowth`] | what a visit to a two-fold makes of a small disturbance |
+//! | [`TwoFoldPassage`] | how a smoothed orbit passes a two-fold: visit, leaving, exits, growth of disturbances |
+//! | [`Leaving`] | where an orbit under any switching rule leaves the surface behind a two-fold |
 //! | [`SmoothingLimit`], [`AfterVisit`] | what smoothed orbits tend to as the switch steepens, before and after a visit |
 //!
 //! Rooms above add their own by implementing [`Question`].
@@ -43,13 +45,15 @@ pub mod desk;
 pub mod digits;
 pub mod encode;
 pub mod exponent;
-pub mod growth;
 pub mod limit;
+pub mod orbit;
 #[cfg(feature = "parquet")]
 pub mod parquet;
+pub mod passage;
 pub mod question;
 pub mod recording;
 pub mod run;
+pub mod scan;
 pub mod simulate;
 pub mod spec;
 pub mod store;
@@ -62,8 +66,9 @@ pub use comparison::PathComparison;
 pub use desk::{Desk, JobWatch, Progress};
 pub use digits::MethodDigits;
 pub use exponent::LargestExponent;
-pub use growth::DisturbanceGrowth;
 pub use limit::{AfterVisit, SmoothingLimit};
+pub use orbit::ClosedOrbit;
+pub use passage::{Leaving, TwoFoldPassage};
 pub use question::{AnyQuestion, JobError, Question};
 pub use recording::{Data, Recording};
 pub use run::Run;

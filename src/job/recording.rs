@@ -102,18 +102,32 @@ impl<const D: usize> Recording<D> {
         let tables = match &self.data {
             Data::Path(samples) => vec![path_table(&names, samples)],
             Data::Section(crossings) => vec![section_table(&names, crossings)],
-            Data::Motion(motion) => motion_tables(&names, &[Member { motion, future: None }]),
+            Data::Motion(motion) => motion_tables(&names, &[Member { motion, future: None }], 0),
             Data::Funnel { approach, futures } => {
                 let mut members = vec![Member { motion: approach, future: None }];
                 members
                     .extend(futures.iter().map(|f| Member { motion: &f.motion, future: Some((f.exit_time, f.side)) }));
-                motion_tables(&names, &members)
+                motion_tables(&names, &members, 0)
             }
         };
         Answer { statistics: Some(self.statistics.clone()), stop: self.stop.into(), ..Answer::of_tables(tables) }
             .with_fact("t", &self.t)
             .with_fact("state", &self.x.as_slice())
             .with_fact("most_steps_in_segment", &self.most_steps_in_segment)
+    }
+
+    /// The table of points that [`Recording::to_answer`] begins with, of a part of a recording. Pieces of a motion are counted from
+    /// `first_piece` on. A funnel has no parts.
+    pub(super) fn part(run: &RunSpec, data: &Data<D>, first_piece: usize) -> Option<Table> {
+        let names = run.system.coordinates();
+        match data {
+            Data::Path(samples) => Some(path_table(&names, samples)),
+            Data::Section(crossings) => Some(section_table(&names, crossings)),
+            Data::Motion(motion) => {
+                motion_tables(&names, &[Member { motion, future: None }], first_piece).into_iter().next()
+            }
+            Data::Funnel { .. } => None,
+        }
     }
 
     /// The recording that an answer to `run` holds.
@@ -233,7 +247,7 @@ fn mode_of(word: &str) -> Option<Mode> {
     MODES.iter().find(|(_, w)| *w == word).map(|(m, _)| *m)
 }
 
-fn motion_tables<const D: usize>(names: &[&str], members: &[Member<'_, D>]) -> Vec<Table> {
+fn motion_tables<const D: usize>(names: &[&str], members: &[Member<'_, D>], first_piece: usize) -> Vec<Table> {
     let future = || {
         [
             Column::integers("future"),
@@ -262,7 +276,7 @@ fn motion_tables<const D: usize>(names: &[&str], members: &[Member<'_, D>]) -> V
         for (piece, (mode, samples)) in member.motion.pieces.iter().enumerate() {
             for s in samples {
                 let mut row = point(s.t, s.x);
-                row.extend([mode_word(Some(*mode)).into(), (piece as i64).into()]);
+                row.extend([mode_word(Some(*mode)).into(), ((first_piece + piece) as i64).into()]);
                 row.extend(which());
                 points.push(row);
             }
@@ -417,6 +431,8 @@ mod tests {
         for run in [
             run(SwitchSpec::tanh(1e-2), path),
             run(SwitchSpec::hysteretic(1e-2, Relaxation::Single), section),
+            run(SwitchSpec::tanh(1e-2), Observation::Times { every: 0.7 }),
+            run(SwitchSpec::Filippov { exit: random, funnel: None }, Observation::Times { every: 0.7 }),
             run(SwitchSpec::Filippov { exit: random, funnel: None }, path),
             run(SwitchSpec::Filippov { exit: random, funnel: None }, section),
             run(SwitchSpec::Filippov { exit: ExitRule::All, funnel: Some(funnel) }, path),

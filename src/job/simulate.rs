@@ -6,12 +6,15 @@ use super::answer::{Answer, Stop};
 use super::question::JobError;
 use super::recording::{Data, Future, Recording};
 use super::spec::{FunnelSpec, MethodSpec, Observation, RunSpec, SpecError, SwitchSpec};
+use super::table::Table;
 use crate::analyse::path::MOST_POINTS;
-use crate::analyse::{Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder};
+use crate::analyse::{Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder, TimedMotion, TimesRecorder};
 use crate::integrate::filippov::{
     self, AllModes, ExitRule, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent, SlidingFlow,
 };
-use crate::integrate::{Course, Flow, Observer, Step, Stepper, StopReason, Summary, Watch, WithStepper, drive};
+use crate::integrate::{
+    Course, Flow, Observer, Statistics, Step, Stepper, StopReason, Summary, Watch, WithStepper, drive,
+};
 use crate::system::{Bound, Compiled, Field, Hysteretic, PiecewiseSmooth, Smoothed, VectorField};
 
 /// Computes a run of a system with three states.
@@ -24,7 +27,7 @@ pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, JobError
     if spec.system.dimension() != 3 {
         return Err(too_many_states(spec, "three states are looked at here"));
     }
-    let recording = three_states(spec, None, watch)?;
+    let recording = three_states(spec, &mut Aside::default(), watch)?;
     if recording.stop == StopReason::Observer {
         return Err(full(recording.t));
     }
@@ -45,7 +48,7 @@ pub fn simulate_until(spec: &RunSpec, until: Until<'_>, watch: &dyn Watch) -> Re
     if spec.system.dimension() != 3 {
         return Err(too_many_states(spec, "three states are looked at here"));
     }
-    let recording = three_states(spec, Some(until), watch)?;
+    let recording = three_states(spec, &mut Aside { sink: None, until: Some(until) }, watch)?;
     if recording.stop == StopReason::Observer && recording.data.len() >= MOST_POINTS {
         return Err(full(recording.t));
     }
@@ -60,17 +63,191 @@ pub fn simulate_until(spec: &RunSpec, until: Until<'_>, watch: &dyn Watch) -> Re
 pub fn answer(spec: &RunSpec, watch: &dyn Watch) -> Result<Answer, JobError> {
     spec.validate()?;
     let answer = match spec.system.dimension() {
-        1 => record::<1, 2>(spec, None, watch)?.to_answer(spec),
-        2 => record::<2, 3>(spec, None, watch)?.to_answer(spec),
-        3 => three_states(spec, None, watch)?.to_answer(spec),
-        4 => record::<4, 5>(spec, None, watch)?.to_answer(spec),
-        5 => record::<5, 6>(spec, None, watch)?.to_answer(spec),
-        6 => record::<6, 7>(spec, None, watch)?.to_answer(spec),
-        7 => record::<7, 8>(spec, None, watch)?.to_answer(spec),
-        8 => record::<8, 9>(spec, None, watch)?.to_answer(spec),
-        _ => return Err(too_many_states(spec, "runs are computed with up to eight states")),
+        1 => record::<1, 2>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        2 => record::<2, 3>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        3 => three_states(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        4 => record::<4, 5>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        5 => record::<5, 6>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        6 => record::<6, 7>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        7 => record::<7, 8>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        8 => record::<8, 9>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        _ => return Err(too_many_states(spec, UP_TO_EIGHT)),
     };
     if answer.stop == Stop::Found { Err(full(answer.fact("t")?)) } else { Ok(answer) }
+}
+
+const UP_TO_EIGHT: &str = "runs are computed with up to eight states";
+
+/// How a streamed run ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Streamed {
+    /// Final time.
+    pub t: f64,
+    /// Rows given away.
+    pub rows: u64,
+    /// Work done.
+    pub statistics: Statistics,
+    /// Why it ended; [`Stop::Found`] where `rows` wanted no more.
+    pub stop: Stop,
+}
+
+/// Computes a run and gives its first table away in parts, in order and without gaps: together they are the table of [`answer`]. Memory
+/// stays flat however long the run is. `rows` says whether it wants more.
+///
+/// # Errors
+///
+/// If the spec is wrong or a funnel (whose members are computed one after the other), or the orbit cannot be followed.
+pub fn stream(spec: &RunSpec, rows: &mut dyn FnMut(&Table) -> bool, watch: &dyn Watch) -> Result<Streamed, JobError> {
+    spec.validate()?;
+    if let SwitchSpec::Filippov { funnel: Some(_), .. } = spec.switch {
+        return Err(JobError::Other("a funnel is not given away in parts".into()));
+    }
+    match spec.system.dimension() {
+        1 => streamed(spec, rows, |aside| record::<1, 2>(spec, aside, watch)),
+        2 => streamed(spec, rows, |aside| record::<2, 3>(spec, aside, watch)),
+        3 => streamed(spec, rows, |aside| three_states(spec, aside, watch)),
+        4 => streamed(spec, rows, |aside| record::<4, 5>(spec, aside, watch)),
+        5 => streamed(spec, rows, |aside| record::<5, 6>(spec, aside, watch)),
+        6 => streamed(spec, rows, |aside| record::<6, 7>(spec, aside, watch)),
+        7 => streamed(spec, rows, |aside| record::<7, 8>(spec, aside, watch)),
+        8 => streamed(spec, rows, |aside| record::<8, 9>(spec, aside, watch)),
+        _ => Err(too_many_states(spec, UP_TO_EIGHT)),
+    }
+}
+
+/// Receives parts of a recording; says whether more is wanted.
+type Sink<'a, const D: usize> = &'a mut dyn FnMut(Data<D>) -> bool;
+
+/// What looks on while a recording grows.
+struct Aside<'a, const D: usize> {
+    /// Takes parts of it away; without one everything is kept.
+    sink: Option<Sink<'a, D>>,
+    /// Ends a smoothed or hysteretic run.
+    until: Option<Until<'a>>,
+}
+
+impl<const D: usize> Default for Aside<'_, D> {
+    fn default() -> Self {
+        Self { sink: None, until: None }
+    }
+}
+
+fn streamed<const D: usize>(
+    spec: &RunSpec,
+    rows: &mut dyn FnMut(&Table) -> bool,
+    run: impl FnOnce(&mut Aside<'_, D>) -> Result<Recording<D>, JobError>,
+) -> Result<Streamed, JobError> {
+    let (mut first_piece, mut count) = (0, 0);
+    let mut give = |data: Data<D>| {
+        let more = Recording::part(spec, &data, first_piece).is_none_or(|table| {
+            count += table.len() as u64;
+            rows(&table)
+        });
+        if let Data::Motion(motion) = &data {
+            // The last piece goes on.
+            first_piece += motion.pieces.len().saturating_sub(1);
+        }
+        more
+    };
+    let end = run(&mut Aside { sink: Some(&mut give), until: None })?;
+    let wanted = give(end.data);
+    let stop = if wanted { end.stop.into() } else { Stop::Found };
+    Ok(Streamed { t: end.t, rows: count, statistics: end.statistics, stop })
+}
+
+/// Points that are kept before they are given away.
+const PART: usize = 8192;
+
+/// A recorder whose points are given away.
+struct Draining<'a, 'b, R, const D: usize> {
+    recorder: R,
+    aside: &'a mut Aside<'b, D>,
+}
+
+/// Something that records and can forget.
+trait Recorder<const D: usize> {
+    fn kept(&self) -> usize;
+    fn take(&mut self) -> Data<D>;
+}
+
+impl<const D: usize> Recorder<D> for PathRecorder<D> {
+    fn kept(&self) -> usize {
+        self.len()
+    }
+    fn take(&mut self) -> Data<D> {
+        Data::Path(PathRecorder::take(self))
+    }
+}
+
+impl<const D: usize> Recorder<D> for TimesRecorder<D> {
+    fn kept(&self) -> usize {
+        self.len()
+    }
+    fn take(&mut self) -> Data<D> {
+        Data::Path(TimesRecorder::take(self))
+    }
+}
+
+impl<const D: usize> Recorder<D> for SectionRecorder<D> {
+    fn kept(&self) -> usize {
+        self.crossings().len()
+    }
+    fn take(&mut self) -> Data<D> {
+        Data::Section(SectionRecorder::take(self))
+    }
+}
+
+impl<const D: usize> Recorder<D> for MotionRecorder<D> {
+    fn kept(&self) -> usize {
+        MotionRecorder::kept(self)
+    }
+    fn take(&mut self) -> Data<D> {
+        Data::Motion(MotionRecorder::take(self))
+    }
+}
+
+impl<const D: usize> Recorder<D> for TimedMotion<D> {
+    fn kept(&self) -> usize {
+        TimedMotion::kept(self)
+    }
+    fn take(&mut self) -> Data<D> {
+        Data::Motion(TimedMotion::take(self))
+    }
+}
+
+impl<R: Recorder<D>, const D: usize> Draining<'_, '_, R, D> {
+    fn drained(&mut self, flow: Flow) -> Flow {
+        if let Some(sink) = self.aside.sink.as_mut()
+            && self.recorder.kept() >= PART
+        {
+            return if sink(self.recorder.take()) { Flow::Continue } else { Flow::Stop };
+        }
+        flow
+    }
+}
+
+impl<R: Recorder<D> + Observer<N>, const D: usize, const N: usize> Observer<N> for Draining<'_, '_, R, D> {
+    fn step(&mut self, step: &Step<'_, N>) -> Flow {
+        let flow = self.recorder.step(step);
+        let flow = self.drained(flow);
+        match self.aside.until {
+            Some(until) if until(&step.x1.as_slice()[..D.min(N)]) => Flow::Stop,
+            _ => flow,
+        }
+    }
+    fn kick(&mut self, t: f64, before: &SVector<f64, N>, after: &SVector<f64, N>) {
+        self.recorder.kick(t, before, after);
+    }
+}
+
+impl<R: Recorder<D> + FilippovObserver<D>, const D: usize> FilippovObserver<D> for Draining<'_, '_, R, D> {
+    fn step(&mut self, mode: Mode, step: &Step<'_, D>) -> Flow {
+        let flow = self.recorder.step(mode, step);
+        self.drained(flow)
+    }
+    fn event(&mut self, event: &ModeEvent<D>) -> Flow {
+        self.recorder.event(event)
+    }
 }
 
 /// The only observers here are recorders, which stop a run when they are full.
@@ -84,30 +261,30 @@ fn too_many_states(spec: &RunSpec, rule: &'static str) -> JobError {
 }
 
 /// Three states: by the compiled equations where there are some, which give the same bits as the recorded ones and give them sooner.
-fn three_states(spec: &RunSpec, until: Option<Until<'_>>, watch: &dyn Watch) -> Result<Recording, JobError> {
+fn three_states(spec: &RunSpec, aside: &mut Aside<'_, 3>, watch: &dyn Watch) -> Result<Recording, JobError> {
     let x0 = start::<3>(spec);
     match (spec.system.compiled(), spec.switch) {
         (Some(Compiled::Caricature(system)), SwitchSpec::Smoothed { eps, transition }) => {
-            observe(spec, &Smoothed { system, transition, eps }, x0, until, watch)
+            observe(spec, &Smoothed { system, transition, eps }, x0, aside, watch)
         }
         (Some(Compiled::Caricature(system)), SwitchSpec::Hysteretic { eps, eps_prime, relaxation, phi0 }) => {
             let field = Hysteretic { system, eps, eps_prime, relaxation };
-            observe(spec, &field, vector![x0[0], x0[1], x0[2], phi0], until, watch)
+            observe(spec, &field, vector![x0[0], x0[1], x0[2], phi0], aside, watch)
         }
         (Some(Compiled::Caricature(system)), SwitchSpec::Filippov { exit, funnel }) => {
-            discontinuous(spec, &system, x0, exit, funnel, watch)
+            discontinuous(spec, &system, x0, exit, funnel, aside, watch)
         }
         (Some(Compiled::Wheel(system)), SwitchSpec::Smoothed { eps, transition }) => {
-            observe(spec, &Smoothed { system, transition, eps }, x0, until, watch)
+            observe(spec, &Smoothed { system, transition, eps }, x0, aside, watch)
         }
-        _ => record::<3, 4>(spec, until, watch),
+        _ => record::<3, 4>(spec, aside, watch),
     }
 }
 
 /// `D` states, by the recorded equations; `M` is `D + 1`.
 fn record<const D: usize, const M: usize>(
     spec: &RunSpec,
-    until: Option<Until<'_>>,
+    aside: &mut Aside<'_, D>,
     watch: &dyn Watch,
 ) -> Result<Recording<D>, JobError>
 where
@@ -117,15 +294,15 @@ where
     match spec.switch {
         SwitchSpec::Smoothed { eps, transition } => {
             let field = Field::smoothed(&spec.system, transition, eps).bind::<D>()?;
-            observe(spec, &field, x0, until, watch)
+            observe(spec, &field, x0, aside, watch)
         }
         SwitchSpec::Hysteretic { eps, eps_prime, relaxation, phi0 } => {
             let field = Field::hysteretic(&spec.system, eps, eps_prime, relaxation).bind::<M>()?;
             let x0 = SVector::<f64, M>::from_fn(|i, _| if i < D { x0[i] } else { phi0 });
-            observe(spec, &field, x0, until, watch)
+            observe(spec, &field, x0, aside, watch)
         }
         SwitchSpec::Filippov { exit, funnel } => {
-            discontinuous(spec, &spec.system.bind::<D>()?, x0, exit, funnel, watch)
+            discontinuous(spec, &spec.system.bind::<D>()?, x0, exit, funnel, aside, watch)
         }
     }
 }
@@ -141,6 +318,7 @@ fn discontinuous<P: PiecewiseSmooth<D>, const D: usize, const M: usize>(
     x0: SVector<f64, D>,
     exit: ExitRule,
     funnel: Option<FunnelSpec>,
+    aside: &mut Aside<'_, D>,
     watch: &dyn Watch,
 ) -> Result<Recording<D>, JobError>
 where
@@ -165,16 +343,21 @@ where
         stop: summary.stop,
     };
     match (spec.observe, funnel) {
-        (Observation::Path { .. }, Some(funnel)) => futures(spec, system, x0, &settings, &funnel),
+        (_, Some(funnel)) => futures(spec, system, x0, &settings, &funnel),
         (Observation::Path { chord }, None) => {
-            let mut recorder = MotionRecorder::new(chord);
-            let end = run(&mut recorder)?;
-            Ok(recording(Data::Motion(recorder.into_motion()), end))
+            let mut draining = Draining { recorder: MotionRecorder::new(chord), aside };
+            let end = run(&mut draining)?;
+            Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
         }
-        (Observation::Section { coordinate, value }, _) => {
-            let mut recorder = SectionRecorder::new(coordinate, value);
-            let end = run(&mut AllModes(&mut recorder))?;
-            Ok(recording(Data::Section(recorder.into_crossings()), end))
+        (Observation::Times { every }, None) => {
+            let mut draining = Draining { recorder: TimedMotion::new(&x0, every), aside };
+            let end = run(&mut draining)?;
+            Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
+        }
+        (Observation::Section { coordinate, value }, None) => {
+            let mut draining = Draining { recorder: SectionRecorder::new(coordinate, value), aside };
+            let end = run(&mut AllModes(&mut draining))?;
+            Ok(recording(Data::Section(draining.recorder.into_crossings()), end))
         }
     }
 }
@@ -255,23 +438,21 @@ fn observe<F: VectorField<N>, const D: usize, const N: usize>(
     spec: &RunSpec,
     field: &F,
     x0: SVector<f64, N>,
-    until: Option<Until<'_>>,
+    aside: &mut Aside<'_, D>,
     watch: &dyn Watch,
 ) -> Result<Recording<D>, JobError> {
     let (summary, data) = match spec.observe {
         Observation::Path { chord } => {
-            let mut recorder = PathRecorder::<D>::new(&x0, chord);
-            (integrate(spec, field, x0, D, &mut recorder, watch)?, Data::Path(recorder.into_samples()))
+            let mut draining = Draining { recorder: PathRecorder::<D>::new(&x0, chord), aside };
+            (integrate(spec, field, x0, D, &mut draining, watch)?, Data::Path(draining.recorder.into_samples()))
+        }
+        Observation::Times { every } => {
+            let mut draining = Draining { recorder: TimesRecorder::<D>::new(&x0, every), aside };
+            (integrate(spec, field, x0, D, &mut draining, watch)?, Data::Path(draining.recorder.into_samples()))
         }
         Observation::Section { coordinate, value } => {
-            let mut recorder = SectionRecorder::<D>::new(coordinate, value);
-            let summary = match until {
-                None => integrate(spec, field, x0, D, &mut recorder, watch)?,
-                Some(until) => {
-                    integrate(spec, field, x0, D, &mut RecordUntil { recorder: &mut recorder, until }, watch)?
-                }
-            };
-            (summary, Data::Section(recorder.into_crossings()))
+            let mut draining = Draining { recorder: SectionRecorder::<D>::new(coordinate, value), aside };
+            (integrate(spec, field, x0, D, &mut draining, watch)?, Data::Section(draining.recorder.into_crossings()))
         }
     };
     Ok(Recording {
@@ -282,21 +463,6 @@ fn observe<F: VectorField<N>, const D: usize, const N: usize>(
         most_steps_in_segment: summary.most_steps_in_segment,
         stop: summary.stop,
     })
-}
-
-/// Records a section until a state is reached of which `until` holds.
-struct RecordUntil<'a, const D: usize> {
-    recorder: &'a mut SectionRecorder<D>,
-    until: Until<'a>,
-}
-
-impl<const N: usize, const D: usize> Observer<N> for RecordUntil<'_, D> {
-    fn step(&mut self, step: &Step<'_, N>) -> Flow {
-        match self.recorder.step(step) {
-            Flow::Continue if (self.until)(step.x1.as_slice()) => Flow::Stop,
-            flow => flow,
-        }
-    }
 }
 
 /// The run itself; `states` of the equation's components are the system's.

@@ -120,7 +120,19 @@ impl MethodSpec {
             max_steps: DEFAULT_MAX_STEPS,
         }
     }
+
+    /// What a method does if nothing else is asked for: as NDSolve, but extended precision is used to its end, 1e-32.
+    pub fn defaults(name: Method) -> Self {
+        let mut defaults = Self::ndsolve_defaults(name);
+        if name == Method::TaylorExtended {
+            defaults.tolerance = Tolerance { rtol: FINEST_EXTENDED, atol: FINEST_EXTENDED };
+        }
+        defaults
+    }
 }
+
+/// The finest tolerance that double-double arithmetic can hold.
+const FINEST_EXTENDED: f64 = 1e-32;
 
 /// What is recorded of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -130,6 +142,11 @@ pub enum Observation {
     Path {
         /// Largest distance, in the state's units.
         chord: f64,
+    },
+    /// The path at the multiples of an interval.
+    Times {
+        /// The interval.
+        every: f64,
     },
     /// Passages through the plane `coordinate = value`.
     Section {
@@ -176,6 +193,21 @@ pub struct SpecError {
     pub rule: &'static str,
 }
 
+/// A check's outcome.
+type Checked = Result<(), SpecError>;
+
+fn wrong(field: &'static str, value: f64, rule: &'static str) -> Checked {
+    Err(SpecError { field, value: format!("{value:?}"), rule })
+}
+
+fn positive(field: &'static str, value: f64) -> Checked {
+    if value.is_finite() && value > 0.0 { Ok(()) } else { wrong(field, value, "give a finite number above zero") }
+}
+
+fn finite(field: &'static str, value: f64) -> Checked {
+    if value.is_finite() { Ok(()) } else { wrong(field, value, "give a finite number") }
+}
+
 impl RunSpec {
     /// Checks every number; a spec that passes can be run.
     ///
@@ -183,46 +215,11 @@ impl RunSpec {
     ///
     /// The first field that is wrong, its value, and the rule that it breaks.
     pub fn validate(&self) -> Result<(), SpecError> {
-        let error = |field, value: f64, rule| Err(SpecError { field, value: format!("{value:?}"), rule });
-        let positive = |field, value: f64| {
-            if value.is_finite() && value > 0.0 {
-                Ok(())
-            } else {
-                error(field, value, "give a finite number above zero")
-            }
-        };
-        let finite = |field, value: f64| {
-            if value.is_finite() { Ok(()) } else { error(field, value, "give a finite number") }
-        };
         positive("t-end", self.t_end)?;
         if self.t_end > LATEST {
-            return error("t-end", self.t_end, "beyond 1e12 a time in f64 has no digits left for a step");
+            return wrong("t-end", self.t_end, "beyond 1e12 a time in f64 has no digits left for a step");
         }
-        let states = self.system.coordinates();
-        if self.start.len() != states.len() {
-            return Err(SpecError {
-                field: "start",
-                value: format!("{:?}", self.start),
-                rule: "give one number for each of the system's states",
-            });
-        }
-        for value in &self.start {
-            finite("start", *value)?;
-        }
-        for (name, value) in self.system.parameters() {
-            if !value.value().is_finite() {
-                let value = format!("with {name} = {}", value.value());
-                return Err(SpecError { field: "system", value, rule: "parameters are finite numbers" });
-            }
-        }
-        if let Some(name) = states.iter().find(|s| COLUMNS.contains(s)) {
-            let value = format!("one with a state called {name}");
-            return Err(SpecError {
-                field: "system",
-                value,
-                rule: "recorded data have a column of this name; rename the state",
-            });
-        }
+        self.validate_system()?;
         match self.switch {
             SwitchSpec::Smoothed { eps, transition } => {
                 positive("eps", eps)?;
@@ -235,86 +232,142 @@ impl RunSpec {
                 positive("eps-prime", eps_prime)?;
                 finite("phi0", phi0)?;
             }
-            SwitchSpec::Filippov { exit, funnel } => {
-                let wrong = |rule| Err(SpecError { field: "exit", value: exit.to_string(), rule });
-                if exit.validate().is_err() {
-                    return wrong("times and lengths are finite and not below 0, probabilities between 0 and 1");
+            SwitchSpec::Filippov { exit, funnel } => self.validate_filippov(exit, funnel)?,
+        }
+        self.method.validate()?;
+        self.validate_schedule()?;
+        self.validate_observation()
+    }
+
+    fn validate_system(&self) -> Checked {
+        let states = self.system.coordinates();
+        if self.start.len() != states.len() {
+            return Err(SpecError {
+                field: "start",
+                value: format!("{:?}", self.start),
+                rule: "give one number for each of the system's states",
+            });
+        }
+        for value in &self.start {
+            finite("start", *value)?;
+        }
+        if let Err(wrong) = self.system.check() {
+            let value = format!("one in which {wrong}");
+            return Err(SpecError { field: "system", value, rule: "the equations make no sense with it" });
+        }
+        match states.iter().find(|s| COLUMNS.contains(s)) {
+            Some(name) => Err(SpecError {
+                field: "system",
+                value: format!("one with a state called {name}"),
+                rule: "recorded data have a column of this name; rename the state",
+            }),
+            None => Ok(()),
+        }
+    }
+
+    fn validate_filippov(&self, exit: ExitRule, funnel: Option<FunnelSpec>) -> Checked {
+        let wrong_exit = |rule| Err(SpecError { field: "exit", value: exit.to_string(), rule });
+        if exit.validate().is_err() {
+            return wrong_exit("times and lengths are finite and not below 0, probabilities between 0 and 1");
+        }
+        if (exit == ExitRule::All) != funnel.is_some() {
+            return wrong_exit("\"all\" and a description of the funnel go together");
+        }
+        if let Some(funnel) = funnel {
+            positive("funnel-shortest", funnel.shortest)?;
+            positive("funnel-longest", funnel.longest)?;
+            positive("funnel-horizon", funnel.horizon)?;
+            if funnel.times == 0 || funnel.times > 100_000 {
+                return wrong("funnel-times", funnel.times as f64, "give a number from 1 to 100000");
+            }
+            match self.observe {
+                Observation::Path { .. } => {}
+                Observation::Section { .. } => {
+                    return wrong_exit("a funnel is recorded as paths; leave out --section");
                 }
-                if (exit == ExitRule::All) != funnel.is_some() {
-                    return wrong("\"all\" and a description of the funnel go together");
-                }
-                if let Some(funnel) = funnel {
-                    positive("funnel-shortest", funnel.shortest)?;
-                    positive("funnel-longest", funnel.longest)?;
-                    positive("funnel-horizon", funnel.horizon)?;
-                    if funnel.times == 0 || funnel.times > 100_000 {
-                        return error("funnel-times", funnel.times as f64, "give a number from 1 to 100000");
-                    }
-                    if let Observation::Section { .. } = self.observe {
-                        return wrong("a funnel is recorded as paths; leave out --section");
-                    }
-                }
-                if self.method.name != Method::Dopri5 {
-                    return Err(SpecError {
-                        field: "method",
-                        value: self.method.name.name().into(),
-                        rule: "Filippov motion is integrated by dopri5 between events",
-                    });
-                }
-                if self.schedule != Schedule::default() {
-                    return Err(SpecError {
-                        field: "switch",
-                        value: "filippov".into(),
-                        rule: "restarts and kicks apply to smoothed and hysteretic runs; leave them out",
-                    });
+                Observation::Times { .. } => {
+                    return wrong_exit("a funnel is recorded at fixed points of each step; leave out --every");
                 }
             }
         }
-        positive("rtol", self.method.tolerance.rtol)?;
-        positive("atol", self.method.tolerance.atol)?;
-        let (finest, rule) = match self.method.name {
-            Method::TaylorExtended => (1e-32, "double-double arithmetic carries 32 digits; give 1e-32 or more"),
-            Method::Taylor => (1e-17, "f64 carries 16 digits; give 1e-17 or more"),
-            _ => (1e-15, "f64 carries 16 digits; give 1e-15 or more"),
-        };
-        if self.method.tolerance.rtol < finest {
-            return error("rtol", self.method.tolerance.rtol, rule);
+        if self.method.name != Method::Dopri5 {
+            return Err(SpecError {
+                field: "method",
+                value: self.method.name.name().into(),
+                rule: "Filippov motion is integrated by dopri5 between events",
+            });
         }
-        if self.method.tolerance.atol < FINEST_ATOL {
-            let rule = "errors are divided by it and squared, which f64 cannot hold below 1e-140; give that or more";
-            return error("atol", self.method.tolerance.atol, rule);
+        if self.schedule != Schedule::default() {
+            return Err(SpecError {
+                field: "switch",
+                value: "filippov".into(),
+                rule: "restarts and kicks apply to smoothed and hysteretic runs; leave them out",
+            });
         }
-        match self.method.step_cap {
-            StepCap::None => {}
-            StepCap::Absolute(h) => positive("max-step", h)?,
-            StepCap::FractionOfSegment(f) => positive("max-step fraction", f)?,
-        }
-        if self.method.max_steps == 0 {
-            return error("max-steps", 0.0, "give at least one step");
-        }
+        Ok(())
+    }
+
+    fn validate_schedule(&self) -> Checked {
         if let Some(every) = self.schedule.restart_every {
             positive("restart", every)?;
             if self.t_end / every > 1e9 {
-                return error("restart", every, "that is more than 10^9 restarts; give a longer interval");
+                return wrong("restart", every, "that is more than 10^9 restarts; give a longer interval");
             }
         }
-        if let Some(kick) = self.schedule.kick {
-            positive("kick-every", kick.every)?;
-            if self.t_end / kick.every > 1e9 {
-                return error("kick-every", kick.every, "that is more than 10^9 kicks; give a longer interval");
-            }
-            if !(kick.size.is_finite() && kick.size >= 0.0) {
-                return error("kick-size", kick.size, "give a finite number, zero or above");
-            }
+        let Some(kick) = self.schedule.kick else { return Ok(()) };
+        positive("kick-every", kick.every)?;
+        if self.t_end / kick.every > 1e9 {
+            return wrong("kick-every", kick.every, "that is more than 10^9 kicks; give a longer interval");
         }
+        if !(kick.size.is_finite() && kick.size >= 0.0) {
+            return wrong("kick-size", kick.size, "give a finite number, zero or above");
+        }
+        Ok(())
+    }
+
+    fn validate_observation(&self) -> Checked {
         match self.observe {
             Observation::Path { chord } => positive("chord", chord),
+            Observation::Times { every } => {
+                positive("every", every)?;
+                if self.t_end / every > 1e15 {
+                    return wrong("every", every, "f64 cannot count so many moments; give a longer interval");
+                }
+                Ok(())
+            }
             Observation::Section { coordinate, value } => {
-                if coordinate >= states.len() {
-                    return error("section", coordinate as f64, "that is not the number of a state; they count from 0");
+                if coordinate >= self.system.dimension() {
+                    return wrong("section", coordinate as f64, "that is not the number of a state; they count from 0");
                 }
                 finite("section", value)
             }
         }
+    }
+}
+
+impl MethodSpec {
+    fn validate(&self) -> Checked {
+        positive("rtol", self.tolerance.rtol)?;
+        positive("atol", self.tolerance.atol)?;
+        let (finest, rule) = match self.name {
+            Method::TaylorExtended => {
+                (FINEST_EXTENDED, "double-double arithmetic carries 32 digits; give 1e-32 or more")
+            }
+            Method::Taylor => (1e-17, "f64 carries 16 digits; give 1e-17 or more"),
+            _ => (1e-15, "f64 carries 16 digits; give 1e-15 or more"),
+        };
+        if self.tolerance.rtol < finest {
+            return wrong("rtol", self.tolerance.rtol, rule);
+        }
+        if self.tolerance.atol < FINEST_ATOL {
+            let rule = "errors are divided by it and squared, which f64 cannot hold below 1e-140; give that or more";
+            return wrong("atol", self.tolerance.atol, rule);
+        }
+        match self.step_cap {
+            StepCap::None => {}
+            StepCap::Absolute(h) => positive("max-step", h)?,
+            StepCap::FractionOfSegment(f) => positive("max-step fraction", f)?,
+        }
+        if self.max_steps == 0 { wrong("max-steps", 0.0, "give at least one step") } else { Ok(()) }
     }
 }

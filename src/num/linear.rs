@@ -1,9 +1,11 @@
-//! Linear systems of a fixed small size, solved once.
+//! Linear systems of a fixed small size, solved once, and eigenvalues.
 //!
 //! Methods that solve many systems with one matrix, real or complex, keep its factors: see `integrate::linear`. Here nothing is kept, and
 //! the quotients are taken as they stand, so that both have their own last bits; published numbers rest on each.
 
 use nalgebra::{SMatrix, SVector};
+
+use super::elementary::sqrt;
 
 /// The solution of a x = b by elimination with row pivoting; `None` when no pivot is above `smallest` in size (0: exactly
 /// singular matrices only) or one is not a number.
@@ -34,6 +36,200 @@ pub fn solve<const N: usize>(
     Some(b)
 }
 
+/// The solution of a x = b for `n` equations, `a` row by row, as [`solve`] does it; for sizes that are known at run time only.
+pub fn solve_any(a: &[f64], b: &[f64], smallest: f64) -> Option<Vec<f64>> {
+    let n = b.len();
+    let (mut a, mut b) = (a.to_vec(), b.to_vec());
+    for k in 0..n {
+        let pivot = (k..n).max_by(|&i, &j| a[i * n + k].abs().total_cmp(&a[j * n + k].abs()))?;
+        if a[pivot * n + k].abs() <= smallest || a[pivot * n + k].is_nan() {
+            return None;
+        }
+        (0..n).for_each(|j| a.swap(k * n + j, pivot * n + j));
+        b.swap(k, pivot);
+        for i in k + 1..n {
+            let factor = a[i * n + k] / a[k * n + k];
+            for j in k..n {
+                a[i * n + j] -= factor * a[k * n + j];
+            }
+            b[i] -= factor * b[k];
+        }
+    }
+    for k in (0..n).rev() {
+        let known: f64 = (k + 1..n).map(|j| a[k * n + j] * b[j]).sum();
+        b[k] = (b[k] - known) / a[k * n + k];
+    }
+    b.iter().all(|x| x.is_finite()).then_some(b)
+}
+
+/// Iterations of the QR algorithm for one eigenvalue; some three are usual.
+const MOST_ITERATIONS: usize = 60;
+
+/// The eigenvalues (real part, imaginary part) of a real matrix of `n` rows, given row by row: elimination to Hessenberg form and
+/// the shifted QR algorithm (Martin, Peters & Wilkinson 1970; EISPACK's `elmhes` and `hqr`). `None` if an entry is not finite, or an
+/// eigenvalue does not settle.
+pub fn eigenvalues(matrix: &[f64], n: usize) -> Option<Vec<[f64; 2]>> {
+    if matrix.len() != n * n || !matrix.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let mut a: Vec<Vec<f64>> = matrix.chunks(n.max(1)).map(<[f64]>::to_vec).collect();
+    hessenberg(&mut a);
+    let norm: f64 = a.iter().flatten().map(|v| v.abs()).sum();
+    let mut found = vec![[0.0; 2]; n];
+    let mut shifts = 0.0;
+    // Eigenvalues are split off from the end; `end` rows are left.
+    let mut end = n;
+    while end > 0 {
+        let last = end - 1;
+        let mut settled = false;
+        for iteration in 0..MOST_ITERATIONS {
+            let small = |l: usize| {
+                let size = a[l - 1][l - 1].abs() + a[l][l].abs();
+                let size = if size == 0.0 { norm } else { size };
+                a[l][l - 1].abs() <= f64::EPSILON * size
+            };
+            let low = (1..end).rev().find(|l| small(*l)).unwrap_or(0);
+            let x = a[last][last];
+            if low == last {
+                found[last] = [x + shifts, 0.0];
+                end -= 1;
+                settled = true;
+                break;
+            }
+            let (y, w) = (a[last - 1][last - 1], a[last][last - 1] * a[last - 1][last]);
+            if low + 1 == last {
+                let half = 0.5 * (y - x);
+                let discriminant = half * half + w;
+                let x = x + shifts;
+                let root = sqrt(discriminant.abs());
+                if discriminant >= 0.0 {
+                    let z = half + root.copysign(half);
+                    found[last - 1] = [x + z, 0.0];
+                    found[last] = [if z == 0.0 { x } else { x - w / z }, 0.0];
+                } else {
+                    found[last - 1] = [x + half, root];
+                    found[last] = [x + half, -root];
+                }
+                end -= 2;
+                settled = true;
+                break;
+            }
+            let mut pair = (x, y, w);
+            if iteration > 0 && iteration % 10 == 0 {
+                // An exceptional shift, against cycling.
+                shifts += x;
+                (0..end).for_each(|i| a[i][i] -= x);
+                let s = a[last][last - 1].abs() + a[last - 1][last - 2].abs();
+                pair = (0.75 * s, 0.75 * s, -0.4375 * s * s);
+            }
+            double_step(&mut a, low, last, pair);
+        }
+        if !settled {
+            return None;
+        }
+    }
+    Some(found)
+}
+
+/// Similar to the matrix, and zero below the first subdiagonal.
+fn hessenberg(a: &mut [Vec<f64>]) {
+    let n = a.len();
+    for m in 1..n.saturating_sub(1) {
+        let Some(pivot) = (m..n).max_by(|i, j| a[*i][m - 1].abs().total_cmp(&a[*j][m - 1].abs())) else { return };
+        let x = a[pivot][m - 1];
+        if pivot != m {
+            a.swap(pivot, m);
+            a.iter_mut().for_each(|row| row.swap(pivot, m));
+        }
+        if x == 0.0 {
+            continue;
+        }
+        for i in m + 1..n {
+            let y = a[i][m - 1] / x;
+            if y == 0.0 {
+                continue;
+            }
+            let row = a[m].clone();
+            (m - 1..n).for_each(|j| a[i][j] -= y * row[j]);
+            a[i][m - 1] = 0.0;
+            a.iter_mut().for_each(|r| r[m] += y * r[i]);
+        }
+    }
+}
+
+/// A double QR step on rows `low` to `last` with the shifts that `pair` describes.
+fn double_step(a: &mut [Vec<f64>], low: usize, last: usize, (x, y, w): (f64, f64, f64)) {
+    let start = |a: &[Vec<f64>], m: usize| {
+        let z = a[m][m];
+        let (r, s) = (x - z, y - z);
+        let p = (r * s - w) / a[m + 1][m] + a[m][m + 1];
+        let q = a[m + 1][m + 1] - z - r - s;
+        let r = a[m + 2][m + 1];
+        let scale = p.abs() + q.abs() + r.abs();
+        (p / scale, q / scale, r / scale)
+    };
+    let mut m = last - 2;
+    let (mut p, mut q, mut r) = start(a, m);
+    while m > low {
+        let u = a[m][m - 1].abs() * (q.abs() + r.abs());
+        let v = p.abs() * (a[m - 1][m - 1].abs() + a[m][m].abs() + a[m + 1][m + 1].abs());
+        if u <= f64::EPSILON * v {
+            break;
+        }
+        m -= 1;
+        (p, q, r) = start(a, m);
+    }
+    for i in m + 2..=last {
+        a[i][i - 2] = 0.0;
+        if i > m + 2 {
+            a[i][i - 3] = 0.0;
+        }
+    }
+    for k in m..last {
+        let mut x = 0.0;
+        if k > m {
+            (p, q) = (a[k][k - 1], a[k + 1][k - 1]);
+            r = if k + 1 < last { a[k + 2][k - 1] } else { 0.0 };
+            x = p.abs() + q.abs() + r.abs();
+            if x == 0.0 {
+                continue;
+            }
+            (p, q, r) = (p / x, q / x, r / x);
+        }
+        let s = sqrt(p * p + q * q + r * r).copysign(p);
+        if s == 0.0 {
+            continue;
+        }
+        if k > m {
+            a[k][k - 1] = -s * x;
+        } else if low != m {
+            a[k][k - 1] = -a[k][k - 1];
+        }
+        p += s;
+        let (x, y, z) = (p / s, q / s, r / s);
+        (q, r) = (q / p, r / p);
+        let three = k + 1 < last;
+        for j in k..=last {
+            let mut t = a[k][j] + q * a[k + 1][j];
+            if three {
+                t += r * a[k + 2][j];
+                a[k + 2][j] -= t * z;
+            }
+            a[k + 1][j] -= t * y;
+            a[k][j] -= t * x;
+        }
+        for row in a.iter_mut().take(last.min(k + 3) + 1).skip(low) {
+            let mut t = x * row[k] + y * row[k + 1];
+            if three {
+                t += z * row[k + 2];
+                row[k + 2] -= t * r;
+            }
+            row[k + 1] -= t * q;
+            row[k] -= t;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -44,6 +240,54 @@ mod tests {
         let a = matrix![0.0, 2.0, 1.0; 1.0, 0.0, 3.0; 4.0, -1.0, 0.0];
         let x = vector![1.0, -2.0, 3.0];
         assert!((solve(a, a * x, 0.0).unwrap() - x).norm() < 1e-14);
+    }
+
+    #[test]
+    fn any_size_as_a_fixed_one() {
+        let a = [0.0, 2.0, 1.0, 1.0, 0.0, 3.0, 4.0, -1.0, 0.0];
+        let x = solve_any(&a, &[-1.0, 10.0, 6.0], 0.0).unwrap();
+        assert!(x.iter().zip([1.0, -2.0, 3.0]).all(|(x, w)| (x - w).abs() < 1e-14), "{x:?}");
+        assert!(solve_any(&[1.0, 2.0, 2.0, 4.0], &[1.0, 1.0], 0.0).is_none());
+    }
+
+    #[test]
+    fn eigenvalues_of_known_matrices() {
+        let sorted = |m: &[f64], n: usize| {
+            let mut e = eigenvalues(m, n).unwrap();
+            e.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+            e
+        };
+        // Companion of (l - 1)(l - 2)(l - 3)(l^2 + 1)(l + 4), whose coefficients are whole numbers.
+        let mut polynomial = vec![1.0];
+        for root in [1.0, 2.0, 3.0, -4.0] {
+            let mut next = polynomial.clone();
+            next.push(0.0);
+            polynomial.iter().enumerate().for_each(|(i, c)| next[i + 1] -= root * c);
+            polynomial = next;
+        }
+        let mut next = polynomial.clone();
+        next.extend([0.0, 0.0]);
+        polynomial.iter().enumerate().for_each(|(i, c)| next[i + 2] += c);
+        let n = 6;
+        let mut companion = vec![0.0; n * n];
+        for i in 0..n {
+            companion[i] = -next[i + 1];
+            if i > 0 {
+                companion[i * n + i - 1] = 1.0;
+            }
+        }
+        let want = [[-4.0, 0.0], [0.0, -1.0], [0.0, 1.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]];
+        for (found, want) in sorted(&companion, n).iter().zip(want) {
+            assert!((found[0] - want[0]).abs() < 1e-10 && (found[1] - want[1]).abs() < 1e-10, "{found:?} {want:?}");
+        }
+        // A cyclic permutation: the seventh roots of one, all of one modulus; plain shifts would cycle.
+        let n = 7;
+        let cycle: Vec<f64> = (0..n * n).map(|k| if (k / n + 1) % n == k % n { 1.0 } else { 0.0 }).collect();
+        for [re, im] in sorted(&cycle, n) {
+            assert!((re * re + im * im - 1.0).abs() < 1e-12);
+        }
+        assert_eq!(sorted(&[0.0; 16], 4), [[0.0; 2]; 4]);
+        assert_eq!(eigenvalues(&[f64::NAN], 1), None);
     }
 
     #[test]

@@ -5,8 +5,8 @@
 //! 13.2; Jorba & Zou 2005, sec. 2). Degree K costs O(K^2) per nonlinear operation. A truncated series that is itself a number
 //! would have to be evaluated anew at every degree, O(K^3)/3; that is why there is none.
 //!
-//! The tape also knows the arguments of every tanh. That is how an integrator learns where an equation has a layer, without
-//! being told (see [`Solution::tanh_arguments`]).
+//! The tape also knows the arguments of every tanh and erf. That is how an integrator learns where an equation has a layer, without
+//! being told (see [`Solution::layer_arguments`]).
 
 use std::ops::Range;
 
@@ -73,7 +73,7 @@ pub struct Solution<S> {
     recurrences: Vec<Recurrence<S>>,
     /// The series of the components' derivatives.
     outputs: Vec<Series>,
-    tanh_arguments: Vec<Series>,
+    layer_arguments: Vec<Series>,
 }
 
 impl<S: Elementary + FromDecimal> Solution<S> {
@@ -88,7 +88,7 @@ impl<S: Elementary + FromDecimal> Solution<S> {
             coefficients: Vec::new(),
             recurrences: Vec::new(),
             outputs: Vec::new(),
-            tanh_arguments: Vec::new(),
+            layer_arguments: Vec::new(),
         };
         solution.set_tape(tape, constants);
         solution
@@ -111,7 +111,7 @@ impl<S: Elementary + FromDecimal> Solution<S> {
             fixed,
         };
         compiler.recurrences.clear();
-        self.tanh_arguments.clear();
+        self.layer_arguments.clear();
         let needed = tape.needed();
         for (node, operation) in tape.operations().iter().enumerate() {
             if let Operation::Variable(i) = operation {
@@ -119,8 +119,8 @@ impl<S: Elementary + FromDecimal> Solution<S> {
             } else if needed[node] && compiler.fixed[node].is_none() {
                 let series = compiler.compile(*operation);
                 compiler.series[node] = Some(series);
-                if let Operation::Tanh(argument) = operation {
-                    self.tanh_arguments.push(compiler.of(*argument));
+                if let Operation::Tanh(argument) | Operation::Erf(argument) = operation {
+                    self.layer_arguments.push(compiler.of(*argument));
                 }
             }
         }
@@ -141,9 +141,9 @@ impl<S: Elementary + FromDecimal> Solution<S> {
         &self.coefficients[self.range(i)]
     }
 
-    /// The series of the arguments of every tanh in the equation, up to degree `degree - 1`.
-    pub fn tanh_arguments(&self) -> impl Iterator<Item = &[S]> {
-        self.tanh_arguments.iter().map(|series| {
+    /// The series of the arguments of every tanh and every erf in the equation, up to degree `degree - 1`.
+    pub fn layer_arguments(&self) -> impl Iterator<Item = &[S]> {
+        self.layer_arguments.iter().map(|series| {
             let range = self.range(*series);
             &self.coefficients[range.start..range.end - 1]
         })
@@ -444,8 +444,8 @@ mod tests {
         let want = [0.0, 0.0, 0.5, 0.0, -1.0 / 12.0, 0.0, 1.0 / 45.0, 0.0, -17.0 / 2520.0, 0.0, 31.0 / 14175.0];
         let s = expand(10, [0.0, 0.0], |x| vec![x[1].tanh(), Recorded::one()]);
         first_is(&s, |j| want[j]);
-        assert_eq!(s.tanh_arguments().count(), 1);
-        assert_eq!(s.tanh_arguments().next().unwrap()[1], DoubleDouble::one());
+        assert_eq!(s.layer_arguments().count(), 1);
+        assert_eq!(s.layer_arguments().next().unwrap()[1], DoubleDouble::one());
     }
 
     #[test]

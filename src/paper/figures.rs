@@ -43,4 +43,5 @@ figures! {
     workprecision: "../../figures/workprecision/figure.rs", "../../figures/workprecision/expected.json";
     digits: "../../figures/digits/figure.rs", "../../figures/digits/expected.json";
     convergence: "../../figures/convergence/figure.rs", "../../figures/convergence/expected.json";
+    law: "../../figures/law/figure.rs", "../../figures/law/expected.json";
 }

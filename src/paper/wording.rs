@@ -4,6 +4,7 @@ use super::Reading;
 use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use crate::integrate::{Kick, StepCap};
 use crate::job::spec::{MethodSpec, RunSpec, SwitchSpec};
+use crate::render::markup;
 pub use crate::render::number::number;
 use crate::system::{Compiled, Relaxation, System, Transition};
 
@@ -39,8 +40,12 @@ pub fn system(system: &System) -> String {
             number(w.v_c)
         ),
         None => {
-            let parameters = system.parameters().map(|(name, value)| format!("*{name}* = {}", number(value.value())));
-            let name = (!system.definition().title().is_empty()).then(|| system.definition().title().to_owned());
+            let said = |(name, value): (&str, &crate::num::Decimal)| {
+                format!("{} = {}", markup::name(name), number(value.value()))
+            };
+            let parameters = system.parameters().map(said);
+            let title = system.definition().title();
+            let name = (!title.is_empty()).then(|| markup::literal(title));
             name.into_iter().chain(parameters).collect::<Vec<_>>().join(", ")
         }
     }

@@ -60,6 +60,74 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     }
 }
 
+/// A file that grows: written like [`write()`], part by part, and in its place only when it is finished.
+pub struct Growing {
+    path: PathBuf,
+    to: Growth,
+}
+
+enum Growth {
+    Stream(File),
+    File { temporary: Temporary, at: PathBuf, old: Option<Metadata> },
+}
+
+impl Growing {
+    /// Begins a file for `path`.
+    ///
+    /// # Errors
+    /// As [`write()`].
+    pub fn begin(path: &Path) -> Result<Self, FileError> {
+        let to = match place(path).map_err(FileError::new("write", path))? {
+            Place::Stream => {
+                Growth::Stream(OpenOptions::new().append(true).open(path).map_err(FileError::new("write", path))?)
+            }
+            Place::File { at, old } => {
+                let folder = folder_of(&at);
+                fs::create_dir_all(folder).map_err(FileError::new("create the folder", folder))?;
+                let temporary = Temporary::new_in(folder).map_err(FileError::new("write in", folder))?;
+                Growth::File { temporary, at, old }
+            }
+        };
+        Ok(Self { path: path.to_path_buf(), to })
+    }
+
+    /// Appends.
+    ///
+    /// # Errors
+    /// If the bytes cannot be written.
+    pub fn append(&mut self, bytes: &[u8]) -> Result<(), FileError> {
+        match &mut self.to {
+            Growth::Stream(file) => file.write_all(bytes),
+            Growth::File { temporary, .. } => temporary.file().write_all(bytes),
+        }
+        .map_err(FileError::new("write", &self.path))
+    }
+
+    /// Puts the file in its place, or in another one.
+    ///
+    /// # Errors
+    /// If it cannot be put there; what was there is unharmed.
+    pub fn finish(self, instead: Option<&Path>) -> Result<(), FileError> {
+        let Self { path, to } = self;
+        let Growth::File { temporary, mut at, mut old } = to else { return Ok(()) };
+        if let Some(instead) = instead {
+            match place(instead).map_err(FileError::new("write", instead))? {
+                Place::Stream => {
+                    let why = io::Error::new(io::ErrorKind::AlreadyExists, "it is no ordinary file");
+                    return Err(FileError::new("write", instead)(why));
+                }
+                Place::File { at: other, old: there } => (at, old) = (other, there),
+            }
+        }
+        temporary
+            .file()
+            .sync_data()
+            .and_then(|()| like(temporary.file(), old.as_ref()))
+            .and_then(|()| temporary.persist(&at))
+            .map_err(FileError::new("write", instead.unwrap_or(&path)))
+    }
+}
+
 /// Tries whether [`write()`] can write to `path`, and leaves everything as it is: for use before a long computation.
 ///
 /// # Errors

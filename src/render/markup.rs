@@ -105,9 +105,84 @@ pub fn plain(text: &str) -> String {
     plain
 }
 
+/// A text in which nothing is markup: what a user's file says, as it stands there.
+pub fn literal(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        if matches!(c, '*' | '^' | '_' | '{' | '}' | '\\') {
+            out.push('\\');
+        }
+        // The embedded fonts have no control characters.
+        out.push(if c.is_control() { ' ' } else { c });
+    }
+    out
+}
+
+/// Names of Greek letters, as programs spell them.
+const GREEK: [(&str, char); 24] = [
+    ("alpha", 'α'),
+    ("beta", 'β'),
+    ("gamma", 'γ'),
+    ("delta", 'δ'),
+    ("epsilon", 'ε'),
+    ("eps", 'ε'),
+    ("zeta", 'ζ'),
+    ("eta", 'η'),
+    ("theta", 'θ'),
+    ("kappa", 'κ'),
+    ("lambda", 'λ'),
+    ("mu", 'μ'),
+    ("nu", 'ν'),
+    ("xi", 'ξ'),
+    ("rho", 'ρ'),
+    ("sigma", 'σ'),
+    ("tau", 'τ'),
+    ("phi", 'φ'),
+    ("chi", 'χ'),
+    ("psi", 'ψ'),
+    ("omega", 'ω'),
+    ("Gamma", 'Γ'),
+    ("Delta", 'Δ'),
+    ("Omega", 'Ω'),
+];
+
+/// A program's name for a quantity, as mathematics sets it: `omega` is an italic ω, `v_plus` and `x1` have subscripts.
+pub fn name(name: &str) -> String {
+    let letters = name.trim_end_matches(|c: char| c.is_ascii_digit());
+    let (base, script) = match name.split_once('_') {
+        Some((base, script)) if !base.is_empty() && !script.is_empty() => (base, script),
+        _ if !letters.is_empty() && !letters.ends_with('_') => (letters, &name[letters.len()..]),
+        _ => (name, ""),
+    };
+    let base = match GREEK.iter().find(|(word, _)| *word == base) {
+        Some((_, letter)) => letter.to_string(),
+        None => literal(base),
+    };
+    if script.is_empty() { format!("*{base}*") } else { format!("*{base}*_{{{}}}", literal(script)) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_of_quantities() {
+        let pairs = [
+            ("x", "*x*"),
+            ("omega", "*ω*"),
+            ("omega0", "*ω*_{0}"),
+            ("v_plus", "*v*_{plus}"),
+            ("a_b_c", "*a*_{b\\_c}"),
+            ("prey", "*prey*"),
+            ("x1", "*x*_{1}"),
+            ("x_", "*x\\_*"),
+        ];
+        for (given, want) in pairs {
+            assert_eq!(name(given), want);
+            assert!(parse(&name(given)).is_ok());
+        }
+        assert_eq!(plain(&literal("a*b_{c}^\\ -1")), "a*b_{c}^\\ -1");
+    }
 
     #[test]
     fn hyphens_and_minus_signs() {

@@ -14,7 +14,7 @@
 //!
 //! [parameters]
 //! belt = { value = 0.3, meaning = "speed of the belt" }   # or only belt = 0.3
-//! friction = 1
+//! friction = { value = 1, above = 0 }                     # or below: other values are refused
 //!
 //! [let]                                   # intermediate terms, in any order
 //! push = "-x"
@@ -37,7 +37,7 @@ use super::expression::{Expression, ExpressionError, is_name, is_reserved};
 use crate::num::tape::{Recorded, Tape};
 use crate::num::{Arithmetic, Decimal};
 
-pub use super::document::About;
+pub use super::document::{About, Bounds};
 
 /// Most states of a system.
 pub const MAX_STATES: usize = 16;
@@ -86,6 +86,8 @@ pub struct ParameterDefinition {
     pub value: Decimal,
     /// Its meaning and unit.
     pub about: About,
+    /// What its values must be.
+    pub bounds: Bounds,
 }
 
 impl Definition {
@@ -166,7 +168,13 @@ impl Definition {
         if !self.parameters.is_empty() {
             text += "\n[parameters]\n";
             for p in &self.parameters {
-                text += &format!("{} = {{ value = {}{} }}\n", p.name, number(&p.value), about(&p.about));
+                let mut bounds = String::new();
+                for (key, bound) in [("above", &p.bounds.above), ("below", &p.bounds.below)] {
+                    if let Some(bound) = bound {
+                        bounds += &format!(", {key} = {}", number(bound));
+                    }
+                }
+                text += &format!("{} = {{ value = {}{bounds}{} }}\n", p.name, number(&p.value), about(&p.about));
             }
         }
         if !self.terms.is_empty() {
@@ -337,7 +345,12 @@ impl Definition {
                 .parameters
                 .0
                 .into_iter()
-                .map(|(name, ParameterEntry { value, about })| ParameterDefinition { name, value, about })
+                .map(|(name, ParameterEntry { value, about, bounds })| ParameterDefinition {
+                    name,
+                    value,
+                    about,
+                    bounds,
+                })
                 .collect(),
             states,
             start,
@@ -346,6 +359,12 @@ impl Definition {
             plus,
             minus,
         };
+        for p in &definition.parameters {
+            if let Some(rule) = p.bounds.refuse(p.value.value()) {
+                let message = format!("`{}` is {}, and its values are {rule}", p.name, p.value);
+                return Err(Problem::new(Place::entry("parameters", &p.name), message, None));
+            }
+        }
         let values: Vec<Decimal> = definition.parameters.iter().map(|p| p.value.clone()).collect();
         let operations = definition.tape(&values).operations().len();
         if operations > MAX_OPERATIONS {
@@ -358,6 +377,17 @@ impl Definition {
             return Err(Problem::new(Place::key("h"), "h depends on no state, so that nothing ever switches", help));
         }
         Ok(definition)
+    }
+
+    /// The states on which h depends, by their numbers.
+    pub fn switching_states(&self) -> Vec<usize> {
+        fn reaches(d: &Definition, expression: &Expression, state: &str) -> bool {
+            expression
+                .names()
+                .into_iter()
+                .any(|name| name == state || d.terms.iter().any(|(n, term)| n == name && reaches(d, term, state)))
+        }
+        (0..self.dimension()).filter(|i| reaches(self, &self.switching, &self.states[*i].name)).collect()
     }
 
     fn depends_on_state(&self, expression: &Expression) -> bool {
@@ -390,7 +420,9 @@ impl From<Definition> for Document {
             parameters: Ordered(
                 d.parameters
                     .into_iter()
-                    .map(|ParameterDefinition { name, value, about }| (name, ParameterEntry { value, about }))
+                    .map(|ParameterDefinition { name, value, about, bounds }| {
+                        (name, ParameterEntry { value, about, bounds })
+                    })
                     .collect(),
             ),
             terms: Ordered(d.terms.iter().map(|(name, term)| (name.clone(), term.to_string())).collect()),
@@ -622,7 +654,7 @@ plus = ["v", "a*slip - x - 1"]
 minus = ["v", "a*slip - x + 1"]
 
 [parameters]
-a = { value = 0.2, unit = "1/s" }
+a = { value = 0.2, unit = "1/s", below = 1 }
 belt = 0.3
 
 [let]
@@ -639,6 +671,7 @@ slip = "v - belt"
         assert_eq!(d.parameters()[0].about.unit, "1/s");
         // Terms may stand in any order.
         assert_eq!(d.plus()[1].to_string(), "a*slip - x - 1");
+        assert_eq!(d.switching_states(), [1]);
     }
 
     #[test]
@@ -660,7 +693,7 @@ slip = "v - belt"
             .replace("start = [0, 0.5]\n", "title = \"A title\"\n")
             .replace("a*slip - x - 1", "  a * (slip)-x -1.0 ")
             .replace(
-                "[parameters]\na = { value = 0.2, unit = \"1/s\" }\nbelt = 0.3",
+                "[parameters]\na = { value = 0.2, unit = \"1/s\", below = 1 }\nbelt = 0.3",
                 "[parameters]\nbelt = 0.3\na = 0.2",
             );
         assert_eq!(canonical(&other), canonical(GOOD));
@@ -669,7 +702,8 @@ slip = "v - belt"
     }
 
     /// (changed, into, place, message, help)
-    const WRONG: [(&str, &str, &str, &str, &str); 25] = [
+    const WRONG: [(&str, &str, &str, &str, &str); 26] = [
+        ("value = 0.2", "value = 1", "10:1", "`a` is 1, and its values are below 1", ""),
         ("a*slip - x - 1", "a*slpi - x - 1", "6:17", "unknown name `slpi`", "did you mean `slip`?"),
         ("a*slip - x + 1", "a*slip - x + 1)", "7:30", "never opened", ""),
         ("h = \"slip\"", "h = \"\"", "5:5", "empty", ""),

@@ -65,6 +65,27 @@ pub struct About {
     pub unit: String,
 }
 
+/// Open bounds of a parameter: what lies outside makes no sense.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bounds {
+    /// Values are above this.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub above: Option<Decimal>,
+    /// Values are below this.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub below: Option<Decimal>,
+}
+
+impl Bounds {
+    /// What a value must be, if it is not: "above 0".
+    pub fn refuse(&self, value: f64) -> Option<String> {
+        let above = self.above.as_ref().filter(|b| value <= b.value()).map(|b| format!("above {b}"));
+        let below = self.below.as_ref().filter(|b| value >= b.value()).map(|b| format!("below {b}"));
+        above.or(below)
+    }
+}
+
 /// A state: a name, or a table with more.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StateEntry {
@@ -77,6 +98,7 @@ pub struct StateEntry {
 pub struct ParameterEntry {
     pub value: Decimal,
     pub about: About,
+    pub bounds: Bounds,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -93,6 +115,10 @@ struct StateTable {
 #[serde(deny_unknown_fields)]
 struct ParameterTable {
     value: Decimal,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    above: Option<Decimal>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    below: Option<Decimal>,
     #[serde(default, skip_serializing_if = "String::is_empty")]
     meaning: String,
     #[serde(default, skip_serializing_if = "String::is_empty")]
@@ -131,11 +157,12 @@ impl<'de> Deserialize<'de> for StateEntry {
 
 impl Serialize for ParameterEntry {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        if self.about == About::default() {
-            return self.value.serialize(serializer);
+        let Self { value, about, bounds } = self.clone();
+        if about == About::default() && bounds == Bounds::default() {
+            return value.serialize(serializer);
         }
-        let About { meaning, unit } = self.about.clone();
-        ParameterTable { value: self.value.clone(), meaning, unit }.serialize(serializer)
+        let (About { meaning, unit }, Bounds { above, below }) = (about, bounds);
+        ParameterTable { value, above, below, meaning, unit }.serialize(serializer)
     }
 }
 
@@ -160,13 +187,14 @@ impl<'de> Deserialize<'de> for ParameterEntry {
                 plain(de::value::StrDeserializer::new(digits))
             }
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<ParameterEntry, A::Error> {
-                let ParameterTable { value, meaning, unit } =
+                let ParameterTable { value, above, below, meaning, unit } =
                     ParameterTable::deserialize(MapAccessDeserializer::new(map))?;
-                Ok(ParameterEntry { value, about: About { meaning, unit } })
+                Ok(ParameterEntry { value, about: About { meaning, unit }, bounds: Bounds { above, below } })
             }
         }
         fn plain<'de, D: Deserializer<'de>>(deserializer: D) -> Result<ParameterEntry, D::Error> {
-            Ok(ParameterEntry { value: Decimal::deserialize(deserializer)?, about: About::default() })
+            let value = Decimal::deserialize(deserializer)?;
+            Ok(ParameterEntry { value, about: About::default(), bounds: Bounds::default() })
         }
         deserializer.deserialize_any(Entry)
     }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::SVector;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
+use super::definition::ParameterDefinition;
 use super::diagnostic::nearest;
 use super::document::Canonical;
 use super::{Caricature, Definition, PiecewiseSmooth, Wheel, caricature::MinusSign, library};
@@ -61,6 +62,18 @@ pub enum ParameterError {
         name: String,
         /// What to do.
         help: String,
+    },
+    /// The value is outside what the definition allows.
+    #[error("{name} is {value}: give a value {rule}{meaning}")]
+    OutOfBounds {
+        /// The name.
+        name: String,
+        /// The value.
+        value: String,
+        /// What it must be.
+        rule: String,
+        /// The parameter's meaning, in brackets, if it has one.
+        meaning: String,
     },
     /// The value is infinite or not a number.
     #[error("{name} is {value}: a parameter is a finite number")]
@@ -130,12 +143,18 @@ impl System {
                 };
                 return Err(ParameterError::Unknown { name: name.into(), help });
             };
-            if !value.value().is_finite() {
-                return Err(ParameterError::NotFinite { name: name.into(), value: value.value().to_string() });
-            }
+            checked(&self.definition.parameters()[i], &value)?;
             values[i] = value;
         }
         Ok(Self::made(self.definition, values))
+    }
+
+    /// Whether every parameter has a value that the definition allows: those given in Rust are not looked at before.
+    ///
+    /// # Errors
+    /// The first that is not finite, or out of its bounds.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        self.definition.parameters().iter().zip(&self.values).try_for_each(|(p, value)| checked(p, value))
     }
 
     /// The same system with these values, in the definition's order, whatever they are.
@@ -232,6 +251,20 @@ impl System {
             })),
             _ => None,
         }
+    }
+}
+
+/// Whether a parameter may have this value.
+fn checked(parameter: &ParameterDefinition, value: &Decimal) -> Result<(), ParameterError> {
+    let (name, number) = (parameter.name.clone(), value.value());
+    if !number.is_finite() {
+        return Err(ParameterError::NotFinite { name, value: number.to_string() });
+    }
+    let meaning = &parameter.about.meaning;
+    let meaning = if meaning.is_empty() { String::new() } else { format!(" ({meaning})") };
+    match parameter.bounds.refuse(number) {
+        None => Ok(()),
+        Some(rule) => Err(ParameterError::OutOfBounds { name, value: number.to_string(), rule, meaning }),
     }
 }
 

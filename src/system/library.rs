@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 use super::{Definition, System};
 
 /// Every file of `systems/`.
-const FILES: [(&str, &str); 7] = [
+const FILES: [(&str, &str); 14] = [
     ("caricature", include_str!("../../systems/caricature.toml")),
     ("caricature-as-printed", include_str!("../../systems/caricature-as-printed.toml")),
     ("two-fold", include_str!("../../systems/two-fold.toml")),
@@ -21,6 +21,13 @@ const FILES: [(&str, &str); 7] = [
     ("relay-linear", include_str!("../../systems/relay-linear.toml")),
     ("relay-parabolic", include_str!("../../systems/relay-parabolic.toml")),
     ("stick-slip", include_str!("../../systems/stick-slip.toml")),
+    ("dry-friction", include_str!("../../systems/dry-friction.toml")),
+    ("friction-pair", include_str!("../../systems/friction-pair.toml")),
+    ("relay-third-order", include_str!("../../systems/relay-third-order.toml")),
+    ("chua", include_str!("../../systems/chua.toml")),
+    ("buck", include_str!("../../systems/buck.toml")),
+    ("gene-switch", include_str!("../../systems/gene-switch.toml")),
+    ("fused-focus", include_str!("../../systems/fused-focus.toml")),
 ];
 
 /// The names of the built-in systems.

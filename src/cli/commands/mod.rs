@@ -4,12 +4,18 @@ mod bless;
 mod check;
 mod figure;
 mod inspect;
+mod lyapunov;
 mod manual;
+mod new;
+mod orbit;
+mod plot;
 mod published;
 mod report;
 mod run;
+mod scan;
 mod store;
 mod sweep;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -30,12 +36,18 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Run(Box<run::Arguments>),
+    Plot(Box<plot::Arguments>),
+    Orbit(Box<orbit::Arguments>),
+    Lyapunov(Box<lyapunov::Arguments>),
+    Scan(Box<scan::Arguments>),
+    New(new::Arguments),
     Figure(Box<figure::Arguments>),
     Sweep(Box<sweep::Arguments>),
     Check(check::Arguments),
     Bless(bless::Arguments),
     Report(report::Arguments),
     Inspect(inspect::Arguments),
+    Verify(verify::Arguments),
     Store(store::Arguments),
     Completions(manual::Completions),
     Man(manual::Man),
@@ -50,12 +62,18 @@ pub fn main() -> ExitCode {
     };
     let result = match arguments.command {
         Command::Run(arguments) => run::run(&arguments),
+        Command::Plot(arguments) => plot::run(&arguments),
+        Command::Orbit(arguments) => orbit::run(&arguments),
+        Command::Lyapunov(arguments) => lyapunov::run(&arguments),
+        Command::Scan(arguments) => scan::run(&arguments),
+        Command::New(arguments) => new::run(&arguments),
         Command::Figure(arguments) => figure::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Bless(arguments) => bless::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::Verify(arguments) => verify::run(&arguments),
         Command::Store(arguments) => store::run(&arguments),
         Command::Completions(arguments) => manual::completions(&arguments, Arguments::command()),
         Command::Man(arguments) => manual::man(&arguments, Arguments::command()),

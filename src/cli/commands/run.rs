@@ -1,6 +1,7 @@
 //! `twofold run`: any run, not only the paper's.
 
-use std::path::PathBuf;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
@@ -10,17 +11,20 @@ use crate::cli::progress::Progress;
 use crate::cli::speak::{deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::job::parquet::parquet;
-use crate::job::{Desk, JobError, Question, Run, Stop, encode};
+use crate::job::spec::SwitchSpec;
+use crate::job::{self, Desk, JobError, Question, Run, Stop, encode, simulate};
+use crate::record::files::Growing;
 
 /// Compute one run: its path, or with --section its passages through a plane.
 ///
-/// A flag that would have no effect on the run is refused. Ctrl-C keeps what has been computed: on standard output, or beside --out
-/// under the name FILE.part.
+/// CSV is written as it is computed: a run of any length needs little memory. A flag that would have no effect on the run is refused. Ctrl-C
+/// keeps what has been computed: on standard output, or beside --out under the name FILE.part, with a last line that says so.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     twofold run --reading reconstructed --t-end 100 --section y=0\n  \
     twofold run --switch filippov --exit random:exponential:0.5 --t-end 80 --out orbit.csv\n  \
     twofold run --system wheel --t-end 60 --format json --out wheel.json\n  \
+    twofold run --system my.toml --set gain=2 --t-end 1e6 --every 10 --out long.csv\n  \
     fig7 --only ii --reading printed --print-spec | twofold run --spec - --out section.csv")]
 pub struct Arguments {
     #[command(flatten)]
@@ -61,9 +65,14 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     }
     let progress = Progress::with_grace(arguments.quiet);
     let run = Run(spec);
+    let format = arguments.format.unwrap_or(Format::Csv);
+    let funnel = matches!(run.0.switch, SwitchSpec::Filippov { funnel: Some(_), .. });
+    if let (Format::Csv, false) = (format, funnel) {
+        return stream(&run, out, &progress);
+    }
     let answer = Desk::new(None, &progress).ask(&run)?;
     let about = json!({ "kind": run.kind(), "question": run.json(), "stop": answer.stop });
-    let bytes = match arguments.format.unwrap_or(Format::Csv) {
+    let bytes = match format {
         Format::Csv => encode::csv(&answer.tables[0], &about),
         Format::Json => encode::json(&answer, &about),
         Format::Parquet => parquet(&answer.tables[0], &about),
@@ -75,8 +84,73 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     };
     let part = out.filter(|f| !is_standard_output(f)).map(part_of);
     deliver(part.as_deref(), &bytes)?;
-    let place = part.map_or("standard output".to_owned(), |p| p.display().to_string());
     let t: f64 = answer.fact("t").map_err(JobError::from)?;
-    let said = format!("interrupted at t = {t}: the {} rows up to there are in {place}", answer.rows());
-    Err(CliError::Stopped { said, exit })
+    Err(stopped_at(t, answer.rows() as u64, part.as_deref(), exit))
+}
+
+fn stopped_at(t: f64, rows: u64, part: Option<&Path>, exit: Exit) -> CliError {
+    let place = part.map_or("standard output".to_owned(), |p| p.display().to_string());
+    CliError::Stopped { said: format!("interrupted at t = {t}: the {rows} rows up to there are in {place}"), exit }
+}
+
+/// Where rows go as they come.
+enum Rows {
+    File(Growing),
+    Output,
+}
+
+impl Rows {
+    fn append(&mut self, bytes: &[u8]) -> Result<(), CliError> {
+        match self {
+            Rows::File(file) => Ok(file.append(bytes)?),
+            // A reader that went away wants no more.
+            Rows::Output => Ok(io::stdout().lock().write_all(bytes)?),
+        }
+    }
+}
+
+/// CSV as it is computed: memory stays flat, and who reads standard output sees rows as they come. Whether the run came to its end is known
+/// when it has: a last line says if it did not.
+fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, CliError> {
+    let file = out.filter(|f| !is_standard_output(f));
+    let mut rows = match file {
+        Some(file) => Rows::File(Growing::begin(file)?),
+        None => Rows::Output,
+    };
+    let about = json!({ "kind": run.kind(), "question": run.json() });
+    let (mut begun, mut failed) = (false, None);
+    let watch = job::Progress::begin(progress, &run.label(), run.extent());
+    let found = simulate::stream(
+        &run.0,
+        &mut |table| {
+            let mut bytes = if begun { Vec::new() } else { encode::csv_head(table, &about) };
+            begun = true;
+            bytes.extend(encode::csv_rows(table));
+            failed = rows.append(&bytes).err();
+            failed.is_none()
+        },
+        &*watch,
+    );
+    watch.done(
+        &found.as_ref().map_or("failed".to_owned(), |f| format!("{} steps, {} rows", f.statistics.steps, f.rows)),
+    );
+    match failed {
+        Some(CliError::Output(e)) if e.kind() == io::ErrorKind::BrokenPipe => return Ok(Exit::Fine),
+        Some(error) => return Err(error),
+        None => {}
+    }
+    let found = found?;
+    let stopped = if found.stop == Stop::Interrupted { progress.asked_to_stop() } else { None };
+    let Some(exit) = stopped else {
+        if let Rows::File(file) = rows {
+            file.finish(None)?;
+        }
+        return Ok(Exit::Fine);
+    };
+    rows.append(&encode::cut_short(found.stop))?;
+    let part = file.map(part_of);
+    if let Rows::File(file) = rows {
+        file.finish(part.as_deref())?;
+    }
+    Err(stopped_at(found.t, found.rows, part.as_deref(), exit))
 }

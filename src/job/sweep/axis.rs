@@ -353,7 +353,7 @@ impl Axis {
     }
 
     /// The value of index `i`, or the one that `u`, uniform on [0, 1), draws.
-    pub(super) fn value(&self, i: u64, u: f64) -> Entry {
+    pub fn value(&self, i: u64, u: f64) -> Entry {
         let integer = matches!(self.coordinate, Coordinate::Seed | Coordinate::Stream);
         match &self.values {
             Values::Numbers(v) if integer => Entry::Integer(v[i as usize] as i64),

@@ -1,0 +1,99 @@
+//! `twofold lyapunov`: the largest Lyapunov exponent of any system.
+
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use crate::analyse::lyapunov::{Exponent, Settings};
+use crate::cli::flags::{RunFlags, Use};
+use crate::cli::progress::Progress;
+use crate::cli::speak::{deliver, try_delivery};
+use crate::cli::{CliError, Exit};
+use crate::integrate::StepCap;
+use crate::job::{Desk, JobError, LargestExponent, Question, Stop, encode};
+
+/// The largest Lyapunov exponent of the orbit from the start, with its standard error: the mean rate at which a tangent vector grows.
+///
+/// Above zero: neighbours part exponentially. Zero within its error: a closed orbit or a torus. Below: a rest. The error comes from averages
+/// over blocks of the orbit and knows only what the orbit has seen: an orbit that changes its ways once in a long while has a larger one.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    twofold lyapunov --system chua --t-end 5000\n  \
+    twofold lyapunov --reading reconstructed --switch hysteretic --t-end 2000 --format json\n  \
+    twofold lyapunov --system my.toml --set gain=2 --transient 500")]
+pub struct Arguments {
+    #[command(flatten)]
+    flags: RunFlags,
+    /// Time before averaging begins, in which the orbit settles and the vector turns into the fastest direction [default: a tenth of --t-end].
+    #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Exponent")]
+    transient: Option<f64>,
+    /// Output format [default: text].
+    #[arg(long, value_enum)]
+    format: Option<Format>,
+    /// File to write instead of standard output (-).
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// No progress on standard error.
+    #[arg(long)]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Format {
+    /// A line for people.
+    Text,
+    /// Everything.
+    Json,
+}
+
+pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
+    let spec = arguments.flags.spec(Use::Exponent)?;
+    let transient = arguments.transient.unwrap_or(0.1 * spec.t_end);
+    if !(transient >= 0.0 && transient < spec.t_end) {
+        let text = format!("--transient is {transient}: give a time from 0 to below --t-end, {}", spec.t_end);
+        return Err(CliError::Usage(text));
+    }
+    let settings = Settings {
+        tolerance: spec.method.tolerance,
+        max_step: if let StepCap::Absolute(h) = spec.method.step_cap { h } else { f64::INFINITY },
+        transient,
+        duration: spec.t_end - transient,
+        max_steps: spec.method.max_steps,
+        kick: spec.schedule.kick,
+    };
+    let question = LargestExponent { system: spec.system, switch: spec.switch, start: spec.start, settings };
+    let out = arguments.out.as_deref();
+    try_delivery(out)?;
+    let progress = Progress::with_grace(arguments.quiet);
+    let answer = Desk::new(None, &progress).ask(&question)?;
+    if let Ok(failure) = answer.fact::<String>("failure") {
+        return Err(CliError::Job(JobError::Other(failure)));
+    }
+    let found: Exponent = answer.fact("exponent").map_err(JobError::from)?;
+    let bytes = match arguments.format.unwrap_or(Format::Text) {
+        Format::Json => encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() })),
+        Format::Text => {
+            let (value, error) = (found.value, found.standard_error);
+            let meaning = if value > 3.0 * error {
+                "neighbours part"
+            } else if value < -3.0 * error {
+                "neighbours approach"
+            } else {
+                "not told from zero"
+            };
+            let until = transient + found.duration;
+            format!(
+                "{value:.6} +- {error:.1e} per unit time ({meaning}; mean over t = {transient} to {until}, standard error)\n"
+            )
+            .into_bytes()
+        }
+    };
+    deliver(out, &bytes)?;
+    match progress.asked_to_stop() {
+        Some(exit) if answer.stop == Stop::Interrupted => {
+            let until = transient + found.duration;
+            Err(CliError::Stopped { said: format!("interrupted: the mean is over t = {transient} to {until}"), exit })
+        }
+        _ => Ok(Exit::Fine),
+    }
+}

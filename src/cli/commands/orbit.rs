@@ -1,0 +1,219 @@
+//! `twofold orbit`: closed orbits and their stability.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use crate::analyse::floquet::Plane;
+use crate::cli::exit::part_of;
+use crate::cli::flags::{RunFlags, Use};
+use crate::cli::progress::Progress;
+use crate::cli::speak::{deliver, is_standard_output, try_delivery};
+use crate::cli::{CliError, Exit};
+use crate::job::orbit::Along;
+use crate::job::spec::Observation;
+use crate::job::{Answer, ClosedOrbit, Desk, JobError, Question, Stop, encode};
+
+/// Find a closed orbit through a plane by Newton's method, with its period and Floquet multipliers; with --along, follow it as a parameter
+/// changes, through folds, and say where it loses its stability.
+///
+/// The motion from the start settles first (--settle), so that attracting orbits are found without a guess; an orbit that repels needs a near
+/// --start and --settle 0. The discontinuous system's orbits (--switch filippov) may cross the switching surface and slide on it; one that
+/// grazes it, or comes to where its future is a set, has no return map, and that is said.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    twofold orbit --system relay-third-order --switch filippov --section q=0\n  \
+    twofold orbit --system buck --section s=0 --along supply=20..26 --format csv --out branch.csv\n  \
+    twofold orbit --reading reconstructed --section y=0 --start 0.8063,0,-0.0002 --settle 0 --format json")]
+pub struct Arguments {
+    #[command(flatten)]
+    flags: RunFlags,
+    /// Count passages in which the plane's coordinate falls, not rises.
+    #[arg(long, help_heading = "Orbit")]
+    downward: bool,
+    /// Passages per turn [default: as many as the settled motion shows].
+    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Orbit")]
+    returns: Option<usize>,
+    /// Time in which the motion settles before the search; 0: none [default: 200].
+    #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Orbit")]
+    settle: Option<f64>,
+    /// Give up on a return after this time.
+    #[arg(long, value_name = "T", default_value_t = 1000.0, allow_hyphen_values = true, help_heading = "Orbit")]
+    longest_return: f64,
+    /// Follow the orbit along a parameter of the system, or eps, from one value to another, in at least so many steps [default: 40].
+    #[arg(long, value_name = "NAME=FROM..TO[:STEPS]", allow_hyphen_values = true, help_heading = "Orbit")]
+    along: Option<String>,
+    /// Output format [default: text].
+    #[arg(long, value_enum)]
+    format: Option<Format>,
+    /// File to write instead of standard output (-).
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// No progress on standard error.
+    #[arg(long)]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Format {
+    /// For people.
+    Text,
+    /// The orbit's passages, or with --along a row per orbit.
+    Csv,
+    /// Everything.
+    Json,
+}
+
+/// Most orbits of a branch.
+const MOST_ORBITS: usize = 10_000;
+
+pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
+    let spec = arguments.flags.spec(Use::Orbit)?;
+    let Observation::Section { coordinate, value } = spec.observe else {
+        return Err(CliError::Usage(
+            "a spec of an orbit has a section: make one with --section and --print-spec".into(),
+        ));
+    };
+    let settle = arguments.settle.unwrap_or(200.0);
+    for (flag, number, least) in
+        [("--settle", settle, "0 or more"), ("--longest-return", arguments.longest_return, "above 0")]
+    {
+        let good = number.is_finite() && (number > 0.0 || flag == "--settle" && number == 0.0);
+        if !good {
+            return Err(CliError::Usage(format!("{flag} is {number}: give a time {least}")));
+        }
+    }
+    let question = ClosedOrbit {
+        system: spec.system,
+        switch: spec.switch,
+        start: spec.start,
+        settle,
+        plane: Plane { axis: coordinate, value, upward: !arguments.downward },
+        returns: arguments.returns,
+        tolerance: spec.method.tolerance,
+        longest_return: arguments.longest_return,
+        along: arguments.along.as_deref().map(along).transpose()?,
+    };
+    let out = arguments.out.as_deref();
+    try_delivery(out)?;
+    let progress = Progress::with_grace(arguments.quiet);
+    let answer = match Desk::new(None, &progress).ask(&question) {
+        Err(JobError::Interrupted) if progress.asked_to_stop().is_some() => {
+            let exit = progress.asked_to_stop().unwrap_or(Exit::Interrupted);
+            return Err(CliError::Stopped { said: "interrupted before an orbit was found".into(), exit });
+        }
+        other => other?,
+    };
+    let bytes = match arguments.format.unwrap_or(Format::Text) {
+        Format::Text => text(&question, &answer)?.into_bytes(),
+        Format::Csv => {
+            let about = json!({ "kind": question.kind(), "question": question.json(), "facts": answer.facts });
+            encode::csv(answer.table("branch").unwrap_or(&answer.tables[0]), &about)
+        }
+        Format::Json => encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() })),
+    };
+    if answer.stop == Stop::Interrupted
+        && let Some(exit) = progress.asked_to_stop()
+    {
+        let part = out.filter(|f| !is_standard_output(f)).map(part_of);
+        deliver(part.as_deref(), &bytes)?;
+        let place = part.map_or("standard output".to_owned(), |p| p.display().to_string());
+        let rows = answer.table("branch").map_or(0, |t| t.len());
+        return Err(CliError::Stopped {
+            said: format!("interrupted: the {rows} orbits up to there are in {place}"),
+            exit,
+        });
+    }
+    deliver(out, &bytes)?;
+    Ok(Exit::Fine)
+}
+
+/// Reads "alpha=0.05..0.2:40".
+fn along(text: &str) -> Result<Along, CliError> {
+    let wrong = |why: &str| {
+        CliError::Usage(format!(
+            "--along \"{text}\": {why}; give it as NAME=FROM..TO or NAME=FROM..TO:STEPS, such as alpha=0.1..0.2:40"
+        ))
+    };
+    let (name, range) = text.split_once('=').ok_or_else(|| wrong("there is no \"=\""))?;
+    let (range, steps) = match range.rsplit_once(':') {
+        Some((range, steps)) => {
+            let steps: usize = steps.trim().parse().map_err(|_| wrong("what follows \":\" is no number of steps"))?;
+            (range, steps)
+        }
+        None => (range, 40),
+    };
+    let (from, to) = range.split_once("..").ok_or_else(|| wrong("there is no \"..\""))?;
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+    match (number(from), number(to)) {
+        (Some(from), Some(to)) if from != to && steps > 0 && steps <= MOST_ORBITS => {
+            Ok(Along { parameter: name.trim().into(), from, to, steps, most: MOST_ORBITS })
+        }
+        (Some(_), Some(_)) => Err(wrong("two different ends and 1 to 10000 steps are needed")),
+        _ => Err(wrong("its ends are not numbers")),
+    }
+}
+
+/// The answer for people.
+fn text(question: &ClosedOrbit, answer: &Answer) -> Result<String, CliError> {
+    let fact = |e| CliError::Job(JobError::Fact(e));
+    let period: f64 = answer.fact("period").map_err(fact)?;
+    let point: Vec<f64> = answer.fact("point").map_err(fact)?;
+    let multipliers: Vec<[f64; 2]> = answer.fact("multipliers").map_err(fact)?;
+    let rate: Option<f64> = answer.fact("rate").map_err(fact)?;
+    let returns: usize = answer.fact("returns").map_err(fact)?;
+    let names = question.system.coordinates();
+    let plane = format!("{} = {}", names[question.plane.axis], question.plane.value);
+    let mut out = String::new();
+    // Writing to a String cannot fail.
+    let mut line = |label: &str, what: String| {
+        let _ = writeln!(out, "{label:<13} {what}");
+    };
+    let passages = if returns == 1 { "1 passage".to_owned() } else { format!("{returns} passages") };
+    line(
+        "closed orbit",
+        format!("through {plane}, {passages} {}wards a turn", if question.plane.upward { "up" } else { "down" }),
+    );
+    line("period", format!("{period}"));
+    line("point", names.iter().zip(&point).map(|(n, x)| format!("{n} = {x}")).collect::<Vec<_>>().join(", "));
+    let said = |m: &[f64; 2]| if m[1] == 0.0 { format!("{:.9}", m[0]) } else { format!("{:.9} {:+.9} i", m[0], m[1]) };
+    line("multipliers", multipliers.iter().map(said).collect::<Vec<_>>().join(", "));
+    line(
+        "stability",
+        match rate {
+            None => "attracts in finite time (all multipliers are zero)".into(),
+            Some(rate) if rate > 0.0 => format!("attracts, by {rate:.6e} per unit time in the end"),
+            Some(rate) => format!("repels, by {:.6e} per unit time", -rate),
+        },
+    );
+    if let (Some(along), Some(branch)) = (&question.along, answer.table("branch")) {
+        let name = &along.parameter;
+        let values = branch.numbers(name);
+        line(
+            "branch",
+            format!("{} orbits, {name} = {} to {}", values.len(), along.from, values.last().unwrap_or(&along.from)),
+        );
+        line("its end", ended(answer, name));
+        if let Some(table) = answer.table("bifurcations") {
+            for row in 0..table.len() {
+                let change = table.words("change").nth(row).unwrap_or_default().to_owned();
+                let (at, half) = (table.numbers(name)[row], table.numbers("uncertainty")[row]);
+                line(&change, format!("at {name} = {at} +- {half:.1e}"));
+            }
+        }
+    }
+    Ok(out)
+}
+
+fn ended(answer: &Answer, name: &str) -> String {
+    use crate::analyse::branch::End;
+    match answer.fact::<End>("end") {
+        Ok(End::Reached) => "the range's other end".into(),
+        Ok(End::TurnedBack) => format!("it turned back and left the range of {name} where it came in"),
+        Ok(End::Enough) => format!("{MOST_ORBITS} orbits"),
+        Ok(End::Lost(why)) => format!("it cannot be followed further: {why}"),
+        Ok(End::Interrupted) => "interrupted".into(),
+        Err(e) => e.to_string(),
+    }
+}

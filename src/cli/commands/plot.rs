@@ -1,0 +1,257 @@
+//! `twofold plot`: a picture of any run.
+
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+
+use crate::cli::flags::{RunFlags, Use};
+use crate::cli::progress::Progress;
+use crate::cli::speak::{deliver, is_standard_output, try_delivery};
+use crate::cli::{CliError, Exit};
+use crate::draw::plot::{self, Look};
+use crate::job::question::question_hash;
+use crate::job::spec::RunSpec;
+use crate::job::{Answer, Desk, JobError, Run, Stop, encode};
+use crate::paper::wording;
+use crate::record;
+use crate::render::{RenderError, markup, render};
+
+/// Draw a run: its states against time, a phase plane, its path in space, or with --section its passages through a plane. The file's
+/// name says the format: .png (300 dpi), .svg or .pdf.
+///
+/// Axes and labels come from the system; the switching surface h = 0 is drawn where it depends on nothing but the states shown, coloured
+/// by what happens there where they are all the states. The same command makes the same bytes on any machine.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    twofold plot --system stick-slip --switch filippov --exit at-once:plus --t-end 30 --out stick-slip.png\n  \
+    twofold plot --system my.toml --set gain=2 --kind series --axes x,v --out my.svg\n  \
+    twofold plot --reading reconstructed --t-end 2000 --section y=0 --out section.pdf\n  \
+    twofold run --system wheel --t-end 60 --out wheel.csv && twofold plot --from wheel.csv --camera -115,18 --out wheel.png")]
+pub struct Arguments {
+    #[command(flatten)]
+    flags: RunFlags,
+    /// Draw what `twofold run` has written to this file (CSV or JSON) and compute nothing; flags of the run are then refused.
+    #[arg(long, value_name = "FILE", help_heading = "Picture")]
+    from: Option<PathBuf>,
+    /// What is shown [default: section with --section, else by the number of axes that the system suggests].
+    #[arg(long, value_enum, help_heading = "Picture")]
+    kind: Option<Kind>,
+    /// The states on the axes, by name: horizontal, (depth,) vertical; of a series, its panels [default: the system's].
+    #[arg(long, value_name = "X,Y,...", value_delimiter = ',', help_heading = "Picture")]
+    axes: Vec<String>,
+    /// Azimuth and elevation of the camera in degrees, of a picture in space [default: -60,25].
+    #[arg(
+        long,
+        value_name = "AZIMUTH,ELEVATION",
+        value_delimiter = ',',
+        num_args = 1,
+        allow_hyphen_values = true,
+        help_heading = "Picture"
+    )]
+    camera: Option<Vec<f64>>,
+    /// Heading [default: the system's title].
+    #[arg(long, value_name = "TEXT", help_heading = "Picture")]
+    title: Option<String>,
+    /// File to write, or - for standard output (with --format).
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Format, for standard output.
+    #[arg(long, value_enum)]
+    format: Option<Format>,
+    /// No progress on standard error.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// A kind of picture.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Kind {
+    /// States against time, a panel for each.
+    Series,
+    /// One state against another.
+    Plane,
+    /// Three states.
+    Space,
+    /// Passages through a plane (with --section).
+    Section,
+}
+
+impl From<Kind> for plot::Kind {
+    fn from(kind: Kind) -> Self {
+        match kind {
+            Kind::Series => plot::Kind::Series,
+            Kind::Plane => plot::Kind::Plane,
+            Kind::Space => plot::Kind::Space,
+            Kind::Section => plot::Kind::Section,
+        }
+    }
+}
+
+/// A format of pictures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Format {
+    /// Pixels, 300 dpi.
+    Png,
+    /// Vectors, for pages.
+    Svg,
+    /// Vectors, for print.
+    Pdf,
+}
+
+impl Format {
+    /// The format of a picture that is to be written to `out`.
+    pub(super) fn of(out: &Path, given: Option<Self>) -> Result<Self, CliError> {
+        if is_standard_output(out) {
+            return given.ok_or_else(|| {
+                CliError::Usage("--out - names no format: give --format png, --format svg or --format pdf".into())
+            });
+        }
+        if given.is_some() {
+            return Err(CliError::no_effect(
+                "--format",
+                "the file's name says the format; leave it out, or write to standard output (--out -)",
+            ));
+        }
+        let extension = out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+        Self::value_variants().iter().copied().find(|f| f.word() == extension).ok_or_else(|| {
+            CliError::Usage(format!(
+                "--out {}: a picture's name ends in .png, .svg or .pdf, which says what is written",
+                out.display()
+            ))
+        })
+    }
+
+    fn word(self) -> &'static str {
+        match self {
+            Format::Png => "png",
+            Format::Svg => "svg",
+            Format::Pdf => "pdf",
+        }
+    }
+}
+
+/// Draws a sheet and writes it.
+pub(super) fn write(sheet: &crate::render::Sheet, out: &Path, format: Format) -> Result<(), CliError> {
+    let rendered = render(sheet).map_err(|error| match error {
+        RenderError::Text(e) => CliError::Usage(format!("{e}; give another --title")),
+        other => CliError::Job(JobError::Other(other.to_string())),
+    })?;
+    let bytes = match format {
+        Format::Png => rendered.png,
+        Format::Svg => rendered.svg,
+        Format::Pdf => rendered.pdf,
+    };
+    deliver(Some(out), &bytes)
+}
+
+pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
+    let format = Format::of(&arguments.out, arguments.format)?;
+    let recorded = match &arguments.from {
+        Some(file) => {
+            if let Some(flag) = arguments.flags.first_given() {
+                return Err(CliError::no_effect(
+                    flag,
+                    "--from gives a whole run that is computed already; leave one of the two out",
+                ));
+            }
+            Some(recorded(file)?)
+        }
+        None => None,
+    };
+    let spec = match &recorded {
+        Some((spec, _)) => spec.clone(),
+        None => arguments.flags.spec(Use::Picture)?,
+    };
+    let look = look(arguments, &spec)?;
+    let unsuitable = |e: plot::PlotError| CliError::Usage(format!("--kind {}: {e}", look.kind.word()));
+    // Said before anything is computed.
+    plot::axes(&spec, look.kind, &look.axes).map_err(unsuitable)?;
+    try_delivery(Some(&arguments.out))?;
+    let progress = Progress::new(arguments.quiet);
+    let answer = match recorded {
+        Some((_, answer)) => answer,
+        None => (*Desk::new(None, &progress).ask(&Run(spec.clone()))?).clone(),
+    };
+    let mut small_print = small_print(&spec);
+    if answer.stop == Stop::Interrupted {
+        small_print.push("an interrupted run: this is what was computed until then".into());
+    }
+    let sheet = plot::sheet(&spec, &answer, &look, small_print)
+        .map_err(unsuitable)?
+        .provenance("Software", concat!("twofold ", env!("CARGO_PKG_VERSION")))
+        .provenance("Picture", format!("plot-{}", look.kind.word()))
+        .provenance("Reading", "none")
+        .provenance("Method", spec.method.name.name())
+        .provenance("Spec-SHA256", question_hash(&Run(spec.clone())).as_str())
+        .provenance("Data-SHA256", record::Hash::of(&encode::bits(&answer.tables)).as_str());
+    write(&sheet, &arguments.out, format)?;
+    Ok(Exit::Fine)
+}
+
+/// The run in words. The system's title, which stands above the picture, is not said again.
+pub(super) fn small_print(spec: &RunSpec) -> Vec<String> {
+    let mut lines = wording::small_print(None, &[spec]);
+    let title = format!("{}, ", markup::literal(spec.system.definition().title()));
+    if let Some(rest) = lines.first().and_then(|line| line.strip_prefix(&title)).map(str::to_owned) {
+        lines[0] = rest;
+    }
+    lines
+}
+
+/// How the flags want it.
+fn look(arguments: &Arguments, spec: &RunSpec) -> Result<Look, CliError> {
+    let kind = arguments.kind.map_or_else(|| plot::Kind::suiting(spec), Into::into);
+    let names = spec.system.coordinates();
+    let mut axes = Vec::new();
+    for name in &arguments.axes {
+        let Some(i) = names.iter().position(|n| *n == name.trim()) else {
+            return Err(CliError::Usage(format!(
+                "--axes: there is no state \"{name}\"; choose among {}",
+                names.join(", ")
+            )));
+        };
+        if axes.contains(&i) {
+            return Err(CliError::Usage(format!("--axes: \"{name}\" stands there twice")));
+        }
+        axes.push(i);
+    }
+    let camera = match arguments.camera.as_deref() {
+        None => None,
+        Some(_) if kind != plot::Kind::Space => {
+            return Err(CliError::no_effect(
+                "--camera",
+                "only a picture in space has one; leave it out, or give --kind space",
+            ));
+        }
+        Some(&[azimuth, elevation]) if azimuth.is_finite() && elevation.abs() <= 90.0 => Some((azimuth, elevation)),
+        Some(_) => {
+            return Err(CliError::Usage(
+                "--camera: give azimuth and elevation in degrees, the elevation from -90 to 90, such as -60,25".into(),
+            ));
+        }
+    };
+    Ok(Look { kind, axes, camera, title: arguments.title.clone() })
+}
+
+/// A run that `twofold run` has written.
+fn recorded(file: &Path) -> Result<(RunSpec, Answer), CliError> {
+    let wrong = |why: String| {
+        CliError::Usage(format!(
+            "--from {}: {why}; give a file that `twofold run` has written as CSV or JSON",
+            file.display()
+        ))
+    };
+    let bytes = record::files::read(file)?;
+    let (about, answer) = if bytes.first() == Some(&b'{') {
+        encode::from_json(&bytes).map_err(|e| wrong(e.to_string()))?
+    } else {
+        let (heading, table) = encode::from_csv(&bytes).map_err(|e| wrong(e.to_string()))?;
+        let stop = encode::stop_of_csv(&bytes).unwrap_or(Stop::Finished);
+        (heading.about, Answer { stop, ..Answer::of_tables(vec![table]) })
+    };
+    let question = about.get("question").cloned().ok_or_else(|| wrong("it does not say of which run it is".into()))?;
+    let spec: RunSpec =
+        serde_json::from_value(question).map_err(|e| wrong(format!("its question is not a run ({e})")))?;
+    spec.validate().map_err(|e| wrong(format!("its question is wrong ({e})")))?;
+    Ok((spec, answer))
+}

@@ -1,0 +1,63 @@
+//! `twofold verify`: whether a theorem follows from its certificate.
+
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use crate::cli::speak::{harmless, print_json};
+use crate::cli::{CliError, Exit, print};
+use crate::record::files::read_text;
+use crate::verify::{Refused, verify};
+
+/// Check certificates of theorems (proofs/certificates) in exact rational arithmetic.
+///
+/// Shares no code with the programs that made them. Exit code 0: every statement follows from its certificate's enclosures. 1: one does not. 2: a file
+/// cannot be read as a certificate. That the enclosures hold the flow is the prover's part (`make proofs`); here, closed orbits are followed by a
+/// plain integrator and crossings compared with tables computed elsewhere.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  twofold verify proofs/certificates/*.json\n  twofold verify --json sensitivity.json"
+)]
+pub struct Arguments {
+    /// Certificates.
+    #[arg(required = true, value_name = "CERT")]
+    files: Vec<PathBuf>,
+    /// JSON on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
+    let mut exit = Exit::Fine;
+    let mut rows = Vec::new();
+    for file in &arguments.files {
+        let shown = file.display().to_string();
+        match verify(&read_text(file)?) {
+            Ok(v) => {
+                if !arguments.json {
+                    print(&format!("{}: verified", v.theorem))?;
+                    for finding in &v.findings {
+                        print(&format!("  {finding}"))?;
+                    }
+                }
+                rows.push(json!({
+                    "file": shown, "verified": true, "theorem": v.theorem, "statement": v.statement, "findings": v.findings,
+                }));
+            }
+            Err(Refused::Unreadable(why)) => {
+                return Err(CliError::Usage(format!("{shown}: not a certificate: {}", harmless(&why))));
+            }
+            Err(wrong @ Refused::Wrong { .. }) => {
+                exit = Exit::CheckFailed;
+                if !arguments.json {
+                    print(&format!("{}: NOT VERIFIED: {}", shown, harmless(&wrong.to_string())))?;
+                }
+                rows.push(json!({ "file": shown, "verified": false, "why": wrong.to_string() }));
+            }
+        }
+    }
+    if arguments.json {
+        print_json(&rows)?;
+    }
+    Ok(exit)
+}

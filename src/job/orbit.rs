@@ -1,0 +1,410 @@
+//! The question of a closed orbit, and of how it changes with a parameter.
+
+use std::cell::RefCell;
+
+use nalgebra::SVector;
+use serde::Serialize;
+use serde_json::Value;
+
+use super::answer::{Answer, Stop};
+use super::desk::Desk;
+use super::question::{JobError, Question};
+use super::run::Run;
+use super::spec::{Observation, RunSpec, SwitchSpec};
+use super::table::{Column, Entry, Table};
+use crate::analyse::branch::{self, Course, End, Newton, Orbit, ReturnMap};
+use crate::analyse::filippov_return;
+use crate::analyse::floquet::{self, Plane, Returned};
+use crate::integrate::filippov::SlidingFlow;
+use crate::integrate::{Failure, Schedule, Tolerance, Watch};
+use crate::num::elementary::sqrt;
+use crate::num::tape::Program;
+use crate::system::{Bound, Field, System, VectorField};
+
+/// The closed orbit through a plane near a start, by Newton's method, and its branch along a parameter if one is named.
+///
+/// Smoothed and hysteretic systems: the return map's derivative is exact (variational equation). Discontinuous ones: by differences,
+/// through crossings and sliding; grazing and set-valued orbits are refused (see [`filippov_return`]).
+///
+/// Tables: `orbit` (its passages through the plane), `branch` (a row per orbit) and `bifurcations` if a parameter is followed. Facts: `period`,
+/// `multipliers` (real, imaginary), `largest_modulus`, `rate`, `residual`, `iterations`, `returns`, `point`; `end` of the branch.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ClosedOrbit {
+    /// The system.
+    pub system: System,
+    /// The switch.
+    pub switch: SwitchSpec,
+    /// Where to begin.
+    pub start: Vec<f64>,
+    /// How the motion settles before Newton's method begins, at most until this time; 0: not at all.
+    pub settle: f64,
+    /// The plane.
+    pub plane: Plane,
+    /// Passages per turn in the plane's direction; none: as many as the settled motion shows.
+    pub returns: Option<usize>,
+    /// Local error of the orbit and its tangent vectors.
+    pub tolerance: Tolerance,
+    /// Give up on a return after this time.
+    pub longest_return: f64,
+    /// The parameter to follow it along.
+    pub along: Option<Along>,
+}
+
+/// A parameter, and from where to where.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Along {
+    /// Its name: one of the system's, or `eps`.
+    pub parameter: String,
+    /// Where the first orbit is looked for.
+    pub from: f64,
+    /// The other end.
+    pub to: f64,
+    /// Steps that the range is divided into, at least.
+    pub steps: usize,
+    /// Most orbits.
+    pub most: usize,
+}
+
+/// Largest |P(u) - u| that counts as closed, in tolerances; and never less than [`LEAST_CLOSED`].
+const CLOSED: f64 = 100.0;
+const LEAST_CLOSED: f64 = 1e-10;
+/// Newton iterations.
+const ITERATIONS: usize = 30;
+/// Most returns that are looked for in a settled motion.
+const MOST_RETURNS: usize = 32;
+/// Two passages this near, in shares of their size, are taken for one when returns are counted: Newton's method then decides.
+const SAME_PASSAGE: f64 = 1e-3;
+/// Systems with up to so many states; a hysteretic switch adds one.
+const MOST_STATES: usize = 8;
+
+impl Question for ClosedOrbit {
+    fn kind(&self) -> &'static str {
+        "closed-orbit"
+    }
+
+    fn json(&self) -> Value {
+        serde_json::to_value(self).expect("questions are plain data")
+    }
+
+    fn label(&self) -> String {
+        match &self.along {
+            Some(along) => format!("closed orbits along {}", along.parameter),
+            None => "closed orbit".into(),
+        }
+    }
+
+    fn cost(&self) -> f64 {
+        let members = self.along.as_ref().map_or(1.0, |a| 3.0 * a.steps as f64);
+        10.0 * (self.settle + members * 50.0)
+    }
+
+    fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+        self.validate()?;
+        let (guess, returns) = self.guess(desk)?;
+        let map = Map { question: self, returns, failure: RefCell::new(None) };
+        let newton = Newton {
+            closed: (CLOSED * self.tolerance.atol.max(self.tolerance.rtol)).max(LEAST_CLOSED),
+            iterations: ITERATIONS,
+        };
+        let value = self.along.as_ref().map_or(0.0, |a| a.from);
+        let first = branch::closed_orbit(&map, &guess, value, newton).map_err(|why| map.error(why))?;
+        let mut answer = self.facts(&first, returns);
+        let Some(along) = &self.along else { return Ok(answer) };
+        let course =
+            Course { from: along.from, to: along.to, longest: 1.0 / along.steps as f64, most: along.most, newton };
+        let width = (along.to - along.from).abs();
+        let mut go_on = |orbit: &Orbit| watch.reached(((orbit.parameter - along.from) / width).abs().min(1.0));
+        let found = branch::follow(&map, first, &course, &mut go_on);
+        if found.end == End::Interrupted {
+            answer.stop = Stop::Interrupted;
+        }
+        answer.tables.push(self.branch_table(&found.orbits));
+        let mut table = Table::new(
+            "bifurcations",
+            [Column::words("change"), Column::numbers(&along.parameter), Column::numbers("uncertainty")],
+        );
+        for b in &found.bifurcations {
+            table.push([b.change.word().into(), b.parameter.into(), b.uncertainty.into()]);
+        }
+        answer.tables.push(table);
+        Ok(answer.with_fact("end", &found.end))
+    }
+}
+
+impl ClosedOrbit {
+    fn validate(&self) -> Result<(), JobError> {
+        let wrong = |why: String| Err(JobError::Other(why));
+        let n = self.system.dimension();
+        if n < 2 || n > MOST_STATES {
+            return wrong(format!("closed orbits are looked for in systems of 2 to {MOST_STATES} states, not of {n}"));
+        }
+        if self.plane.axis >= n {
+            return wrong(format!("the plane's coordinate is state {} of {n}", self.plane.axis + 1));
+        }
+        if let Some(along) = &self.along {
+            self.at(along.from)?;
+            self.at(along.to)?;
+            if along.from == along.to || along.steps == 0 {
+                return wrong(format!(
+                    "{} goes from {} to {}: give two ends and at least one step",
+                    along.parameter, along.from, along.to
+                ));
+            }
+        }
+        if self.returns == Some(0) {
+            return wrong("a closed orbit crosses its plane at least once per turn: ask for one return or more".into());
+        }
+        Ok(())
+    }
+
+    /// System and switch at a value of the parameter.
+    fn at(&self, value: f64) -> Result<(System, SwitchSpec), JobError> {
+        let Some(along) = &self.along else { return Ok((self.system.clone(), self.switch)) };
+        if along.parameter == "eps" && self.system.parameter("eps").is_none() {
+            let switch = match self.switch {
+                SwitchSpec::Smoothed { transition, .. } if value > 0.0 => {
+                    SwitchSpec::Smoothed { eps: value, transition }
+                }
+                SwitchSpec::Hysteretic { eps_prime, relaxation, phi0, .. } if value > 0.0 => {
+                    SwitchSpec::Hysteretic { eps: value, eps_prime, relaxation, phi0 }
+                }
+                SwitchSpec::Filippov { .. } => {
+                    return Err(JobError::Other("the discontinuous system has no eps to follow".into()));
+                }
+                _ => return Err(JobError::Other(format!("eps = {value}: it is above 0"))),
+            };
+            return Ok((self.system.clone(), switch));
+        }
+        let system = self.system.clone().with(&along.parameter, value).map_err(|e| JobError::Other(e.to_string()))?;
+        Ok((system, self.switch))
+    }
+
+    /// Where Newton's method begins, in the equation's states, and the number of returns.
+    fn guess(&self, desk: &Desk<'_>) -> Result<(Vec<f64>, usize), JobError> {
+        let (system, switch) = self.at(self.along.as_ref().map_or(0.0, |a| a.from))?;
+        let mut point = self.start.clone();
+        let mut returns = self.returns;
+        if self.settle > 0.0 {
+            let spec = RunSpec {
+                system: system.clone(),
+                switch,
+                start: self.start.clone(),
+                t_end: self.settle,
+                method: super::spec::MethodSpec {
+                    name: super::spec::Method::Dopri5,
+                    tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
+                    step_cap: crate::integrate::StepCap::None,
+                    max_steps: super::spec::DEFAULT_MAX_STEPS,
+                },
+                schedule: Schedule::default(),
+                observe: Observation::Section { coordinate: self.plane.axis, value: self.plane.value },
+            };
+            let settled = desk.ask(&Run(spec))?;
+            if settled.stop == Stop::Interrupted {
+                return Err(JobError::Interrupted);
+            }
+            let section = settled.table("section").ok_or_else(|| JobError::Other("a section was asked for".into()))?;
+            let columns: Vec<&[f64]> = system.coordinates().iter().map(|name| section.numbers(name)).collect();
+            let wanted = if self.plane.upward { "up" } else { "down" };
+            let rows: Vec<usize> =
+                section.words("direction").enumerate().filter(|(_, w)| *w == wanted).map(|(row, _)| row).collect();
+            let state = |row: usize| columns.iter().map(|c| c[row]).collect::<Vec<f64>>();
+            let Some(last) = rows.last() else {
+                return Err(JobError::Other(format!(
+                    "the motion from the start does not pass the plane {}wards within t = {}: choose another plane or start, or \
+                     let it settle for longer",
+                    wanted, self.settle
+                )));
+            };
+            point = state(*last);
+            let size = 1.0 + point.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
+            let near = |row: usize| {
+                let d = state(row).iter().zip(&point).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+                sqrt(d) < SAME_PASSAGE * size
+            };
+            returns =
+                returns.or_else(|| (1..=MOST_RETURNS.min(rows.len() - 1)).find(|k| near(rows[rows.len() - 1 - k])));
+        }
+        point[self.plane.axis] = self.plane.value;
+        if let SwitchSpec::Hysteretic { .. } = switch {
+            let mut h = [f64::NAN];
+            Program::new(&system.tape().select([0])).evaluate(&point, &mut h);
+            point.push(if h[0] > 0.0 { 1.0 } else { 0.0 });
+        }
+        Ok((point, returns.unwrap_or(1)))
+    }
+
+    /// States of the equation: a hysteretic switch has one more.
+    fn states(&self) -> usize {
+        self.system.dimension() + usize::from(matches!(self.switch, SwitchSpec::Hysteretic { .. }))
+    }
+
+    fn names(&self) -> Vec<String> {
+        let mut names: Vec<String> = self.system.coordinates().into_iter().map(Into::into).collect();
+        if self.states() > names.len() {
+            names.push(if names.iter().any(|n| n == "phi") { "phi_".into() } else { "phi".into() });
+        }
+        names
+    }
+
+    fn facts(&self, orbit: &Orbit, returns: usize) -> Answer {
+        let names = self.names();
+        let columns = names.iter().map(|n| Column::numbers(n)).chain([Column::words("direction")]);
+        let mut table = Table::new("orbit", columns);
+        let (here, there) = if self.plane.upward { ("up", "down") } else { ("down", "up") };
+        for (points, word) in [(&orbit.same, here), (&orbit.opposite, there)] {
+            for point in points {
+                table.push(point.iter().map(|x| Entry::Number(*x)).chain([word.into()]));
+            }
+        }
+        Answer::of_tables(vec![table])
+            .with_fact("period", &orbit.period)
+            .with_fact("point", &orbit.point)
+            .with_fact("multipliers", &orbit.multipliers)
+            .with_fact("largest_modulus", &orbit.largest_modulus())
+            .with_fact("rate", &orbit.rate())
+            .with_fact("residual", &orbit.residual)
+            .with_fact("iterations", &orbit.iterations)
+            .with_fact("returns", &returns)
+    }
+
+    fn branch_table(&self, orbits: &[Orbit]) -> Table {
+        let parameter = self.along.as_ref().map_or("", |a| a.parameter.as_str());
+        let multipliers = orbits.iter().map(|o| o.multipliers.len()).max().unwrap_or(0);
+        let numbered = (1..=multipliers).flat_map(|k| [format!("multiplier{k}_re"), format!("multiplier{k}_im")]);
+        let columns = [Column::numbers(parameter), Column::numbers("period"), Column::words("stability")]
+            .into_iter()
+            .chain(self.names().into_iter().map(|n| Column::numbers(&n)))
+            .chain(numbered.map(|n| Column::numbers(&n)));
+        let mut table = Table::new("branch", columns);
+        for o in orbits {
+            let stability = if o.attracts() { "stable" } else { "unstable" };
+            let mut row: Vec<Entry> = vec![o.parameter.into(), o.period.into(), stability.into()];
+            row.extend(o.point.iter().map(|x| Entry::Number(*x)));
+            row.extend(
+                (0..multipliers).flat_map(|k| o.multipliers.get(k).map_or([f64::NAN; 2], |m| *m).map(Entry::Number)),
+            );
+            table.push(row);
+        }
+        table
+    }
+}
+
+/// The return map of a question's system.
+struct Map<'a> {
+    question: &'a ClosedOrbit,
+    returns: usize,
+    /// An error of the question that a return met: the words of the search do not hide it.
+    failure: RefCell<Option<JobError>>,
+}
+
+impl Map<'_> {
+    fn error(&self, why: String) -> JobError {
+        self.failure.borrow_mut().take().unwrap_or(JobError::Other(why))
+    }
+
+    /// By the variational equation.
+    fn smooth<const N: usize, const M: usize>(&self, field: &Field, u: &[f64]) -> Result<Returned, JobError> {
+        let tangent = field.variational(N).bind::<M>()?;
+        let u = SVector::<f64, N>::from_column_slice(u);
+        let found = floquet::return_map::<N, M, _>(&tangent, self.question.plane, self.returns, &u, &self.settings());
+        found.map_err(|error| match error {
+            floquet::Error::Integration(failure) => JobError::Other(without_tangents(failure, N).to_string()),
+            other => JobError::Other(other.to_string()),
+        })
+    }
+
+    /// Of the discontinuous system.
+    fn discontinuous<const N: usize, const M: usize>(
+        &self,
+        system: &System,
+        u: &[f64],
+        derivative: bool,
+    ) -> Result<Returned, JobError>
+    where
+        for<'b> SlidingFlow<'b, Bound<N>, N>: VectorField<M>,
+    {
+        let u = SVector::<f64, N>::from_column_slice(u);
+        let system = system.bind::<N>()?;
+        filippov_return::return_map(&system, self.question.plane, self.returns, &u, &self.settings(), derivative)
+            .map_err(|e| JobError::Other(e.to_string()))
+    }
+
+    fn settings(&self) -> floquet::Settings {
+        floquet::Settings {
+            tolerance: self.question.tolerance,
+            longest_return: self.question.longest_return,
+            ..floquet::Settings::default()
+        }
+    }
+
+    fn find(&self, u: &[f64], p: f64, derivative: bool) -> Result<Returned, JobError> {
+        let (system, switch) = self.question.at(p)?;
+        let field = match switch {
+            SwitchSpec::Filippov { .. } => {
+                return match u.len() {
+                    2 => self.discontinuous::<2, 3>(&system, u, derivative),
+                    3 => self.discontinuous::<3, 4>(&system, u, derivative),
+                    4 => self.discontinuous::<4, 5>(&system, u, derivative),
+                    5 => self.discontinuous::<5, 6>(&system, u, derivative),
+                    6 => self.discontinuous::<6, 7>(&system, u, derivative),
+                    7 => self.discontinuous::<7, 8>(&system, u, derivative),
+                    8 => self.discontinuous::<8, 9>(&system, u, derivative),
+                    n => Err(JobError::Other(format!("no closed orbits with {n} states"))),
+                };
+            }
+            SwitchSpec::Smoothed { eps, transition } => Field::smoothed(&system, transition, eps),
+            SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. } => {
+                Field::hysteretic(&system, eps, eps_prime, relaxation)
+            }
+        };
+        match u.len() {
+            2 => self.smooth::<2, 6>(&field, u),
+            3 => self.smooth::<3, 12>(&field, u),
+            4 => self.smooth::<4, 20>(&field, u),
+            5 => self.smooth::<5, 30>(&field, u),
+            6 => self.smooth::<6, 42>(&field, u),
+            7 => self.smooth::<7, 56>(&field, u),
+            8 => self.smooth::<8, 72>(&field, u),
+            9 => self.smooth::<9, 90>(&field, u),
+            n => Err(JobError::Other(format!("no closed orbits with {n} states"))),
+        }
+    }
+}
+
+/// A failure that speaks of the orbit alone, not of the tangent vectors beside it.
+fn without_tangents(mut failure: Failure, states: usize) -> Failure {
+    match &mut failure {
+        Failure::NotFinite { state, .. }
+        | Failure::StepUnderflow { state, .. }
+        | Failure::TooManySteps { state, .. }
+        | Failure::NotConverged { state, .. } => state.truncate(states),
+    }
+    failure
+}
+
+impl ReturnMap for Map<'_> {
+    fn states(&self) -> usize {
+        self.question.states()
+    }
+
+    fn axis(&self) -> usize {
+        self.question.plane.axis
+    }
+
+    fn returned(&self, u: &[f64], p: f64, derivative: bool) -> Result<Returned, String> {
+        if !u.iter().all(|x| x.is_finite()) {
+            return Err(format!(
+                "the search left the finite numbers; start nearer ({})",
+                Failure::NotFinite { t: 0.0, state: u.to_vec() }
+            ));
+        }
+        self.find(u, p, derivative).map_err(|error| {
+            let said = error.to_string();
+            if !matches!(error, JobError::Other(_)) {
+                *self.failure.borrow_mut() = Some(error);
+            }
+            said
+        })
+    }
+}

@@ -1,0 +1,259 @@
+//! The commands that look at any system, as a user runs them.
+#![cfg(feature = "cli")]
+#![allow(clippy::disallowed_methods)] // compared with tolerances, not with hashes
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use twofold::render::{decode_png, read_provenance};
+
+fn twofold_in(folder: &Path, arguments: &[&str]) -> (i32, Vec<u8>, String) {
+    let out = Command::cargo_bin("twofold").unwrap().current_dir(folder).args(arguments).output().unwrap();
+    (out.status.code().unwrap(), out.stdout, String::from_utf8(out.stderr).unwrap())
+}
+
+/// Runs a command that must succeed, without a word on standard error.
+fn good(folder: &Path, arguments: &[&str]) -> Vec<u8> {
+    let (code, out, err) = twofold_in(folder, arguments);
+    assert_eq!((code, err.as_str()), (0, ""), "{arguments:?}");
+    out
+}
+
+/// Runs a command that must be refused with words that hold all of `expected`.
+fn refused(folder: &Path, arguments: &[&str], code: i32, expected: &[&str]) {
+    let (found, out, err) = twofold_in(folder, arguments);
+    assert_eq!(found, code, "{arguments:?}: {err}");
+    assert!(out.is_empty(), "{arguments:?}");
+    for words in expected {
+        assert!(err.contains(words), "{arguments:?}: no {words:?} in {err}");
+    }
+}
+
+#[test]
+fn every_kind_of_picture_of_every_switch() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let filippov = ["--switch", "filippov", "--exit", "after-time:0.3:plus", "--t-end", "20"];
+    let smoothed = ["--t-end", "20"];
+    let hysteretic = ["--switch", "hysteretic", "--t-end", "5"];
+    for (s, switch) in [&filippov[..], &smoothed, &hysteretic].iter().enumerate() {
+        for (kind, more) in [
+            ("series", &["--axes", "z,x"][..]),
+            ("plane", &[]),
+            ("space", &["--camera", "-40,10"]),
+            ("section", &["--section", "y=0"]),
+        ] {
+            let file = format!("{s}-{kind}.png");
+            let all = [&["plot", "--quiet", "--kind", kind, "--out", &file][..], switch, more].concat();
+            good(at, &all);
+            let bytes = fs::read(at.join(&file)).unwrap();
+            // A blank picture has one colour.
+            let pixels = decode_png(&bytes).unwrap();
+            let mut colours: Vec<_> = pixels.rgb.chunks(3).collect();
+            colours.sort();
+            colours.dedup();
+            assert!(colours.len() > 20, "{file}: {} colours", colours.len());
+            let provenance = read_provenance(&bytes).unwrap();
+            assert!(provenance.intact, "{file}");
+            // The same bytes again.
+            good(at, &all);
+            assert_eq!(fs::read(at.join(&file)).unwrap(), bytes);
+        }
+    }
+}
+
+#[test]
+fn formats_by_name_and_recorded_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let run = [
+        "--system",
+        "stick-slip",
+        "--switch",
+        "filippov",
+        "--exit",
+        "at-once:plus",
+        "--t-end",
+        "12",
+        "--chord",
+        "1e-3",
+    ];
+    for (file, magic) in [("a.svg", "<?xml"), ("a.PDF", "%PDF")] {
+        good(at, &[&["plot", "--quiet", "--out", file][..], &run].concat());
+        assert!(fs::read(at.join(file)).unwrap().starts_with(magic.as_bytes()), "{file}");
+    }
+    let direct = good(at, &[&["plot", "--quiet", "--out", "-", "--format", "svg"][..], &run].concat());
+    assert_eq!(direct, fs::read(at.join("a.svg")).unwrap());
+    for format in ["csv", "json"] {
+        let file = format!("run.{format}");
+        good(at, &[&["run", "--quiet", "--format", format, "--out", &file][..], &run].concat());
+        good(at, &["plot", "--quiet", "--from", &file, "--out", "b.png"]);
+        assert!(fs::read(at.join("b.png")).unwrap().starts_with(b"\x89PNG"));
+    }
+    let text = String::from_utf8(direct).unwrap();
+    assert!(text.contains("A block on a moving belt"), "the heading is not in the picture's title");
+}
+
+#[test]
+fn pictures_that_cannot_be_are_refused_with_reasons() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("other.csv"), "a,b\n1,2\n").unwrap();
+    let plot = |more: &[&str], code: i32, expected: &[&str]| {
+        refused(at, &[&["plot", "--quiet", "--t-end", "3"][..], more].concat(), code, expected);
+    };
+    plot(&["--out", "a.jpg"], 2, &[".png, .svg or .pdf"]);
+    plot(&["--out", "a.png", "--format", "svg"], 2, &["--format has no effect"]);
+    plot(&["--out", "-"], 2, &["--format png"]);
+    plot(&["--out", "a.png", "--kind", "section"], 2, &["--section y=0"]);
+    plot(&["--out", "a.png", "--kind", "plane", "--section", "y=0"], 2, &["leave out --section"]);
+    plot(&["--out", "a.png", "--axes", "x,q"], 2, &["no state \"q\"", "x, y, z"]);
+    plot(&["--out", "a.png", "--axes", "x,y,x"], 2, &["stands there twice"]);
+    plot(&["--out", "a.png", "--kind", "plane", "--axes", "x"], 2, &["two axes", "1 given"]);
+    plot(&["--out", "a.png", "--kind", "plane", "--camera", "1,2"], 2, &["--camera has no effect"]);
+    plot(&["--out", "a.png", "--camera", "1,200"], 2, &["elevation"]);
+    plot(
+        &["--out", "a.png", "--system", "stick-slip", "--kind", "space"],
+        2,
+        &["shows 3 states, and the system has 2"],
+    );
+    plot(&["--out", "a.png", "--from", "other.csv"], 2, &["--t-end has no effect", "--from"]);
+    refused(at, &["plot", "--from", "other.csv", "--out", "a.png"], 2, &["other.csv", "twofold run"]);
+    refused(at, &["plot", "--out", "nowhere/a.png"], 2, &["nowhere"]);
+    assert_eq!(fs::read_dir(at).unwrap().count(), 1, "something was written");
+}
+
+#[test]
+fn parameters_that_make_no_sense_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, value) in [("m", "0"), ("j", "-1"), ("v_c", "0")] {
+        let set = format!("{name}={value}");
+        refused(folder.path(), &["run", "--system", "wheel", "--set", &set], 2, &["--set", "above 0", name]);
+    }
+}
+
+/// The commands of docs/systems.md, in one folder, in order: each must succeed.
+#[test]
+fn every_command_of_the_manual_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = include_str!("../docs/systems.md");
+    let mut inside = false;
+    let mut count = 0;
+    for line in text.lines() {
+        if line.starts_with("```") {
+            inside = line == "```console";
+        } else if inside && let Some(command) = line.strip_prefix("$ twofold ") {
+            let mut arguments: Vec<&str> = command.split_whitespace().collect();
+            if !["new"].contains(&arguments[0]) {
+                arguments.push("--quiet");
+            }
+            let (code, out, err) = twofold_in(folder.path(), &arguments);
+            assert_eq!((code, err.as_str()), (0, ""), "{command}");
+            if let Some(at) = arguments.iter().position(|a| *a == "--out") {
+                assert!(folder.path().join(arguments[at + 1]).metadata().unwrap().len() > 100, "{command}");
+            } else {
+                assert!(!out.is_empty(), "{command}");
+            }
+            count += 1;
+        }
+    }
+    assert!(count >= 15, "{count} commands");
+    // The error that the page shows.
+    let file = folder.path().join("my.toml");
+    let changed = fs::read_to_string(&file).unwrap().replace("pull - friction", "pull - frictoin");
+    fs::write(&file, changed).unwrap();
+    let (code, _, err) = twofold_in(folder.path(), &["run", "--system", "my.toml"]);
+    let shown = text.split("```text\n").nth(1).unwrap().split("```").next().unwrap();
+    assert_eq!((code, err.as_str()), (2, shown));
+}
+
+#[test]
+fn a_new_file_is_never_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    good(at, &["new", "a.toml"]);
+    fs::write(at.join("a.toml"), "mine").unwrap();
+    refused(at, &["new", "a.toml"], 2, &["there already", "--force"]);
+    assert_eq!(fs::read_to_string(at.join("a.toml")).unwrap(), "mine");
+    good(at, &["new", "a.toml", "--force", "--from", "wheel"]);
+    assert_eq!(fs::read_to_string(at.join("a.toml")).unwrap(), twofold::system::library::text("wheel").unwrap());
+    refused(at, &["new", "b.txt"], 2, &[".toml"]);
+    refused(at, &["new", "b.toml", "--from", "whel"], 2, &["did you mean wheel?"]);
+    refused(at, &["new", "-", "--force"], 2, &["--force has no effect"]);
+    let template = good(at, &["new", "-"]);
+    let text = String::from_utf8(template).unwrap();
+    let definition = twofold::system::Definition::from_toml(&text, "template").unwrap_or_else(|e| panic!("{e}"));
+    assert!(definition.start().is_some());
+}
+
+#[test]
+fn orbits_and_exponents_say_what_is_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let orbit = |more: &[&str], code: i32, expected: &[&str]| {
+        refused(at, &[&["orbit", "--quiet"][..], more].concat(), code, expected);
+    };
+    orbit(&[], 2, &["--section y=0"]);
+    orbit(&["--section", "y=0", "--t-end", "5"], 2, &["--t-end has no effect", "--settle"]);
+    orbit(&["--section", "y=0", "--along", "alpha"], 2, &["no \"=\"", "alpha=0.1..0.2:40"]);
+    orbit(&["--section", "y=0", "--along", "alhpa=1..2"], 3, &["alhpa", "did you mean `alpha`?"]);
+    orbit(&["--section", "y=0", "--settle", "-1"], 2, &["--settle is -1"]);
+    orbit(&["--system", "gene-switch", "--section", "q=5"], 3, &["does not pass the plane"]);
+    // The caricature's orbits come to the two-fold: no return map through it.
+    let two_fold = ["--switch", "filippov", "--section", "x=-0.05", "--settle", "0", "--start", "-0.05,0.3,0.3"];
+    let (code, _, err) = twofold_in(at, &[&["orbit", "--quiet"][..], &two_fold].concat());
+    assert!(code == 3 && (err.contains("many futures") || err.contains("did not return")), "{err}");
+    let exponent =
+        |more: &[&str], expected: &[&str]| refused(at, &[&["lyapunov", "--quiet"][..], more].concat(), 2, expected);
+    exponent(&["--switch", "filippov"], &["no tangent flow", "--switch smoothed"]);
+    exponent(&["--section", "y=0"], &["--section has no effect"]);
+    exponent(&["--t-end", "10", "--transient", "10"], &["--transient is 10"]);
+    let out = good(at, &["lyapunov", "--quiet", "--system", "relay-third-order", "--t-end", "300", "--format", "json"]);
+    let json: serde_json::Value = serde_json::from_slice(&out).unwrap();
+    // On a closed orbit the largest exponent is that along it, zero.
+    let exponent = json["facts"]["exponent"]["value"].as_f64().unwrap();
+    assert!(exponent.abs() < 1e-2, "{exponent}");
+}
+
+#[test]
+fn streamed_rows_are_those_of_the_whole_and_thin_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let filippov = ["--switch", "filippov", "--exit", "random:exponential:0.5"];
+    for more in [
+        &[][..],
+        &["--section", "y=0"],
+        &filippov,
+        &["--every", "0.01"],
+        &[&filippov[..], &["--every", "0.01"]].concat(),
+    ] {
+        let run = [&["run", "--quiet", "--t-end", "150"][..], more].concat();
+        let streamed = good(at, &run);
+        good(at, &[&run[..], &["--format", "json", "--out", "whole.json"]].concat());
+        let bytes = fs::read(at.join("whole.json")).unwrap();
+        let (_, answer) = twofold::job::encode::from_json(&bytes).unwrap();
+        let (heading, table) = twofold::job::encode::from_csv(&streamed).unwrap();
+        assert_eq!(table, answer.tables[0], "{more:?}");
+        assert!(heading.about["question"]["t_end"] == 150.0, "{more:?}");
+        // To a file the same bytes.
+        good(at, &[&run[..], &["--out", "run.csv"]].concat());
+        assert_eq!(fs::read(at.join("run.csv")).unwrap(), streamed, "{more:?}");
+    }
+    let thin = good(at, &["run", "--quiet", "--t-end", "20000", "--every", "1000", "--method", "dopri5"]);
+    let (_, table) = twofold::job::encode::from_csv(&thin).unwrap();
+    assert_eq!(table.numbers("t"), (0..=20).map(|k| f64::from(k) * 1000.0).collect::<Vec<_>>());
+    refused(at, &["run", "--every", "1", "--chord", "0.1"], 2, &["--chord has no effect"]);
+    refused(at, &["run", "--every", "1", "--section", "y=0"], 2, &["--every has no effect"]);
+    refused(at, &["run", "--every", "0"], 2, &["--every is 0"]);
+}
+
+/// `make gallery` draws every system that ships.
+#[test]
+fn the_gallery_is_whole() {
+    let script = include_str!("../scripts/gallery.sh");
+    let drawn: Vec<&str> = script.lines().filter_map(|l| l.trim().strip_prefix("plot ")?.split(' ').next()).collect();
+    for name in twofold::system::library::names() {
+        assert!(drawn.contains(&name), "{name}");
+    }
+}
