@@ -47,8 +47,8 @@ READINGS := --over params.alpha=1e-3,0.1
 CELLS := --over params.alpha=1e-3..1:log:7 --over params.beta=1e-6..1e-3:log:7
 census: ## go on with the census, the audit and the basins (hours; Ctrl-C keeps what is finished, and the next call goes on)
 	@$(CARGO) build --release --locked --bin twofold
-	@$(SWEEP) --t-end 1e4 --method dopri5 --over start.x=-60..60:41 --over start.y=0 --over start.z=-60..60:41 --out figures/basin/printed.parquet
-	@$(SWEEP) --t-end 1e4 --method dopri5 --reading reconstructed --over start.x=-3..3:41 --over start.y=0 --over start.z=-3..3:41 --out figures/basin/reconstructed.parquet
+	@$(SWEEP) --t-end 1e4 --method dopri5 --over start.x=-60..60:25 --over start.y=0 --over start.z=-60..60:25 --out figures/basin/printed.parquet
+	@$(SWEEP) --t-end 1e4 --method dopri5 --reading reconstructed --over start.x=-3..3:25 --over start.y=0 --over start.z=-3..3:25 --out figures/basin/reconstructed.parquet
 	@$(SWEEP) --t-end 2e5 $(READINGS) --over interval=20,40,100 $(STARTS) --random 300 --out figures/census/fig7.parquet
 	@$(SWEEP) --t-end 2e5 $(READINGS) --restart 100 --over sigma=0.01,0.1,0.13 $(STARTS) --random 300 --out figures/census/fig8.parquet
 	@$(SWEEP) --t-end 2e5 --restart 100 --over params.alpha=0.1 --over method=dopri5,radau5 $(STARTS) --random 100 --out figures/census/methods.parquet

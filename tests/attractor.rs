@@ -337,7 +337,8 @@ fn standard(n: usize, start: f64, kick: f64, stream: u64) -> Vec<[f64; 2]> {
         .map(|_| {
             p = (p + 1.8 / tau * (tau * x).sin()).rem_euclid(1.0);
             x = (x + p + kick * r.normal()).rem_euclid(1.0);
-            [x, p]
+            // Shifted, so that the largest island does not lie across the edge.
+            [x, (p + 0.5).rem_euclid(1.0)]
         })
         .collect()
 }
@@ -346,8 +347,10 @@ fn standard(n: usize, start: f64, kick: f64, stream: u64) -> Vec<[f64; 2]> {
 fn kicked_sections_keep_less_structure_the_harder_the_kicks() {
     let free: Vec<Vec<SectionPoint>> =
         (0..4).map(|k| sequence(standard(30_000, 0.01 + 1e-6 * f64::from(k), 0.0, 0))).collect();
+    // Many short runs: in a single one chance decides how long it stays in an island.
     let contrast = |kick: f64| {
-        let kicked = sequence(standard(10_000, 0.02, kick, 1));
+        let runs = (0..100_u32).flat_map(|k| standard(100, 0.02 + 1e-4 * f64::from(k), kick, u64::from(k)));
+        let kicked = sequence(runs);
         let question = Question { kicked: true, reference: Some(&free), ..Question::default() };
         let Verdict::Noisy { contrast, around: None } = classify(&kicked, &question, &Thresholds::default()).verdict
         else {
@@ -355,11 +358,11 @@ fn kicked_sections_keep_less_structure_the_harder_the_kicks() {
         };
         contrast.unwrap()
     };
-    let found = [0.0, 1e-3, 5e-3, 0.1].map(contrast);
+    let found = [0.0, 0.02, 0.1, 0.3].map(contrast);
     let values = found.map(|c| c.value);
     assert!(values[0] > 0.95 && found[0].free[0] > 0.9, "{found:?}");
-    assert!(values.windows(2).all(|w| w[1] < w[0] + 0.05) && values[2] < values[0] - 0.1, "{values:?}");
-    assert!(values[3] < 0.15, "{values:?}");
+    // A program outside this project gives 0.75 to 0.85, 0.05 to 0.23 and 0.02, by the seed.
+    assert!((values[1] - 0.8).abs() < 0.15 && (values[2] - 0.14).abs() < 0.2 && values[3].abs() < 0.15, "{found:?}");
 }
 
 #[test]

@@ -129,7 +129,7 @@ fn relay_linear_slides_exponentially() {
 #[test]
 fn relay_parabolic_chatters_geometrically() {
     let s = system("relay-parabolic");
-    let times: Vec<f64> = events(&run(&s, FILIPPOV, 3.5, Observation::Path { chord: 1e-3 }), &s, "crossing")
+    let times: Vec<f64> = events(&run(&s, FILIPPOV, 5.2, Observation::Path { chord: 1e-3 }), &s, "crossing")
         .iter()
         .map(|e| e.0)
         .collect();
@@ -307,7 +307,7 @@ fn gene_switch_settles_on_its_threshold() {
 fn fused_focus_attracts_algebraically_and_bears_a_cycle() {
     let c = -0.3;
     let s = system("fused-focus");
-    let crossings = events(&run(&s, FILIPPOV, 400.0, Observation::Path { chord: 1e-2 }), &s, "crossing");
+    let crossings = events(&run(&s, FILIPPOV, 110.0, Observation::Path { chord: 1e-2 }), &s, "crossing");
     let rho: Vec<f64> = crossings.iter().filter(|(_, x)| x[0] < 0.0).map(|(_, x)| -x[0]).collect();
     assert!(rho.len() > 50, "{}", rho.len());
     let n = rho.len();
@@ -329,4 +329,25 @@ fn fused_focus_attracts_algebraically_and_bears_a_cycle() {
     assert!((m[0][0] - (1.0 + 4.0 * c * rho / 3.0)).abs() < 0.02, "{m:?}");
     let mode = path(&run(&s, FILIPPOV, 5.0, Observation::Times { every: 0.5 }), "t");
     assert_eq!(mode.len(), 11);
+}
+
+/// A limit cycle of radius one beside a surface y = level: apart from it Newton's method finds the cycle; where it touches there is no
+/// derivative, and through a two-fold no map.
+#[test]
+fn grazing_and_set_valued_orbits_are_refused() {
+    let text = "states = ['x', 'y']\nstart = [1, 0]\nh = 'y - level'\nplus = ['g*x - y + 1', 'g*y + x - 1']\nminus = ['g*x - y', 'g*y + x']\n\
+                [parameters]\nlevel = 1.2\n[let]\ng = '1 - x^2 - y^2'";
+    let s = System::new(twofold::system::Definition::from_toml(text, "cycle.toml").unwrap_or_else(|e| panic!("{e}")));
+    let found = ask(&orbit(&s, FILIPPOV, 1, 0.0));
+    let (period, m): (f64, Vec<[f64; 2]>) = (found.fact("period").unwrap(), found.fact("multipliers").unwrap());
+    assert!((period - 2.0 * PI).abs() < 1e-8 && (m[0][0] - (-4.0 * PI).exp()).abs() < 1e-6, "{period} {m:?}");
+    let refused = |s: &System, axis: usize, start: &[f64]| {
+        let question = ClosedOrbit { start: start.to_vec(), ..orbit(s, FILIPPOV, axis, 0.0) };
+        Desk::quiet().ask(&question).unwrap_err().to_string()
+    };
+    let grazing = refused(&s.clone().with("level", 1.0).unwrap(), 1, &[1.0, 0.0]);
+    assert!(grazing.contains("grazes"), "{grazing}");
+    // From the attracting region of the two-fold, into it.
+    let set_valued = refused(&system("two-fold"), 2, &[0.0, 0.1, 0.0]);
+    assert!(set_valued.contains("many futures") || set_valued.contains("did not return"), "{set_valued}");
 }

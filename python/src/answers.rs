@@ -91,7 +91,7 @@ pub fn written(py: Python<'_>, text: &str, format: &str, show: Option<&Bound<'_,
         let run = Run(spec);
         let answer = ask(run.0.clone(), work)?;
         let about = json!({ "kind": run.kind(), "question": run.json(), "stop": answer.stop });
-        Ok(if as_csv { encode::csv(&answer.tables[0], &about) } else { encode::json(&answer, &about) })
+        Ok(if as_csv { encode::csv_of_run(&run, &answer) } else { encode::json(&answer, &about) })
     })
 }
 

@@ -26,7 +26,9 @@ pub fn definition(text: String) -> PyErr {
 /// A parameter that is wrong.
 pub fn parameter(problem: &WrongParameter) -> PyErr {
     let name = match problem {
-        WrongParameter::Unknown { name, .. } | WrongParameter::NotFinite { name, .. } => name.clone(),
+        WrongParameter::Unknown { name, .. }
+        | WrongParameter::OutOfBounds { name, .. }
+        | WrongParameter::NotFinite { name, .. } => name.clone(),
     };
     ParameterError::new_err((problem.to_string(), name))
 }

@@ -29,7 +29,8 @@ mod _native {
         module.add("VERSION", env!("CARGO_PKG_VERSION"))?;
         // The digest of the sources that numbers depend on.
         module.add("NUMERICS", NUMERICS)?;
-        module.add("DEFAULT_TOLERANCE", MethodSpec::ndsolve_defaults(Method::Dopri5).tolerance.rtol)?;
+        module.add("DEFAULT_TOLERANCE", MethodSpec::defaults(Method::Dopri5).tolerance.rtol)?;
+        module.add("DEFAULT_TOLERANCE_EXTENDED", MethodSpec::defaults(Method::TaylorExtended).tolerance.rtol)?;
         module.add("DEFAULT_MAX_STEPS", DEFAULT_MAX_STEPS)
     }
 }

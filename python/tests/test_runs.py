@@ -27,6 +27,13 @@ def test_a_path(caricature):
     np.testing.assert_allclose((run.y[:, i] - run.y[:, 0]) / run.t[i], plus, atol=0.1)
 
 
+def test_points_at_fixed_times(caricature):
+    run = twofold.solve(caricature, START, 10.0, every=0.5)
+    np.testing.assert_array_equal(run.t, np.arange(21) * 0.5)
+    sliding = twofold.solve(caricature, START, 10.0, every=0.5, switch="filippov", exit="at-once:plus")
+    assert set(np.arange(21) * 0.5) <= set(sliding.t) and len(sliding.mode) == len(sliding)
+
+
 def test_states_are_the_recorded_columns(caricature):
     run = twofold.solve(caricature, START, 5.0)
     x = run["x"]
@@ -139,6 +146,8 @@ WRONG = [
     (dict(method="euler"), "spec"),
     (dict(transition="step"), "spec"),
     (dict(chord=0.0), "chord"),
+    (dict(chord=1e-2, every=1.0), "chord"),
+    (dict(every=-1.0), "every"),
     (dict(max_steps=0), "max_steps"),
     (dict(max_steps=1.5), "max_steps"),
     (dict(switch="none"), "switch"),
@@ -181,6 +190,8 @@ def test_wrong_planes_funnels_and_specs(caricature):
         with pytest.raises(twofold.SpecError) as caught:
             twofold.section(caricature, START, 1.0, plane=plane)
         assert caught.value.field == "plane"
+    with pytest.raises(TypeError, match="chord"):
+        twofold.funnel(caricature, START, 1.0, chord=1e-3)
     for options in [dict(exit="at-once:plus"), dict(switch="filippov"), dict(eps=1.0), dict(times=0), dict(seed=1)]:
         with pytest.raises(twofold.SpecError):
             twofold.funnel(caricature, START, 1.0, **options)

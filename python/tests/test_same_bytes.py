@@ -28,6 +28,8 @@ RUNS = {
     ),
     "perturbed": (["--t-end", "30", "--method", "dopri5", "--sigma", "0.1"], dict(sigma=0.1)),
     "arctan": (["--t-end", "30", "--method", "dopri5", "--transition", "arctan"], dict(transition="arctan")),
+    "times": (["--t-end", "30", "--method", "dopri5", "--every", "0.5"], dict(every=0.5)),
+    "extended": (["--t-end", "1", "--method", "taylor-extended"], dict(method="taylor-extended")),
     "filippov": (
         ["--t-end", "30", "--switch", "filippov", "--exit", "random:exponential:0.5", "--plus-probability", "0.4"],
         dict(switch="filippov", exit="random:exponential:0.5", plus_probability=0.4),
@@ -46,7 +48,7 @@ def cells(text):
 def test_flags_and_arguments_ask_the_same_and_get_the_same_bytes(command, caricature, name):
     flags, arguments = RUNS[name]
     flags = ["run", "--reading", "reconstructed", *flags]
-    spec = twofold.spec(caricature, START, 30.0, **arguments)
+    spec = twofold.spec(caricature, START, float(flags[flags.index("--t-end") + 1]), **arguments)
     assert spec == json.loads(command(*flags, "--print-spec"))
     written = command(*flags, "--quiet")
     assert twofold.written(spec) == written == command("run", "--spec", "-", "--quiet", stdin=json.dumps(spec).encode())

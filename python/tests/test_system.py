@@ -106,6 +106,14 @@ def test_errors_point():
         twofold.System('{"states": 1}')
 
 
+def test_bounds_of_parameters():
+    system = twofold.System(states=["x"], h="x", plus=["-k"], minus=["k"], parameters={"k": {"value": 1, "above": 0, "meaning": "pull"}})
+    assert pickle.loads(pickle.dumps(system)) == system and system.with_(k=2).parameters == {"k": 2.0}
+    with pytest.raises(twofold.ParameterError, match="pull") as caught:
+        system.with_(k=-1)
+    assert caught.value.parameter == "k"
+
+
 @pytest.mark.parametrize("value", [float("inf"), float("nan"), "nonsense", "1e999"])
 def test_values_that_are_none(value):
     with pytest.raises(twofold.ParameterError) as caught:

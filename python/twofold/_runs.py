@@ -190,7 +190,7 @@ def _spec(
                 "seed": 2013 if seed is None else _count("seed", seed),
                 "stream": 0 if stream is None else _count("stream", stream),
             }
-    tolerance = _native.DEFAULT_TOLERANCE
+    tolerance = _native.DEFAULT_TOLERANCE_EXTENDED if method == "taylor-extended" else _native.DEFAULT_TOLERANCE
     return system, {
         "system": json.loads(system.to_json()),
         "switch": model,
@@ -208,6 +208,13 @@ def _spec(
         "schedule": {"restart_every": None if restart is None else _finite("restart", restart), "kick": kick},
         "observe": observe,
     }
+
+
+def _path(chord: Optional[float], every: Optional[float]) -> Dict[str, Any]:
+    if every is None:
+        return {"path": {"chord": 1e-3 if chord is None else _finite("chord", chord)}}
+    _refuse({"chord": chord}, "points at fixed times have no chord; leave one of the two out")
+    return {"times": {"every": _finite("every", every)}}
 
 
 def _plane(system: SystemLike, plane: Plane) -> Dict[str, Any]:
@@ -564,7 +571,8 @@ def solve(
     kick_law: Optional[str] = None,
     seed: Optional[int] = None,
     stream: Optional[int] = None,
-    chord: float = 1e-3,
+    chord: Optional[float] = None,
+    every: Optional[float] = None,
     progress: Progress = False,
 ) -> Solution:
     """Integrates a system from t = 0 to ``t_end`` and records its path.
@@ -598,7 +606,7 @@ def solve(
     method : {"dopri5", "lsoda", "radau5", "taylor", "taylor-extended"}
         Integration method. Filippov motion is integrated by dopri5.
     rtol, atol : float
-        Tolerances of a step's local error [default 10^-7.97727, NDSolve's].
+        Tolerances of a step's local error [default 10^-7.97727, NDSolve's; 1e-32 for taylor-extended].
     max_step : float
         Longest step, in units of time [default a tenth of the time between restarts or kicks].
     max_steps : int
@@ -610,7 +618,9 @@ def solve(
     seed, stream : int
         Of the random numbers of kicks and random exits (ChaCha8) [default 2013, 0].
     chord : float
-        Largest distance between the recorded polyline and the dense output, in the states' units.
+        Largest distance between the recorded polyline and the dense output, in the states' units [default 1e-3].
+    every : float
+        Record at multiples of this time instead.
     progress : bool or callable
         True shows a line on standard error; a callable is given the share that is done and what is being computed.
 
@@ -637,8 +647,8 @@ def solve(
     >>> run.y.shape == (3, len(run.t)), run.success
     (True, True)
     """
-    options = {k: v for k, v in locals().items() if k not in ("system", "start", "t_end", "chord", "progress")}
-    system, question = _spec(system, start, t_end, {"path": {"chord": _finite("chord", chord)}}, **options)
+    options = {k: v for k, v in locals().items() if k not in ("system", "start", "t_end", "chord", "every", "progress")}
+    system, question = _spec(system, start, t_end, _path(chord, every), **options)
     answer = _answer(system, question, progress)
     assert isinstance(answer, Solution)
     return answer
@@ -660,7 +670,7 @@ def section(
     plane : str or (state, value)
         ``"y=0"`` or ``("y", 0.0)``.
     system, start, t_end, progress, **options
-        As for :func:`solve`, without ``chord``.
+        As for :func:`solve`, without ``chord`` and ``every``.
 
     Returns
     -------
@@ -684,7 +694,6 @@ def funnel(
     times: int = 12,
     horizon: float = 50.0,
     until_two_fold: bool = True,
-    chord: float = 1e-3,
     progress: Progress = False,
     **options: Any,
 ) -> Funnel:
@@ -700,8 +709,8 @@ def funnel(
         Follow each future so long at most.
     until_two_fold : bool
         End a future when it next comes to a two-fold.
-    system, start, t_end, chord, progress, **options
-        As for :func:`solve`; ``t_end`` ends the approach.
+    system, start, t_end, progress, **options
+        As for :func:`solve`, without ``chord`` and ``every``: each step is recorded at fixed points; ``t_end`` ends the approach.
 
     Returns
     -------
@@ -722,8 +731,7 @@ def funnel(
     }
     for name in ("switch", "exit"):
         _refuse({name: options.get(name)}, "a funnel is of the discontinuous system, with every exit")
-    observe = {"path": {"chord": _finite("chord", chord)}}
-    system, question = _spec(system, start, t_end, observe, grid, **{**options, "switch": "filippov"})
+    system, question = _spec(system, start, t_end, _path(None, None), grid, **{**options, "switch": "filippov"})
     answer = _answer(system, question, progress)
     assert isinstance(answer, Funnel)
     return answer
@@ -736,6 +744,7 @@ def spec(
     *,
     plane: Optional[Plane] = None,
     chord: Optional[float] = None,
+    every: Optional[float] = None,
     **options: Any,
 ) -> Dict[str, Any]:
     """A run as data, computing nothing: what ``twofold run --print-spec`` prints. ``plane`` records passages, else the path is recorded.
@@ -744,9 +753,9 @@ def spec(
     """
     system = as_system(system)
     if plane is None:
-        observe: Any = {"path": {"chord": 1e-3 if chord is None else _finite("chord", chord)}}
+        observe: Any = _path(chord, every)
     else:
-        _refuse({"chord": chord}, "passages through a plane have no chord")
+        _refuse({"chord": chord, "every": every}, "passages through a plane are recorded where they are")
         observe = _plane(system, plane)
     return _spec(system, start, t_end, observe, **options)[1]
 

@@ -59,8 +59,10 @@ def _toml(
     words: Mapping[str, str],
 ) -> str:
     def table(entries: Mapping[str, Any], of: str) -> str:
-        fields = (f"{_key(k)} = {_number(v, of) if k == 'value' else _text(str(v))}" for k, v in entries.items())
-        return "{ " + ", ".join(fields) + " }"
+        def value(key: str, given: Any) -> str:
+            return _text(given) if key in ("name", "meaning", "unit") else _number(given, of)
+
+        return "{ " + ", ".join(f"{_key(k)} = {value(k, v)}" for k, v in entries.items()) + " }"
 
     if isinstance(states, str):
         raise TypeError('states is a list of names, such as ["x", "v"]')

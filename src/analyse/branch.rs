@@ -73,6 +73,14 @@ pub struct Newton {
 
 /// Pivots below this share of the largest entry are rounding.
 const SINGULAR: f64 = 1e-13;
+/// An orbit that misses itself by up to so many times what counts as closed is taken for closed where Newton's method gets no further: what is
+/// left is the error of the integration.
+const STALLED: f64 = 100.0;
+
+/// Whether Newton's method is done with this residual, having had that one before.
+fn settled(residual: f64, before: f64, newton: Newton) -> bool {
+    residual <= newton.closed || residual <= STALLED * newton.closed && residual >= 0.5 * before
+}
 
 /// The closed orbit near `guess` at the parameter's value `p`.
 ///
@@ -81,14 +89,15 @@ const SINGULAR: f64 = 1e-13;
 pub fn closed_orbit(map: &dyn ReturnMap, guess: &[f64], p: f64, newton: Newton) -> Result<Orbit, String> {
     let (n, axis) = (map.states(), map.axis());
     let mut u = guess.to_vec();
-    let mut best = f64::INFINITY;
+    let (mut best, mut before) = (f64::INFINITY, f64::INFINITY);
     for iterations in 0..=newton.iterations {
         let r = map.returned(&u, p, true)?;
         let difference: Vec<f64> = r.point.iter().zip(&u).map(|(a, b)| a - b).collect();
         let residual = sqrt(difference.iter().map(|d| d * d).sum());
-        if residual <= newton.closed {
+        if settled(residual, before, newton) {
             return Ok(orbit(map, u, p, r, residual, iterations));
         }
+        before = residual;
         best = best.min(residual);
         let mut matrix = less_identity(&r.derivative, n);
         matrix[axis * n + axis] = 1.0;
@@ -244,7 +253,9 @@ pub fn follow(map: &dyn ReturnMap, first: Orbit, course: &Course, go_on: &mut dy
         };
         let next = match next {
             Ok(next)
-                if !beyond && (next.iterations > MANY || jumps(last, &next)) && step > SHORTEST * course.longest =>
+                if !beyond
+                    && (next.iterations > MANY || jumps(last, &next))
+                    && 0.5 * step >= SHORTEST * course.longest =>
             {
                 Err("too long a step".to_owned())
             }
@@ -308,16 +319,17 @@ fn arclength(
     newton: Newton,
 ) -> Result<Orbit, String> {
     let (n, axis) = (map.states(), map.axis());
-    let (mut u, mut q) = (guess.to_vec(), p);
+    let (mut u, mut q, mut before) = (guess.to_vec(), p, f64::INFINITY);
     for iterations in 0..=newton.iterations {
         let r = map.returned(&u, q, true)?;
         let difference: Vec<f64> = r.point.iter().zip(&u).map(|(a, b)| a - b).collect();
         let residual = sqrt(difference.iter().map(|d| d * d).sum());
         let along: f64 =
             (0..n).map(|i| du[i] * (u[i] - guess[i]) / scales.state).sum::<f64>() + dp * (q - p) / scales.parameter;
-        if residual <= newton.closed && along.abs() < 1e-6 {
+        if settled(residual, before, newton) && along.abs() < 1e-6 {
             return Ok(orbit(map, u, q, r, residual, iterations));
         }
+        before = residual;
         // The derivative in the parameter by differences; its error only slows Newton's method down.
         let delta = 1e-6 * scales.parameter;
         let (up, down) = (map.returned(&u, q + delta, false)?, map.returned(&u, q - delta, false)?);
@@ -387,12 +399,10 @@ fn doubling(map: &dyn ReturnMap, a: &Orbit, b: &Orbit, newton: Newton) -> Option
         let g = test(&orbit)?;
         point = orbit.point;
         let width = (pb - pa).abs();
-        if g.abs() < 1e-8 || width < 1e-10 * (1.0 + p.abs()) {
-            return Some(Bifurcation {
-                change: Change::PeriodDoubling,
-                parameter: p,
-                uncertainty: (1e-8_f64).min(width),
-            });
+        if g.abs() < 1e-7 || width < 1e-9 * (1.0 + p.abs()) {
+            // How far p is from the zero, by the slope between the ends.
+            let off = (g * (pb - pa) / (gb - ga)).abs();
+            return Some(Bifurcation { change: Change::PeriodDoubling, parameter: p, uncertainty: off.min(width) });
         }
         let side = if g * gb > 0.0 { 1 } else { -1 };
         if side > 0 {

@@ -91,6 +91,8 @@ const LENGTHS: Lengths = Lengths {
 
 impl Classification {
     fn evidence(&self, desk: &Desk<'_>) -> Result<Evidence, JobError> {
+        // What cannot be judged is not computed.
+        plane(&self.run)?;
         self.evidence_of(desk, &*desk.ask(&Run(self.run.clone()))?)
     }
 
@@ -162,26 +164,35 @@ impl Classification {
     }
 }
 
+/// The states that span the plane in which a run is judged: the first two that its section leaves free, or the only one.
+fn plane(run: &RunSpec) -> Result<(&str, Option<&str>), JobError> {
+    let Observation::Section { coordinate, .. } = run.observe else {
+        return Err(refused("a run is classified from its section; record one with --section"));
+    };
+    let names = run.system.coordinates();
+    let mut free = names.into_iter().enumerate().filter(|(i, _)| *i != coordinate).map(|(_, name)| name);
+    match free.next() {
+        Some(first) => Ok((first, free.next())),
+        None => Err(refused(
+            "a run is classified from where it meets a section, so its system must have at least two states",
+        )),
+    }
+}
+
+fn refused(why: &str) -> JobError {
+    JobError::Other(why.into())
+}
+
 /// Where the run ended, and its section as the classifier takes it: in the plane of the first two coordinates that the section leaves free. With
 /// two states there is one, and the other is 0; with more than three this is a projection, in which different points may fall together but
 /// one orbit's period, its approach and its irregularity are seen as they are.
 fn section(run: &RunSpec, answer: &Answer) -> Result<(Vec<f64>, Vec<SectionPoint>), JobError> {
-    let refused = |why: &str| JobError::Other(why.into());
-    let Observation::Section { coordinate, .. } = run.observe else {
-        return Err(refused("a run is classified from its section; record one with --section"));
-    };
+    let (first, second) = plane(run)?;
     if answer.stop == Stop::Interrupted {
         return Err(JobError::Interrupted);
     }
-    let names = run.system.coordinates();
-    let mut free = names.iter().enumerate().filter(|(i, _)| *i != coordinate).map(|(_, name)| *name);
-    let Some(first) = free.next() else {
-        return Err(refused(
-            "a run is classified from where it meets a section, so its system must have at least two states",
-        ));
-    };
     let table = answer.table("section").ok_or_else(|| refused("the run has no table of its section"))?;
-    let (u, v) = (table.numbers(first), free.next().map(|second| table.numbers(second)));
+    let (u, v) = (table.numbers(first), second.map(|name| table.numbers(name)));
     let directions = table.words("direction").map(|word| word == Direction::Up.word());
     let points = table.numbers("t").iter().zip(u).zip(directions).enumerate();
     let points =

@@ -7,7 +7,8 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::answer::Answer;
+use super::answer::{Answer, Stop};
+use super::question::Question;
 use super::table::{Cells, Column, Kind, Table, Words};
 use crate::record::hash::canonical_json;
 
@@ -227,15 +228,29 @@ pub fn csv_rows(table: &Table) -> Vec<u8> {
     writer.into_inner().expect("memory takes what is written to it")
 }
 
+/// What the CSV file of a run says of itself: it is written before it is known how the run ends.
+pub fn about_run(run: &dyn Question) -> Value {
+    json!({ "kind": run.kind(), "question": run.json() })
+}
+
+/// The CSV file of a run: its first table.
+pub fn csv_of_run(run: &dyn Question, answer: &Answer) -> Vec<u8> {
+    let mut bytes = csv(&answer.tables[0], &about_run(run));
+    if answer.stop == Stop::Interrupted {
+        bytes.extend(cut_short(answer.stop));
+    }
+    bytes
+}
+
 /// The last line of a CSV file whose computation did not come to its end.
-pub fn cut_short(stop: super::answer::Stop) -> Vec<u8> {
+pub fn cut_short(stop: Stop) -> Vec<u8> {
     format!("{COMMENT}{STOP}{}\n", stop.word()).into_bytes()
 }
 
 const STOP: &str = "stop: ";
 
 /// Why the computation of which this is the CSV file ended before its time; none if it did not.
-pub fn stop_of_csv(bytes: &[u8]) -> Option<super::answer::Stop> {
+pub fn stop_of_csv(bytes: &[u8]) -> Option<Stop> {
     let text = bytes.strip_suffix(b"\n").unwrap_or(bytes);
     let last = text.rsplit(|b| *b == b'\n').next()?;
     let word = last.strip_prefix(COMMENT.as_bytes())?.strip_prefix(STOP.as_bytes())?;
@@ -329,7 +344,7 @@ pub fn from_json(bytes: &[u8]) -> Result<(Value, Answer), Malformed> {
     #[derive(Deserialize)]
     struct File {
         about: Value,
-        stop: super::answer::Stop,
+        stop: Stop,
         facts: serde_json::Map<String, Value>,
         statistics: Option<crate::integrate::Statistics>,
         tables: Vec<FileTable>,

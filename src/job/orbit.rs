@@ -10,7 +10,7 @@ use super::answer::{Answer, Stop};
 use super::desk::Desk;
 use super::question::{JobError, Question};
 use super::run::Run;
-use super::spec::{Observation, RunSpec, SwitchSpec};
+use super::spec::{Observation, RunSpec, SpecError, SwitchSpec};
 use super::table::{Column, Entry, Table};
 use crate::analyse::branch::{self, Course, End, Newton, Orbit, ReturnMap};
 use crate::analyse::filippov_return;
@@ -133,26 +133,43 @@ impl Question for ClosedOrbit {
 
 impl ClosedOrbit {
     fn validate(&self) -> Result<(), JobError> {
-        let wrong = |why: String| Err(JobError::Other(why));
+        let wrong = |field, value: String, rule| Err(SpecError { field, value, rule }.into());
         let n = self.system.dimension();
         if n < 2 || n > MOST_STATES {
-            return wrong(format!("closed orbits are looked for in systems of 2 to {MOST_STATES} states, not of {n}"));
+            return wrong(
+                "system",
+                format!("one of {n} states"),
+                "closed orbits are looked for in systems of 2 to 8 states",
+            );
         }
         if self.plane.axis >= n {
-            return wrong(format!("the plane's coordinate is state {} of {n}", self.plane.axis + 1));
+            return wrong(
+                "section",
+                self.plane.axis.to_string(),
+                "that is not the number of a state; they count from 0",
+            );
         }
         if let Some(along) = &self.along {
-            self.at(along.from)?;
-            self.at(along.to)?;
+            for end in [along.from, along.to] {
+                if let Err(error) = self.at(end) {
+                    let value = format!("\"{}\" ({error})", along.parameter);
+                    return wrong("along", value, "name a parameter of the system and values that it may have, or eps");
+                }
+            }
             if along.from == along.to || along.steps == 0 {
-                return wrong(format!(
-                    "{} goes from {} to {}: give two ends and at least one step",
-                    along.parameter, along.from, along.to
-                ));
+                return wrong(
+                    "along",
+                    format!("{} to {}", along.from, along.to),
+                    "give two ends and at least one step",
+                );
             }
         }
         if self.returns == Some(0) {
-            return wrong("a closed orbit crosses its plane at least once per turn: ask for one return or more".into());
+            return wrong(
+                "returns",
+                "0".into(),
+                "a closed orbit crosses its plane at least once per turn: ask for one return or more",
+            );
         }
         Ok(())
     }

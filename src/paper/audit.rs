@@ -44,7 +44,7 @@ impl Cell {
     }
 }
 
-/// The cells of two sweeps over `params.alpha` and `params.beta`, of fig. 7's intervals and of fig. 8's sigmas, in order.
+/// The cells of two sweeps over `params.alpha` and `params.beta`, of fig. 7's intervals and of fig. 8's sigmas, in order; those in which every panel has a run.
 pub fn cells(fig7: &Table, fig8: &Table, rules: &Rules) -> Vec<Cell> {
     let mut pairs: Vec<[f64; 2]> = Vec::new();
     for table in [fig7, fig8] {
@@ -69,7 +69,8 @@ pub fn cells(fig7: &Table, fig8: &Table, rules: &Rules) -> Vec<Cell> {
         }
         Cell::of(alpha, beta, found)
     };
-    pairs.into_iter().map(cell).collect()
+    // A panel without a run says nothing, and its cell would look better than it is.
+    pairs.into_iter().map(cell).filter(Cell::is_whole).collect()
 }
 
 /// A reading of the paper's two numbers: as printed, or with one digit of an exponent changed.
@@ -120,7 +121,12 @@ pub fn candidates(cells: &[Cell]) -> Option<Vec<Candidate>> {
 
 /// Cells as a table.
 pub fn cell_table(cells: &[Cell]) -> Table {
-    let mut columns = vec![Column::numbers("alpha"), Column::numbers("beta"), Column::numbers("log10_likelihood"), Column::integers("far")];
+    let mut columns = vec![
+        Column::numbers("alpha"),
+        Column::numbers("beta"),
+        Column::numbers("log10_likelihood"),
+        Column::integers("far"),
+    ];
     columns.extend(PANELS.iter().flat_map(|p| {
         let name = p.name.replace(['(', ')'], "_");
         [Column::integers(&format!("runs_{name}")), Column::integers(&format!("hits_{name}"))]
@@ -156,13 +162,8 @@ mod tests {
 
     #[test]
     fn candidates_differ_from_the_printed_numbers_in_one_exponent() {
-        let cells = [
-            cell(1e-3, 1e-5, 0),
-            cell(1e-1, 1e-5, 9),
-            cell(1e-3, 1e-4, 0),
-            cell(1e-1, 1e-4, 9),
-            cell(3e-3, 1e-5, 9),
-        ];
+        let cells =
+            [cell(1e-3, 1e-5, 0), cell(1e-1, 1e-5, 9), cell(1e-3, 1e-4, 0), cell(1e-1, 1e-4, 9), cell(3e-3, 1e-5, 9)];
         let found = candidates(&cells).unwrap();
         let pairs: Vec<[f64; 2]> = found.iter().map(|c| [c.cell.alpha, c.cell.beta]).collect();
         assert_eq!(pairs, [[1e-3, 1e-5], [1e-1, 1e-5], [1e-3, 1e-4]]);

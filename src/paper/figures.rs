@@ -44,4 +44,7 @@ figures! {
     digits: "../../figures/digits/figure.rs", "../../figures/digits/expected.json";
     convergence: "../../figures/convergence/figure.rs", "../../figures/convergence/expected.json";
     law: "../../figures/law/figure.rs", "../../figures/law/expected.json";
+    census: "../../figures/census/figure.rs", "../../figures/census/expected.json";
+    audit: "../../figures/audit/figure.rs", "../../figures/audit/expected.json";
+    basin: "../../figures/basin/figure.rs", "../../figures/basin/expected.json";
 }

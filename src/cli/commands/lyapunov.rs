@@ -65,7 +65,12 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let out = arguments.out.as_deref();
     try_delivery(out)?;
     let progress = Progress::with_grace(arguments.quiet);
-    let answer = Desk::new(None, &progress).ask(&question)?;
+    let answer = match (Desk::new(None, &progress).ask(&question), progress.asked_to_stop()) {
+        (Err(JobError::Interrupted), Some(exit)) => {
+            return Err(CliError::Stopped { said: "interrupted before there was a mean with an error".into(), exit });
+        }
+        (answer, _) => answer?,
+    };
     if let Ok(failure) = answer.fact::<String>("failure") {
         return Err(CliError::Job(JobError::Other(failure)));
     }

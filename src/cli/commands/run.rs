@@ -73,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let answer = Desk::new(None, &progress).ask(&run)?;
     let about = json!({ "kind": run.kind(), "question": run.json(), "stop": answer.stop });
     let bytes = match format {
-        Format::Csv => encode::csv(&answer.tables[0], &about),
+        Format::Csv => encode::csv_of_run(&run, &answer),
         Format::Json => encode::json(&answer, &about),
         Format::Parquet => parquet(&answer.tables[0], &about),
     };
@@ -117,7 +117,7 @@ fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, Cl
         Some(file) => Rows::File(Growing::begin(file)?),
         None => Rows::Output,
     };
-    let about = json!({ "kind": run.kind(), "question": run.json() });
+    let about = encode::about_run(run);
     let (mut begun, mut failed) = (false, None);
     let watch = job::Progress::begin(progress, &run.label(), run.extent());
     let found = simulate::stream(

@@ -232,7 +232,11 @@ impl Sweep {
         settings
     }
 
-    /// The question of a row; an error says why its settings make none.
+    /// The question of a row.
+    ///
+    /// # Errors
+    ///
+    /// Why its settings make none.
     pub fn question(&self, row: u64) -> Result<Fate, String> {
         let mut run = self.run.clone();
         let varied = |c: &Coordinate| self.over.iter().any(|axis| axis.coordinate == *c);

@@ -111,24 +111,24 @@ impl Row {
 
     /// How it ended, in a word.
     pub fn outcome(&self) -> &str {
-        self.from_end(15).word()
+        self.cell_from_last(15).word()
     }
 
     /// Why it failed, if it did.
     pub fn reason(&self) -> Option<&str> {
-        let reason = self.from_end(2).word();
+        let reason = self.cell_from_last(2).word();
         (!reason.is_empty()).then_some(reason)
     }
 
     /// The leading digits of its question's digest.
     pub fn key(&self) -> i64 {
-        match self.from_end(16) {
+        match self.cell_from_last(16) {
             Entry::Integer(key) => *key,
             _ => 0,
         }
     }
 
-    fn from_end(&self, i: usize) -> &Entry {
+    fn cell_from_last(&self, i: usize) -> &Entry {
         &self.cells[self.cells.len() - i]
     }
 

@@ -1,0 +1,162 @@
+//! The audit: at which alpha and beta the paper's outcomes of figs 7 and 8 are likely. Not a figure of the paper. Its data are committed beside it and
+//! made by `make census`.
+
+use std::sync::Arc;
+
+use twofold::job::sweep::Rows;
+use twofold::job::table::Table;
+use twofold::job::{AnyQuestion, JobError};
+use twofold::num::elementary::sqrt;
+use twofold::paper::audit::{self, PRIORS};
+use twofold::paper::claims::claims;
+use twofold::paper::study::Computed;
+use twofold::paper::wording::number;
+use twofold::paper::{Figure, Picture, Study, View};
+use twofold::record::Hash;
+use twofold::render::sheet::*;
+use twofold::render::style;
+
+/// Fig. 7's intervals and fig. 8's sigmas over alpha and beta, Dormand-Prince at NDSolve's tolerance.
+const FIG7: &[u8] = include_bytes!("fig7.parquet");
+const FIG8: &[u8] = include_bytes!("fig8.parquet");
+
+fn table_of(bytes: &[u8]) -> Result<Table, JobError> {
+    Rows::from_parquet(bytes).map(|rows| rows.table()).map_err(|e| JobError::Other(format!("the audit's data: {e}")))
+}
+
+fn tables() -> Result<Vec<Table>, JobError> {
+    let cells = audit::cells(&table_of(FIG7)?, &table_of(FIG8)?, &claims().rules);
+    let candidates = audit::candidates(&cells)
+        .ok_or_else(|| JobError::Other("the printed numbers are not on the audit's grid".into()))?;
+    Ok(vec![audit::cell_table(&cells), audit::candidate_table(&candidates)])
+}
+
+fn questions() -> Vec<AnyQuestion> {
+    let data = [FIG7, FIG8].map(Hash::of);
+    vec![Arc::new(Computed {
+        kind: "audit",
+        question: serde_json::json!({ "data": data, "rules": claims().rules, "priors": PRIORS }),
+        cost: 1.0,
+        compute: tables,
+    })]
+}
+
+/// From white to a dark blue.
+fn shade(share: f64) -> Colour {
+    let mix = |light: f64, dark: f64| (light + (dark - light) * share.clamp(0.0, 1.0)).round() as u8;
+    Colour::rgb(mix(247.0, 8.0), mix(251.0, 48.0), mix(255.0, 107.0))
+}
+
+fn draw(tables: &[Table]) -> Sheet {
+    let [cells, candidates] = tables else { unreachable!("the audit has two tables") };
+    let (alpha, beta, l) = (cells.numbers("alpha"), cells.numbers("beta"), cells.numbers("log10_likelihood"));
+    let spacing = |values: &[f64]| {
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        sorted.dedup();
+        let ratio = sorted.windows(2).map(|w| w[1] / w[0]).fold(f64::INFINITY, f64::min);
+        if ratio.is_finite() { sqrt(ratio) } else { 1.5 }
+    };
+    let (wide, high) = (spacing(alpha), spacing(beta));
+    let (low, top) = range_of(l.iter().copied());
+    let best = (0..l.len()).max_by(|a, b| l[*a].total_cmp(&l[*b])).unwrap_or(0);
+    let ends = |v: &[f64], by: f64| {
+        let (a, b) = range_of(v.iter().copied());
+        (a / by, b * by)
+    };
+    let ((a0, a1), (b0, b1)) = (ends(alpha, wide), ends(beta, high));
+    let mut map = PlanePanel::new(Axis::log("*α*", a0, a1), Axis::log("*β*", b0, b1));
+    for i in 0..l.len() {
+        let (x, y) = (alpha[i], beta[i]);
+        let outline = vec![[x / wide, y / high], [x * wide, y / high], [x * wide, y * high], [x / wide, y * high]];
+        map = map.solid(outline, shade(if top > low { (l[i] - low) / (top - low) } else { 0.0 }));
+    }
+    let marks = [
+        (
+            "printed",
+            vec![[1e-3, 1e-5]],
+            MarkerStyle { shape: MarkerShape::Cross, colour: style::VERMILLION, size: 6.0 },
+        ),
+        (
+            "reconstructed",
+            vec![[1e-1, 1e-5]],
+            MarkerStyle { shape: MarkerShape::Star, colour: style::ORANGE, size: 7.0 },
+        ),
+        (
+            "most likely",
+            vec![[alpha[best], beta[best]]],
+            MarkerStyle { shape: MarkerShape::OpenDot, colour: style::VERMILLION, size: 5.0 },
+        ),
+    ];
+    let mut sheet = Sheet::new(ColumnWidth::Double, 2, "").panel_aspect(0.85);
+    for (words, at, marker) in marks {
+        map = map.markers(at, marker);
+        sheet = sheet.legend(LegendEntry::new(LegendKey::Marker(marker), words));
+    }
+    for (share, words) in [(0.0, low), (0.5, 0.5 * (low + top)), (1.0, top)] {
+        sheet = sheet.legend(LegendEntry::new(LegendKey::Area(shade(share), 100), format!("10^{{{words:.1}}}")));
+    }
+    let (ca, cb) = (candidates.numbers("alpha"), candidates.numbers("beta"));
+    let posteriors = ["posterior_prior_0.5", "posterior_prior_0.99"].map(|c| candidates.numbers(c));
+    let n = candidates.len() as f64;
+    let mut odds = PlanePanel::new(Axis::linear("", -0.8, n + 0.1), Axis::linear("", -0.3, 1.1));
+    odds.axes = false;
+    for percent in [0.0, 50.0, 100.0] {
+        let y = percent / 100.0;
+        odds = odds.line(vec![[-0.05, y], [n, y]], LineStyle::new(style::GRID, 0.6)).note(
+            [-0.1, y],
+            format!("{percent} %"),
+            Anchor::Right,
+        );
+    }
+    for i in 0..candidates.len() {
+        for (k, colour) in [style::BLUE, style::ORANGE].into_iter().enumerate() {
+            let (left, height) = (i as f64 + 0.12 + 0.38 * k as f64, posteriors[k][i].max(0.003));
+            odds = odds.solid(vec![[left, 0.0], [left + 0.36, 0.0], [left + 0.36, height], [left, height]], colour);
+        }
+        odds = odds.note([i as f64 + 0.5, -0.03], number(ca[i]), Anchor::Below).note(
+            [i as f64 + 0.5, -0.14],
+            number(cb[i]),
+            Anchor::Below,
+        );
+    }
+    let runs: Vec<i64> = cells
+        .columns
+        .iter()
+        .filter(|c| c.name.starts_with("runs"))
+        .flat_map(|c| cells.integers(&c.name))
+        .copied()
+        .collect();
+    let (fewest, most) = (runs.iter().min().copied().unwrap_or(0), runs.iter().max().copied().unwrap_or(0));
+    sheet
+        .panel("(a)", "likelihood of the six outcomes", map)
+        .panel("(b)", "posterior of *α* (above) and *β*", odds)
+        .legend(LegendEntry::new(LegendKey::Area(style::BLUE, 100), format!("prior of printed {}", PRIORS[0])))
+        .legend(LegendEntry::new(LegendKey::Area(style::ORANGE, 100), format!("prior of printed {}", PRIORS[1])))
+        .footer(format!(
+            "(a) Probability that one new run of each panel of figs 7 and 8 comes out as the paper says, from {fewest} to {most} runs of each panel in each cell \
+             (Dormand-Prince at NDSolve's tolerance, *t* = 200000). Most likely: *α* = {}, *β* = {}.",
+            number(alpha[best]),
+            number(beta[best])
+        ))
+        .footer("(b) The printed numbers and those with one exponent changed; what is not printed shares the rest of the prior evenly.")
+}
+
+/// The figure's specification.
+pub fn figure() -> Figure {
+    Figure {
+        id: "audit",
+        title: "At which parameters the paper's outcomes are likely",
+        pictures: vec![Picture {
+            name: "audit".into(),
+            reading: None,
+            title: "At which parameters the paper's outcomes are likely",
+            caption: "(a) How likely the six outcomes that the paper reports in figs 7 and 8 are at each α and β, with the printed, the reconstructed and \
+                      the most likely pair. (b) How probable it is that one digit of an exponent was misprinted, under two priors."
+                .into(),
+            view: View::Study(Study { questions, draw: |answers| draw(&Study::tables(answers)) }),
+            panels: Vec::new(),
+            alterations: Vec::new(),
+        }],
+    }
+}

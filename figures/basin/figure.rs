@@ -1,0 +1,109 @@
+//! The basin: where starts on the plane y = 0 lead. Not a figure of the paper. Its data are committed beside it and made by `make census`.
+
+use std::sync::Arc;
+
+use twofold::job::sweep::Rows;
+use twofold::job::table::{Column, Entry, Table};
+use twofold::job::{AnyQuestion, JobError};
+use twofold::paper::census::{self, Kind};
+use twofold::paper::study::Computed;
+use twofold::paper::{Figure, Reading, Study};
+use twofold::record::Hash;
+use twofold::render::sheet::*;
+use twofold::render::style;
+
+/// Starts on a square of the plane y = 0, followed to the same time.
+const PRINTED: &[u8] = include_bytes!("printed.parquet");
+const RECONSTRUCTED: &[u8] = include_bytes!("reconstructed.parquet");
+
+/// Colours of the kinds, in the order of `Kind::ALL`.
+const COLOURS: [Colour; 6] = [style::BLUE, style::GREEN, style::SKY, style::VERMILLION, style::INK, style::FAINT];
+
+fn data(reading: Reading) -> &'static [u8] {
+    match reading {
+        Reading::Printed => PRINTED,
+        Reading::Reconstructed => RECONSTRUCTED,
+    }
+}
+
+fn tables(reading: Reading) -> Result<Vec<Table>, JobError> {
+    let rows = Rows::from_parquet(data(reading)).map_err(|e| JobError::Other(format!("the basin's data: {e}")))?;
+    let end = rows.sweep().run().t_end;
+    let table = rows.table();
+    let mut found =
+        Table::new("basin", [Column::numbers("x"), Column::numbers("z"), Column::words("kind"), Column::numbers("t")]);
+    let runs = census::runs(&table, &[]);
+    for ((x, z), run) in table.numbers("start.x").iter().zip(table.numbers("start.z")).zip(&runs) {
+        found.push([Entry::Number(*x), Entry::Number(*z), run.kind(end).words().into(), Entry::Number(end)]);
+    }
+    Ok(vec![found])
+}
+
+fn question(reading: Reading) -> AnyQuestion {
+    Arc::new(Computed {
+        kind: "basin",
+        question: serde_json::json!({ "reading": reading, "data": Hash::of(data(reading)) }),
+        cost: 1.0,
+        compute: match reading {
+            Reading::Printed => || tables(Reading::Printed),
+            Reading::Reconstructed => || tables(Reading::Reconstructed),
+        },
+    })
+}
+
+fn draw(tables: &[Table]) -> Sheet {
+    let [basin] = tables else { unreachable!("the basin has one table") };
+    let (x, z) = (basin.numbers("x"), basin.numbers("z"));
+    let step = |values: &[f64]| {
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        sorted.dedup();
+        sorted.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min)
+    };
+    let (dx, dz) = (0.5 * step(x), 0.5 * step(z));
+    let ends = |v: &[f64], d: f64| {
+        let (a, b) = range_of(v.iter().copied());
+        (a - d, b + d)
+    };
+    let ((x0, x1), (z0, z1)) = (ends(x, dx), ends(z, dz));
+    let mut map = PlanePanel::new(Axis::linear("*x*", x0, x1), Axis::linear("*z*", z0, z1)).equal();
+    let mut counts = [0_u64; 6];
+    for (i, word) in basin.words("kind").enumerate() {
+        let Some(kind) = Kind::ALL.iter().position(|k| k.words() == word) else { continue };
+        counts[kind] += 1;
+        let (a, b) = (x[i], z[i]);
+        map = map.solid(vec![[a - dx, b - dz], [a + dx, b - dz], [a + dx, b + dz], [a - dx, b + dz]], COLOURS[kind]);
+    }
+    let start = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::INK, size: 4.5 };
+    map = map.markers(vec![[0.2, -1.0]], start);
+    let end = basin.numbers("t").first().copied().unwrap_or(0.0);
+    let mut sheet = Sheet::new(ColumnWidth::Single, 1, "")
+        .panel_aspect(1.0)
+        .panel("", "starts on *y* = 0", map)
+        .legend(LegendEntry::new(LegendKey::Marker(start), "the paper's start"));
+    for (i, kind) in Kind::ALL.into_iter().enumerate().filter(|(i, _)| counts[*i] > 0) {
+        sheet = sheet.legend(LegendEntry::new(LegendKey::Area(COLOURS[i], 100), kind.words()));
+    }
+    sheet.footer(format!(
+        "What {} runs are at *t* = {end}, Dormand-Prince at NDSolve's tolerance: {}.",
+        basin.len(),
+        census::in_words(&counts)
+    ))
+}
+
+/// The figure's specification.
+pub fn figure() -> Figure {
+    Figure::studied_in_both_readings(
+        "basin",
+        "Where starts lead",
+        "Starts on the plane y = 0, coloured by what becomes of the run: captured by the period-one orbit, by the period-three orbit, regular \
+         otherwise, still irregular, or on the way to the far state.",
+        [
+            Study { questions: || vec![question(Reading::Printed)], draw: |answers| draw(&Study::tables(answers)) },
+            Study {
+                questions: || vec![question(Reading::Reconstructed)],
+                draw: |answers| draw(&Study::tables(answers)),
+            },
+        ],
+    )
+}
