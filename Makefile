@@ -7,7 +7,7 @@ PROOFS  := printed-cycle coexistence sensitivity crossings
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help figures gallery report check bless test elementary rigor-test census proofs browser-test lint bench bench-peers torture ci clean bench-keep
+.PHONY: help figures gallery report check bless test elementary rigor-test census proofs browser-test lint bench bench-peers torture ci clean bench-keep bench-cost
 
 help: ## this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -87,6 +87,11 @@ torture: ## kill the program at random moments and look for losses: make torture
 
 bench-peers: ## W1 and W2 of benches/README.md by the peers and by us, in turn: table, ratios, picture (needs g++, Boost, SUNDIALS, python3)
 	@sh benches/peers/run.sh
+
+bench-cost: ## cost against end time, layer and tolerance: benches/cost.csv, cost.md and cost.svg
+	@$(CARGO) build --release --locked --quiet --manifest-path benches/peers/ours/Cargo.toml --target-dir target --bin twofold-cost
+	@target/release/twofold-cost > benches/cost.csv
+	@python3 benches/cost.py
 
 bench: ## benchmarks, compared with the last kept ones (make bench-keep)
 	@if ls target/criterion/*/*/kept >/dev/null 2>&1; then flags="--baseline kept"; fi; \

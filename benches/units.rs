@@ -8,9 +8,9 @@ use std::time::Instant;
 
 use nalgebra::{SVector, vector};
 use twofold::analyse::SectionRecorder;
-use twofold::integrate::ensemble::{Settings, ensemble, in_lanes};
+use twofold::integrate::ensemble::{InstructionSet, Run, ensemble_with};
 use twofold::integrate::{
-    Course, Dopri5, Failure, Ignore, Lsoda, Radau5, Schedule, StepCap, Stepper, Taylor, Tolerance, drive,
+    Course, Dopri5, Failure, Ignore, Layered, Lsoda, Radau5, Schedule, StepCap, Stepper, Taylor, Tolerance, drive,
 };
 use twofold::system::{Caricature, Smoothed, Transition};
 
@@ -57,14 +57,14 @@ fn w2<M: Stepper<3>>(field: &Field, make: impl Fn() -> M) -> Done {
     Ok(done)
 }
 
-/// W2 in lanes: `dispatched` with the instruction set chosen at run time, else what the program was compiled for.
-fn w2_in_lanes(field: &Field, dispatched: bool) -> Done {
-    let starts: Vec<_> = (0..1000).map(|k| vector![0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0, 0.0, -1.0]).collect();
-    let settings = Settings { tolerance: TOLERANCE, t_end: 2000.0, max_step: 10.0, max_steps: u64::MAX };
-    let ends =
-        if dispatched { ensemble(field, &starts, &settings) } else { in_lanes::<_, 3, 8>(field, &starts, &settings) };
+/// W2 in lanes.
+fn w2_in_lanes(field: &Field, set: InstructionSet) -> Done {
+    let course = Course { step_cap: StepCap::Absolute(10.0), ..Course::to(2000.0) };
+    let run = |k: u32| Run { start: vector![0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0, 0.0, -1.0], course };
+    let runs: Vec<_> = (0..1000).map(run).collect();
+    let ends = ensemble_with(set, field, &runs, TOLERANCE, None, |_| Ignore);
     ends.into_iter().try_fold((0, 0, vector![0.0, 0.0, 0.0]), |done, end| {
-        let end = end?;
+        let end = end.summary?;
         Ok((done.0 + end.statistics.steps, 0, end.x))
     })
 }
@@ -76,9 +76,13 @@ fn once(unit: &str, set: &str, method: &str) -> Option<Done> {
         ("W1", "lsoda") => w1(&field, Lsoda::new(TOLERANCE)),
         ("W1", "radau5") => w1(&field, Radau5::new(TOLERANCE)),
         ("W1", "taylor") => w1(&field, Taylor::new(TOLERANCE)),
+        ("W1", "layered") => w1(&field, Layered::new(TOLERANCE)),
+        ("W2", "layered") => w2(&field, || Layered::new(TOLERANCE)),
         ("W2", "dopri5") => w2(&field, || Dopri5::new(TOLERANCE)),
-        ("W2", "dopri5-lanes") => w2_in_lanes(&field, true),
-        ("W2", "dopri5-lanes-portable") => w2_in_lanes(&field, false),
+        ("W2", "dopri5-lanes-avx2") if InstructionSet::Avx2.is_here() => w2_in_lanes(&field, InstructionSet::Avx2),
+        ("W2", "dopri5-lanes-avx512") if InstructionSet::Avx512.is_here() => {
+            w2_in_lanes(&field, InstructionSet::Avx512)
+        }
         ("W2", "lsoda") => w2(&field, || Lsoda::new(TOLERANCE)),
         _ => return None,
     })

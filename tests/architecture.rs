@@ -51,8 +51,8 @@ const ROOMS: [(&str, &[&str]); 14] = [
 const LIBRARIES: [(&str, &[&str]); 11] = [
     ("libm", &["num"]),
     ("pxfm", &["num"]),
-    // Only the runs in lanes choose an instruction set; nothing else may look at the processor.
-    ("pulp", &["integrate"]),
+    // Numbers in vector registers, and the runs in lanes that choose an instruction set; nothing else may look at the processor.
+    ("pulp", &["num", "integrate"]),
     ("rand", &["num"]),
     ("rand_chacha", &["num"]),
     ("plotters", &["render"]),

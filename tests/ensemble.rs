@@ -1,73 +1,155 @@
 //! A run in a lane against the same run alone.
 
 use nalgebra::{SVector, vector};
-use twofold::integrate::ensemble::{End, Settings, ensemble, in_lanes};
-use twofold::integrate::{Course, Dopri5, Failure, Ignore, StepCap, Tolerance, drive};
+use twofold::analyse::SectionRecorder;
+use twofold::integrate::ensemble::{End, InstructionSet, Plane, Run, ensemble, ensemble_with};
+use twofold::integrate::{
+    Course, Dopri5, Flow, Ignore, Kick, KickLaw, Observer, Schedule, Step, StepCap, StopReason, Tolerance, drive,
+};
 use twofold::system::{Caricature, Smoothed, Transition};
+
+const TOLERANCE: Tolerance = Tolerance { rtol: 1.0536712e-8, atol: 1.0536712e-8 };
+const PLANE: Plane = Plane { coordinate: 1, value: 0.0 };
 
 fn field() -> Smoothed<Caricature> {
     Smoothed { system: Caricature::with_reinjection(1e-1, 1e-4), transition: Transition::Tanh, eps: 1e-3 }
 }
 
-const SETTINGS: Settings = Settings {
-    tolerance: Tolerance { rtol: 1.0536712e-8, atol: 1.0536712e-8 },
-    t_end: 30.0,
-    max_step: 10.0,
-    max_steps: 20_000,
-};
-
-/// Some that stay near, one on its own far from the others, one that cannot begin.
-fn starts() -> Vec<SVector<f64, 3>> {
-    let mut starts: Vec<_> = (0..21).map(|k| vector![0.1 + 0.01 * f64::from(k), 0.0, -1.0]).collect();
-    starts.push(vector![0.9, -0.6, 0.4]);
-    starts.insert(5, vector![f64::NAN, 0.0, 0.0]);
-    starts
+/// Runs of different lengths, under different schedules and caps; one that cannot begin, one that has nothing to do, one with a small budget.
+fn runs() -> Vec<Run<3>> {
+    let mut runs: Vec<_> = (0..37_u32)
+        .map(|k| {
+            let kick = Kick { every: 0.9, size: 1e-3, law: KickLaw::Sphere, seed: 7, stream: k.into() };
+            let schedule = Schedule { restart_every: (k % 3 > 0).then_some(3.7), kick: (k % 5 == 4).then_some(kick) };
+            let step_cap = [StepCap::None, StepCap::Absolute(0.3), StepCap::FractionOfSegment(0.1)][k as usize % 3];
+            let course = Course { schedule, step_cap, max_steps: 50_000, ..Course::to(2.0 + f64::from(k * 11 % 17)) };
+            Run { start: vector![0.1 + 0.01 * f64::from(k), 0.0, -1.0], course }
+        })
+        .collect();
+    runs[5].start[0] = f64::NAN;
+    runs[11].course.t_end = 0.0;
+    runs[17].course.max_steps = 20;
+    runs
 }
 
-fn alone(x0: SVector<f64, 3>, settings: &Settings) -> Result<End<3>, Failure> {
-    let course = Course {
-        step_cap: StepCap::Absolute(settings.max_step),
-        max_steps: settings.max_steps,
-        ..Course::to(settings.t_end)
-    };
-    let end = drive(&field(), x0, &course, &mut Dopri5::new(settings.tolerance), &mut Ignore, &())?.within_budget()?;
-    Ok(End { x: end.x, statistics: end.statistics })
+fn alone<O: Observer<3>>(run: &Run<3>, mut observer: O) -> End<O, 3> {
+    let mut stepper = Dopri5::new(TOLERANCE);
+    let summary = drive(&field(), run.start, &run.course, &mut stepper, &mut observer, &());
+    End { summary, observer }
 }
 
 /// Bits, not values: NaN states in errors compare too.
-fn words(ends: &[Result<End<3>, Failure>]) -> Vec<String> {
-    let word = |e: &Result<End<3>, Failure>| match e {
-        Ok(end) => format!("{:?} {:?}", end.x.map(f64::to_bits), end.statistics),
+fn words<O>(ends: &[End<O, 3>], seen: impl Fn(&O) -> String) -> Vec<String> {
+    let word = |end: &End<O, 3>| match &end.summary {
+        Ok(s) => format!(
+            "{} {:?} {:?} {} {:?} {}",
+            s.t.to_bits(),
+            s.x.map(f64::to_bits),
+            s.statistics,
+            s.most_steps_in_segment,
+            s.stop,
+            seen(&end.observer)
+        ),
         Err(failure) => format!("{failure:?}"),
     };
     ends.iter().map(word).collect()
 }
 
-#[test]
-fn a_lane_has_the_bits_of_a_run_alone() {
-    let expected = words(&starts().iter().map(|x| alone(*x, &SETTINGS)).collect::<Vec<_>>());
-    assert!(expected[5].starts_with("NotFinite") && expected[0].contains("rejected"), "{expected:?}");
-    assert_eq!(words(&ensemble(&field(), &starts(), &SETTINGS)), expected, "with the machine's instructions");
-    assert_eq!(words(&in_lanes::<_, 3, 1>(&field(), &starts(), &SETTINGS)), expected, "1 lane");
-    assert_eq!(words(&in_lanes::<_, 3, 4>(&field(), &starts(), &SETTINGS)), expected, "4 lanes");
-    assert_eq!(words(&in_lanes::<_, 3, 8>(&field(), &starts(), &SETTINGS)), expected, "8 lanes");
-    // Whatever the neighbours.
-    let mut backwards = starts();
-    backwards.reverse();
-    let mut found = words(&ensemble(&field(), &backwards, &SETTINGS));
-    found.reverse();
-    assert_eq!(found, expected);
+fn crossings(recorder: &SectionRecorder<3>) -> String {
+    recorder.crossings().iter().map(|c| format!("{:?} {:?};", c.t.to_bits(), c.x.map(f64::to_bits))).collect()
+}
+
+/// Calls `test` for each instruction set of this machine, and says which it has not.
+fn on_every_set(test: impl Fn(InstructionSet)) {
+    for set in InstructionSet::ALL {
+        if set.is_here() {
+            test(set);
+            println!("{set:?}: run");
+        } else {
+            println!("{set:?}: NOT RUN, this machine has not got it");
+        }
+    }
 }
 
 #[test]
-fn a_budget_ends_a_run_where_it_ends_it_alone() {
-    let settings = Settings { max_steps: 100, ..SETTINGS };
-    let expected = words(&starts().iter().map(|x| alone(*x, &settings)).collect::<Vec<_>>());
-    assert!(expected[0].starts_with("TooManySteps"), "{expected:?}");
-    assert_eq!(words(&ensemble(&field(), &starts(), &settings)), expected);
+fn a_lane_has_the_bits_of_a_run_alone_on_every_instruction_set() {
+    let runs = runs();
+    let recorder = || SectionRecorder::<3>::new(PLANE.coordinate, PLANE.value);
+    let expected = words(&runs.iter().map(|run| alone(run, recorder())).collect::<Vec<_>>(), crossings);
+    assert!(expected[5].starts_with("NotFinite") && expected[17].contains("StepBudget"), "{expected:?}");
+    let crossed = expected.iter().filter(|e| e.contains(';')).count();
+    assert!(crossed > runs.len() / 2, "crossings are among what is compared: {expected:?}");
+    on_every_set(|set| {
+        let found = ensemble_with(set, &field(), &runs, TOLERANCE, Some(PLANE), |_| recorder());
+        assert_eq!(words(&found, crossings), expected, "{set:?}");
+        // Whatever the neighbours.
+        let backwards: Vec<_> = runs.iter().rev().copied().collect();
+        let mut found = ensemble_with(set, &field(), &backwards, TOLERANCE, Some(PLANE), |_| recorder());
+        found.reverse();
+        assert_eq!(words(&found, crossings), expected, "{set:?}, neighbours the other way round");
+        // Fewer runs than lanes.
+        let found = ensemble_with(set, &field(), &runs[..3], TOLERANCE, Some(PLANE), |_| recorder());
+        assert_eq!(words(&found, crossings), expected[..3], "{set:?}, three runs");
+    });
 }
 
 #[test]
-fn no_starts_no_ends() {
-    assert!(ensemble(&field(), &[], &SETTINGS).is_empty());
+fn without_a_plane_ends_are_the_same() {
+    let runs = runs();
+    let expected = words(&runs.iter().map(|run| alone(run, Ignore)).collect::<Vec<_>>(), |_| String::new());
+    let found = ensemble(&field(), &runs, TOLERANCE, None, |_| Ignore);
+    assert_eq!(words(&found, |_| String::new()), expected);
+}
+
+/// Stops at the second step that it hears of.
+struct Second(SectionRecorder<3>);
+impl Observer<3> for Second {
+    fn step(&mut self, step: &Step<'_, 3>) -> Flow {
+        let _ = self.0.step(step);
+        if self.0.crossings().len() >= 2 { Flow::Stop } else { Flow::Continue }
+    }
+}
+
+#[test]
+fn an_observer_may_stop_its_run_and_no_other() {
+    let runs = runs();
+    let second = || Second(SectionRecorder::new(PLANE.coordinate, PLANE.value));
+    let expected = words(&runs.iter().map(|run| alone(run, second())).collect::<Vec<_>>(), |s| crossings(&s.0));
+    assert!(expected.iter().any(|e| e.contains(&format!("{:?}", StopReason::Observer))), "{expected:?}");
+    assert!(expected.iter().any(|e| e.contains(&format!("{:?}", StopReason::EndTime))), "{expected:?}");
+    on_every_set(|set| {
+        let found = ensemble_with(set, &field(), &runs, TOLERANCE, Some(PLANE), |_| second());
+        assert_eq!(words(&found, |s| crossings(&s.0)), expected, "{set:?}");
+    });
+}
+
+/// x' = x^2: leaves the numbers in finite time, by steps that shrink.
+#[test]
+fn failures_are_those_of_a_run_alone() {
+    struct Exploding;
+    impl twofold::system::VectorField<1> for Exploding {
+        fn eval<S: twofold::num::Elementary>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
+            vector![x[0] * x[0]]
+        }
+    }
+    let runs: Vec<Run<1>> =
+        (0..19).map(|k| Run { start: vector![f64::from(k) - 4.0], course: Course::to(1.0) }).collect();
+    let word = |summary: &Result<twofold::integrate::Summary<1>, twofold::integrate::Failure>| format!("{summary:?}");
+    let expected: Vec<_> = runs
+        .iter()
+        .map(|run| {
+            let mut stepper = Dopri5::new(TOLERANCE);
+            word(&drive(&Exploding, run.start, &run.course, &mut stepper, &mut Ignore, &()))
+        })
+        .collect();
+    assert!(expected.iter().any(|e| e.starts_with("Err")) && expected[0].starts_with("Ok"), "{expected:?}");
+    on_every_set(|set| {
+        let found = ensemble_with(set, &Exploding, &runs, TOLERANCE, None, |_| Ignore);
+        assert_eq!(found.iter().map(|end| word(&end.summary)).collect::<Vec<_>>(), expected, "{set:?}");
+    });
+}
+
+#[test]
+fn no_runs_no_ends() {
+    assert!(ensemble(&field(), &[], TOLERANCE, None, |_| Ignore).is_empty());
 }

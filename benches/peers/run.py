@@ -31,7 +31,8 @@ PEERS = [
 ]
 METHODS = {
     "dopri5": (W1 + ["W2 B"], "Boost.odeint dopri5", 0.8),
-    "dopri5-lanes": (["W2 B"], "Boost.odeint dopri5", 1 / 12),
+    "dopri5-lanes-avx2": (["W2 B"], "Boost.odeint dopri5", 1 / 12),
+    "dopri5-lanes-avx512": (["W2 B"], "Boost.odeint dopri5", 1 / 12),
     "lsoda": (W1, "CVODE Adams", 1 / 7),
     "radau5": (W1, None, None),
     "taylor": (W1, "heyoka Taylor, layer's edge as event", 1 / 1.2),

@@ -603,7 +603,7 @@ def solve(
         "random:exponential:MEAN" or "random:uniform:LONGEST". There is no default: the equations do not make this choice.
     plus_probability : float
         Probability of leaving to h > 0 under a random exit [default 0.5].
-    method : {"dopri5", "lsoda", "radau5", "taylor", "taylor-extended"}
+    method : {"dopri5", "lsoda", "radau5", "taylor", "taylor-extended", "layered"}
         Integration method. Filippov motion is integrated by dopri5.
     rtol, atol : float
         Tolerances of a step's local error [default 10^-7.97727, NDSolve's; 1e-32 for taylor-extended].

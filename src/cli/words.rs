@@ -49,6 +49,8 @@ mirror! {
         Taylor,
         /// The same in double-double arithmetic, about 32 digits.
         TaylorExtended,
+        /// Taylor series outside the layer, its own variable inside: smoothed systems that are polynomials outside.
+        Layered,
     }
 }
 

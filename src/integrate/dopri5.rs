@@ -72,25 +72,25 @@ pub struct Dopri5<const N: usize> {
     t: f64,
     x: SVector<f64, N>,
     /// f(x): the last stage of the previous step.
-    fsal: SVector<f64, N>,
+    pub(super) fsal: SVector<f64, N>,
     t_end: f64,
-    max_step: f64,
+    pub(super) max_step: f64,
     /// Step to try next.
-    h: f64,
+    pub(super) h: f64,
     /// log2 of the square of the last accepted step's error, for the PI controller.
-    last_log: f64,
-    dense: Dense<N>,
+    pub(super) last_log: f64,
+    pub(super) dense: Dense<N>,
 }
 
 /// The interpolant of one step, Hairer et al. (1993), sec. II.6: what it is made of. Most steps are never looked into, so its
 /// coefficients are computed when asked for.
 #[derive(Clone, Debug)]
-struct Dense<const N: usize> {
-    h: f64,
-    x0: SVector<f64, N>,
-    x1: SVector<f64, N>,
+pub(super) struct Dense<const N: usize> {
+    pub(super) h: f64,
+    pub(super) x0: SVector<f64, N>,
+    pub(super) x1: SVector<f64, N>,
     /// The derivatives of stages 1, 3, 4, 5, 6, 7.
-    k: [SVector<f64, N>; 6],
+    pub(super) k: [SVector<f64, N>; 6],
 }
 
 impl<const N: usize> Interpolant<N> for Dense<N> {

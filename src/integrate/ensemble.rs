@@ -1,290 +1,609 @@
-//! Many independent runs of one system at once, side by side in [`Lanes`], by Dormand-Prince 5(4).
+//! Many independent runs of one equation at once, side by side in the lanes of vector registers, by Dormand-Prince 5(4).
 //!
-//! Each lane has its own time and step size, takes and refuses steps by itself, and is given the next start when it has reached the
-//! end. So a run's result does not depend on its neighbours, on the width, or on the machine: it is bit for bit
-//! that of [`Dopri5`](super::Dopri5) alone, because every operation is the same one in the same order (tests/ensemble.rs).
+//! Each lane has its own time, step size, schedule and end, takes and refuses steps by itself, and is given the next run when its own has
+//! come to an end. So what comes of a run does not depend on its neighbours, on the number of lanes, or on the machine: it is bit for bit
+//! what [`drive`](super::drive) makes of it with [`Dopri5`], because every operation is the same one in the same order (tests/ensemble.rs).
 //!
-//! The instruction set is chosen when the program runs (crate `pulp`; x86-64 with AVX2 or AVX-512, else what the program was
-//! compiled for). It changes how many lanes an instruction takes and nothing else: no operation is fused, none reordered.
+//! The instruction set is chosen when the program runs ([`InstructionSet`]). It decides how many lanes an instruction takes and nothing else:
+//! no operation is fused, none reordered.
+
+// Loops by number over registers and components: iterators and closures may stay calls, compiled for the wrong instruction set.
+#![allow(clippy::needless_range_loop)]
 
 use nalgebra::SVector;
+use pulp::bytemuck::{cast_slice, cast_slice_mut};
+use pulp::{Scalar, Simd, WithSimd};
 
-use super::dopri5::{control, tableau::*};
-use super::starting_step::starting_step;
-use super::step::{Failure, Statistics, Tolerance, finite};
-use crate::num::elementary::kernels::{Pointwise, rough_exp2, rough_log2};
-use crate::num::elementary::sqrt;
-use crate::num::{Arithmetic, Lanes};
+use super::dopri5::{Dense, Dopri5, control, tableau::*};
+use super::driver::{Course, Observer, Summary};
+use super::schedule::{Kicker, Segment};
+use super::step::{Failure, Flow, Statistics, Step, Stepper, StopReason, Tolerance};
+use crate::num::elementary::kernels::{rough_exp2, rough_log2};
+use crate::num::{Arithmetic, Mask, Registers};
 use crate::system::VectorField;
 
-/// Lanes of [`ensemble()`]: one register of AVX-512, two of AVX2, four of SSE2.
-pub const WIDTH: usize = 8;
-
-/// What every run of an ensemble shares.
+/// A start and what is to happen from there.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// Local error control.
-    pub tolerance: Tolerance,
-    /// Each run goes from time 0 to this one.
-    pub t_end: f64,
-    /// No step is longer.
-    pub max_step: f64,
-    /// A run that has taken so many steps before the end is given up.
-    pub max_steps: u64,
+pub struct Run<const N: usize> {
+    /// The state at time 0.
+    pub start: SVector<f64, N>,
+    /// How far and by what rules.
+    pub course: Course,
 }
 
-/// The end of one run.
+/// How one run ended.
 #[derive(Clone, Debug, PartialEq)]
-pub struct End<const N: usize> {
-    /// The state at the end time.
-    pub x: SVector<f64, N>,
-    /// Work done.
-    pub statistics: Statistics,
+pub struct End<O, const N: usize> {
+    /// What [`drive`](super::drive) gives.
+    pub summary: Result<Summary<N>, Failure>,
+    /// The run's observer, with what it has seen.
+    pub observer: O,
 }
 
-/// The ends of the runs from `starts`, in their order.
+/// The plane x\[coordinate\] = value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// Which component of the state.
+    pub coordinate: usize,
+    /// Its value there.
+    pub value: f64,
+}
+
+/// The instructions that lanes are computed with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InstructionSet {
+    /// What the program was compiled for, one lane.
+    Portable,
+    /// AVX2, four lanes an instruction.
+    Avx2,
+    /// AVX-512, eight lanes an instruction.
+    Avx512,
+}
+
+impl InstructionSet {
+    /// Every one, those of other machines too.
+    pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
+
+    /// Whether this machine has it.
+    pub fn is_here(self) -> bool {
+        match self {
+            Self::Portable => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => pulp::x86::V3::try_new().is_some(),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => pulp::x86::V4::try_new().is_some(),
+            #[cfg(not(target_arch = "x86_64"))]
+            Self::Avx2 | Self::Avx512 => false,
+        }
+    }
+
+    /// The fastest one here.
+    pub fn best() -> Self {
+        let widest = [Self::Avx512, Self::Avx2];
+        widest.into_iter().find(|set| set.is_here()).unwrap_or(Self::Portable)
+    }
+}
+
+/// The ends of `runs`, in their order, computed with the fastest instructions of this machine.
 ///
-/// Each is a [`Failure`] where [`Dopri5`](super::Dopri5) would fail; [`Failure::TooManySteps`] where the budget is used up.
-pub fn ensemble<F: VectorField<N>, const N: usize>(
+/// Each run has an observer of its own, made by `observer` from the run's number. It hears of every kick, and of those steps only that may
+/// meet `plane`: of none without one. (Steps that certainly do not meet a plane tell a section nothing, and most do not.)
+pub fn ensemble<F, O, const N: usize>(
     field: &F,
-    starts: &[SVector<f64, N>],
-    settings: &Settings,
-) -> Vec<Result<End<N>, Failure>> {
-    struct Job<'a, F, const N: usize>(&'a F, &'a [SVector<f64, N>], &'a Settings);
-    impl<F: VectorField<N>, const N: usize> pulp::WithSimd for Job<'_, F, N> {
-        type Output = Vec<Result<End<N>, Failure>>;
-        #[inline(always)]
-        fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
-            in_lanes::<F, N, WIDTH>(self.0, self.1, self.2)
-        }
-    }
-    pulp::Arch::new().dispatch(Job(field, starts, settings))
+    runs: &[Run<N>],
+    tolerance: Tolerance,
+    plane: Option<Plane>,
+    observer: impl Fn(usize) -> O,
+) -> Vec<End<O, N>>
+where
+    F: VectorField<N>,
+    O: Observer<N>,
+{
+    ensemble_with(InstructionSet::best(), field, runs, tolerance, plane, observer)
 }
 
-/// [`ensemble()`] in `W` lanes with the instructions that the program was compiled for.
-#[inline(always)]
-pub fn in_lanes<F: VectorField<N>, const N: usize, const W: usize>(
+/// [`ensemble()`] with the instructions `set`; with [`InstructionSet::best`] if this machine has not got it.
+pub fn ensemble_with<F, O, const N: usize>(
+    set: InstructionSet,
     field: &F,
-    starts: &[SVector<f64, N>],
-    settings: &Settings,
-) -> Vec<Result<End<N>, Failure>> {
-    let mut ends: Vec<Option<Result<End<N>, Failure>>> = vec![None; starts.len()];
-    let mut waiting = starts.iter().copied().enumerate();
-    let mut lanes = State::<N, W>::idle(settings);
-    for lane in 0..W {
-        lanes.refill(lane, field, settings, &mut waiting, &mut ends);
+    runs: &[Run<N>],
+    tolerance: Tolerance,
+    plane: Option<Plane>,
+    observer: impl Fn(usize) -> O,
+) -> Vec<End<O, N>>
+where
+    F: VectorField<N>,
+    O: Observer<N>,
+{
+    let set = if set.is_here() { set } else { InstructionSet::best() };
+    let all = All::<_, _, _, N, 1> { field, runs, tolerance, plane, observer };
+    match set {
+        InstructionSet::Portable => all.with_simd(Scalar),
+        // Two registers side by side: while one waits for a quotient, the other goes on.
+        #[cfg(target_arch = "x86_64")]
+        InstructionSet::Avx2 => match pulp::x86::V3::try_new() {
+            Some(set) => Simd::vectorize(set, all.in_registers::<2>()),
+            None => all.with_simd(Scalar),
+        },
+        #[cfg(target_arch = "x86_64")]
+        InstructionSet::Avx512 => match pulp::x86::V4::try_new() {
+            Some(set) => Simd::vectorize(set, all.in_registers::<2>()),
+            None => all.with_simd(Scalar),
+        },
+        #[cfg(not(target_arch = "x86_64"))]
+        InstructionSet::Avx2 | InstructionSet::Avx512 => all.with_simd(Scalar),
     }
-    while lanes.run.iter().any(Option::is_some) {
-        let done = lanes.step(field, settings);
-        for (lane, done) in done.into_iter().enumerate() {
-            if let (true, Some(run)) = (done, lanes.run[lane]) {
-                ends[run] = Some(lanes.end(lane, settings));
-                lanes.refill(lane, field, settings, &mut waiting, &mut ends);
-            }
-        }
-    }
-    ends.into_iter().flatten().collect()
 }
 
-/// All lanes: [`Dopri5`](super::Dopri5)'s fields side by side.
-struct State<const N: usize, const W: usize> {
-    /// The run in each lane; its other values mean nothing without one.
-    run: [Option<usize>; W],
-    t: Lanes<W>,
-    x: SVector<Lanes<W>, N>,
-    fsal: SVector<Lanes<W>, N>,
-    h: Lanes<W>,
-    last_log: Lanes<W>,
-    rejected_before: [bool; W],
-    steps: [u64; W],
-    rejected: [u64; W],
-    evaluations: [u64; W],
-    failure: [Option<Failure>; W],
+/// The whole task, for `K` registers.
+struct All<'a, F, O, M: Fn(usize) -> O, const N: usize, const K: usize> {
+    field: &'a F,
+    runs: &'a [Run<N>],
+    tolerance: Tolerance,
+    plane: Option<Plane>,
+    observer: M,
 }
 
-impl<const N: usize, const W: usize> State<N, W> {
-    fn idle(settings: &Settings) -> Self {
-        let zero = SVector::from_element(Lanes([0.0; W]));
-        Self {
-            run: [None; W],
-            t: Lanes([settings.t_end; W]),
-            x: zero,
-            fsal: zero,
-            h: Lanes([0.0; W]),
-            last_log: Lanes([control::LEAST_LOG; W]),
-            rejected_before: [false; W],
-            steps: [0; W],
-            rejected: [0; W],
-            evaluations: [0; W],
-            failure: [const { None }; W],
-        }
+impl<'a, F, O, M: Fn(usize) -> O, const N: usize, const K: usize> All<'a, F, O, M, N, K> {
+    fn in_registers<const L: usize>(self) -> All<'a, F, O, M, N, L> {
+        let Self { field, runs, tolerance, plane, observer } = self;
+        All { field, runs, tolerance, plane, observer }
     }
+}
 
-    /// Puts the next start into `lane`; ends that need no step go straight to `ends`.
-    fn refill<F: VectorField<N>>(
-        &mut self,
-        lane: usize,
-        field: &F,
-        settings: &Settings,
-        waiting: &mut impl Iterator<Item = (usize, SVector<f64, N>)>,
-        ends: &mut [Option<Result<End<N>, Failure>>],
-    ) {
-        self.run[lane] = None;
-        self.h.0[lane] = 0.0;
-        for (run, x) in waiting {
-            let slope = field.eval(&x);
-            if !finite(&x) || !finite(&slope) {
-                ends[run] = Some(Err(Failure::NotFinite { t: 0.0, state: Failure::state(&x) }));
-                continue;
-            }
-            let Tolerance { rtol, atol } = settings.tolerance;
-            let norm = |v: &SVector<f64, N>| {
-                let mut sum = 0.0;
-                for i in 0..N {
-                    let q = v[i] / (atol + rtol * x[i].abs());
-                    sum += q * q;
-                }
-                sqrt(sum / N as f64)
-            };
-            let longest = settings.max_step.min(settings.t_end);
-            let h = starting_step(&x, &slope, norm, 0.2, longest, |y| field.eval(y)).min(settings.max_step);
-            self.run[lane] = Some(run);
-            self.t.0[lane] = 0.0;
-            for i in 0..N {
-                self.x[i].0[lane] = x[i];
-                self.fsal[i].0[lane] = slope[i];
-            }
-            self.h.0[lane] = h;
-            self.last_log.0[lane] = control::LEAST_LOG;
-            self.rejected_before[lane] = false;
-            (self.steps[lane], self.rejected[lane], self.evaluations[lane]) = (0, 0, 2);
-            return;
-        }
-    }
-
-    /// How the run in `lane` ended.
-    fn end(&mut self, lane: usize, settings: &Settings) -> Result<End<N>, Failure> {
-        let x = SVector::from_fn(|i, _| self.x[i].0[lane]);
-        if let Some(failure) = self.failure[lane].take() {
-            return Err(failure);
-        }
-        if self.t.0[lane] < settings.t_end {
-            return Err(Failure::TooManySteps {
-                t: self.t.0[lane],
-                limit: settings.max_steps,
-                state: Failure::state(&x),
-            });
-        }
-        let statistics = Statistics {
-            steps: self.steps[lane],
-            rejected: self.rejected[lane],
-            evaluations: self.evaluations[lane],
-            restarts: 1,
-            highest_order: 5,
-            ..Statistics::default()
-        };
-        Ok(End { x, statistics })
-    }
-
-    /// One trial step in every lane; says which lanes have come to an end of any kind.
+impl<F: VectorField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, const K: usize> WithSimd
+    for All<'_, F, O, M, N, K>
+{
+    type Output = Vec<End<O, N>>;
     #[inline(always)]
-    fn step<F: VectorField<N>>(&mut self, field: &F, settings: &Settings) -> [bool; W] {
-        let (t0, x0, k1) = (self.t, self.x, self.fsal);
-        let t_end = Lanes([settings.t_end; W]);
-        let remaining = t_end - t0;
-        let last: [bool; W] = std::array::from_fn(|l| self.h.0[l] * 1.000_000_1 >= remaining.0[l]);
-        let h = Lanes(std::array::from_fn(|l| if last[l] { remaining.0[l] } else { self.h.0[l] }));
-
-        let k2 = field.eval(&advanced(&x0, h, [(&k1, A21)]));
-        let k3 = field.eval(&advanced(&x0, h, [(&k1, A31), (&k2, A32)]));
-        let k4 = field.eval(&advanced(&x0, h, [(&k1, A41), (&k2, A42), (&k3, A43)]));
-        let k5 = field.eval(&advanced(&x0, h, [(&k1, A51), (&k2, A52), (&k3, A53), (&k4, A54)]));
-        let k6 = field.eval(&advanced(&x0, h, [(&k1, A61), (&k2, A62), (&k3, A63), (&k4, A64), (&k5, A65)]));
-        let increment = combined(h, (&k1, A71), [(&k3, A73), (&k4, A74), (&k5, A75), (&k6, A76)]);
-        let x1 = SVector::from_fn(|i, _| x0[i] + increment[i]);
-        let k7 = field.eval(&x1);
-        let e = combined(h, (&k1, E1), [(&k3, E3), (&k4, E4), (&k5, E5), (&k6, E6), (&k7, E7)]);
-
-        let (rtol, atol) = (Lanes::from_f64(settings.tolerance.rtol), Lanes::from_f64(settings.tolerance.atol));
-        let mut square = Lanes([0.0; W]);
-        for i in 0..N {
-            let q = e[i] / (atol + rtol * x0[i].map2(x1[i], |a, b| a.abs().max(b.abs())));
-            square += q * q;
-        }
-        let square = square / Lanes::from_f64(N as f64);
-        // 0 times a finite number is 0; anything else makes a NaN.
-        let zero = Lanes([0.0; W]);
-        let mut probe = square * zero;
-        for i in 0..N {
-            probe += x1[i] * zero + k7[i] * zero;
-        }
-
-        let log = rough_log2(square.map(|s| s.max(control::LEAST_SQUARE)));
-        let accepted: [bool; W] = std::array::from_fn(|l| square.0[l] <= 1.0 && probe.0[l] == 0.0);
-        let grown = Lanes::from_f64(control::ALPHA) * log - Lanes::from_f64(control::BETA) * self.last_log;
-        let half = Lanes::from_f64(0.5);
-        let (after_success, after_failure) = (half * grown, Lanes::from_f64(0.5 * control::ALPHA) * log);
-        let exponent: Lanes<W> =
-            Lanes(std::array::from_fn(|l| if accepted[l] { after_success.0[l] } else { after_failure.0[l] }));
-        let factor = rough_exp2(exponent) / Lanes::from_f64(control::SAFETY);
-
-        let mut done = [false; W];
-        for l in 0..W {
-            // The rare cases first; idle lanes have h = 0.
-            if self.run[l].is_none() {
-                continue;
-            }
-            let state = |x: &SVector<Lanes<W>, N>| x.iter().map(|c| c.0[l]).collect();
-            let h = h.0[l];
-            if h.abs() <= t0.0[l].abs() * f64::EPSILON || h < f64::MIN_POSITIVE {
-                self.failure[l] = Some(Failure::StepUnderflow { t: t0.0[l], h, state: state(&x0) });
-                done[l] = true;
-                continue;
-            }
-            self.evaluations[l] += 6;
-            if accepted[l] {
-                let next = h / factor.0[l].clamp(1.0 / control::GROW, 1.0 / control::SHRINK);
-                let next = if self.rejected_before[l] { next.min(h) } else { next };
-                self.h.0[l] = next.min(settings.max_step);
-                self.last_log.0[l] = log.0[l].max(control::LEAST_LOG);
-                self.t.0[l] = if last[l] { settings.t_end } else { t0.0[l] + h };
-                self.rejected_before[l] = false;
-                self.steps[l] += 1;
-                done[l] = last[l] || self.steps[l] >= settings.max_steps;
-            } else {
-                self.rejected[l] += 1;
-                self.rejected_before[l] = true;
-                if probe.0[l] == 0.0 {
-                    self.h.0[l] = h / factor.0[l].min(1.0 / control::SHRINK);
-                } else {
-                    self.h.0[l] = h * 0.1;
-                    if self.h.0[l] <= t0.0[l].abs() * f64::EPSILON || self.h.0[l] < 1e-300 {
-                        self.failure[l] = Some(Failure::NotFinite { t: t0.0[l], state: state(&x0) });
-                        done[l] = true;
+    fn with_simd<S: Simd>(self, set: S) -> Self::Output {
+        let Self { field, runs, tolerance, plane, observer } = self;
+        let width = Registers::<S, K>::WIDTH;
+        let mut ends: Vec<Option<End<O, N>>> = runs.iter().map(|_| None).collect();
+        let mut waiting = 0..runs.len();
+        let mut state = State::<S, O, N, K>::idle(set, tolerance);
+        loop {
+            for l in 0..width {
+                while state.lanes[l].is_none() {
+                    let Some(run) = waiting.next() else { break };
+                    if let Some(end) = state.begin(l, field, run, &runs[run], observer(run)) {
+                        ends[run] = Some(end);
                     }
                 }
             }
+            if state.lanes.iter().all(Option::is_none) {
+                break;
+            }
+            // Until a lane is empty.
+            while !state.step(field, plane, &mut ends) {}
         }
-        for i in 0..N {
-            self.x[i] = Lanes(std::array::from_fn(|l| if accepted[l] { x1[i].0[l] } else { x0[i].0[l] }));
-            self.fsal[i] = Lanes(std::array::from_fn(|l| if accepted[l] { k7[i].0[l] } else { k1[i].0[l] }));
-        }
-        done
+        ends.into_iter().flatten().collect()
     }
+}
+
+/// What a lane's run needs besides its numbers.
+struct Lane<O, const N: usize> {
+    run: usize,
+    course: Course,
+    segments: Box<dyn Iterator<Item = Segment>>,
+    segment: Segment,
+    kicker: Option<Kicker>,
+    observer: O,
+    restarts: u64,
+    /// Steps taken before this segment.
+    steps_before: f64,
+    most_steps_in_segment: f64,
+    /// Does the restarts.
+    stepper: Dopri5<N>,
+}
+
+/// All lanes: the fields of [`Dopri5`] side by side, as bare registers.
+struct State<S: Simd, O, const N: usize, const K: usize> {
+    set: S,
+    tolerance: Tolerance,
+    t: [S::f64s; K],
+    t_end: [S::f64s; K],
+    max_step: [S::f64s; K],
+    max_steps: [S::f64s; K],
+    h: [S::f64s; K],
+    last_log: [S::f64s; K],
+    /// 1 after a rejected trial of the same step, else 0.
+    rejected_before: [S::f64s; K],
+    steps: [S::f64s; K],
+    rejected: [S::f64s; K],
+    x: [[S::f64s; K]; N],
+    fsal: [[S::f64s; K]; N],
+    lanes: Vec<Option<Lane<O, N>>>,
+}
+
+#[inline(always)]
+fn get<V: pulp::bytemuck::Pod, const K: usize>(parts: &[V; K], lane: usize) -> f64 {
+    cast_slice::<V, f64>(parts)[lane]
+}
+
+#[inline(always)]
+fn put<V: pulp::bytemuck::Pod, const K: usize>(parts: &mut [V; K], lane: usize, value: f64) {
+    cast_slice_mut::<V, f64>(parts)[lane] = value;
+}
+
+impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> {
+    fn idle(set: S, tolerance: Tolerance) -> Self {
+        let zero = [set.splat_f64s(0.0); K];
+        Self {
+            set,
+            tolerance,
+            t: zero,
+            t_end: zero,
+            max_step: zero,
+            max_steps: zero,
+            h: zero,
+            last_log: zero,
+            rejected_before: zero,
+            steps: zero,
+            rejected: zero,
+            x: [zero; N],
+            fsal: [zero; N],
+            lanes: (0..Registers::<S, K>::WIDTH).map(|_| None).collect(),
+        }
+    }
+
+    /// Puts a run into an empty lane; gives its end if it needs no step.
+    #[inline(never)]
+    fn begin<F: VectorField<N>>(
+        &mut self,
+        l: usize,
+        field: &F,
+        run: usize,
+        Run { start, course }: &Run<N>,
+        observer: O,
+    ) -> Option<End<O, N>> {
+        let mut segments = Box::new(course.schedule.segments(0.0, course.t_end));
+        put(&mut self.steps, l, 0.0);
+        put(&mut self.rejected, l, 0.0);
+        put(&mut self.t, l, 0.0);
+        put(&mut self.max_steps, l, course.max_steps as f64);
+        for i in 0..N {
+            put(&mut self.x[i], l, start[i]);
+        }
+        let first = segments.next();
+        self.lanes[l] = Some(Lane {
+            run,
+            course: *course,
+            segments,
+            segment: first.unwrap_or(Segment { end: 0.0, kick: false }),
+            kicker: course.schedule.kick.map(|kick| Kicker::new(kick, course.kicked_states)),
+            observer,
+            restarts: 0,
+            steps_before: 0.0,
+            most_steps_in_segment: 0.0,
+            stepper: Dopri5::new(self.tolerance),
+        });
+        if first.is_none() {
+            return self.finish(l, Ok(StopReason::EndTime));
+        }
+        self.restart(l, field).and_then(|failure| self.finish(l, Err(failure)))
+    }
+
+    /// Begins the segment of lane `l`.
+    fn restart<F: VectorField<N>>(&mut self, l: usize, field: &F) -> Option<Failure> {
+        let (t, x) = (get(&self.t, l), self.state(l));
+        let lane = self.lanes[l].as_mut()?;
+        lane.restarts += 1;
+        let end = lane.segment.end;
+        if let Err(failure) = lane.stepper.restart(field, t, x, end, lane.course.step_cap.for_segment(end - t)) {
+            return Some(failure);
+        }
+        let Dopri5 { fsal, h, last_log, max_step, .. } = &lane.stepper;
+        put(&mut self.t_end, l, end);
+        put(&mut self.max_step, l, *max_step);
+        put(&mut self.h, l, *h);
+        put(&mut self.last_log, l, *last_log);
+        put(&mut self.rejected_before, l, 0.0);
+        for i in 0..N {
+            put(&mut self.fsal[i], l, fsal[i]);
+        }
+        None
+    }
+
+    fn state(&self, l: usize) -> SVector<f64, N> {
+        SVector::from_fn(|i, _| get(&self.x[i], l))
+    }
+
+    /// Empties lane `l`.
+    fn finish(&mut self, l: usize, stop: Result<StopReason, Failure>) -> Option<End<O, N>> {
+        let lane = self.lanes[l].take()?;
+        put(&mut self.h, l, 0.0);
+        let (steps, rejected) = (get(&self.steps, l) as u64, get(&self.rejected, l) as u64);
+        let statistics = Statistics {
+            steps,
+            rejected,
+            evaluations: 2 * lane.restarts + 6 * (steps + rejected),
+            restarts: lane.restarts,
+            highest_order: 5,
+            ..Statistics::default()
+        };
+        let (t, x) = (get(&self.t, l), self.state(l));
+        let most_steps_in_segment = lane.most_steps_in_segment as u64;
+        let summary = stop.map(|stop| Summary { t, x, statistics, most_steps_in_segment, stop });
+        Some(End { summary, observer: lane.observer })
+    }
+
+    /// One trial step in every lane. Says whether a lane has become empty.
+    #[inline(always)]
+    fn step<F: VectorField<N>>(&mut self, field: &F, plane: Option<Plane>, ends: &mut [Option<End<O, N>>]) -> bool {
+        let set = self.set;
+        let vector = |parts: &[[S::f64s; K]; N]| {
+            let mut v = SVector::<Registers<S, K>, N>::from_element(Registers::splat(set, 0.0));
+            for i in 0..N {
+                v[i] = Registers::new(set, parts[i]);
+            }
+            v
+        };
+        let number = |value: f64| Registers::<S, K>::splat(set, value);
+        let of = |parts: [S::f64s; K]| Registers::<S, K>::new(set, parts);
+        let (t0, x0, k1) = (of(self.t), vector(&self.x), vector(&self.fsal));
+        let remaining = of(self.t_end) - t0;
+        let last = remaining.at_most(of(self.h) * number(1.000_000_1), set);
+        let h = last.select(remaining, of(self.h));
+
+        let f = |x: &SVector<Registers<S, K>, N>| vector(&set.vectorize(Field { set, field, x: bare(x) }));
+        let k2 = f(&advanced(&x0, h, [(&k1, A21)]));
+        let k3 = f(&advanced(&x0, h, [(&k1, A31), (&k2, A32)]));
+        let k4 = f(&advanced(&x0, h, [(&k1, A41), (&k2, A42), (&k3, A43)]));
+        let k5 = f(&advanced(&x0, h, [(&k1, A51), (&k2, A52), (&k3, A53), (&k4, A54)]));
+        let k6 = f(&advanced(&x0, h, [(&k1, A61), (&k2, A62), (&k3, A63), (&k4, A64), (&k5, A65)]));
+        let mut x1 = combined(h, (&k1, A71), [(&k3, A73), (&k4, A74), (&k5, A75), (&k6, A76)]);
+        for i in 0..N {
+            x1[i] = x0[i] + x1[i];
+        }
+        let k7 = f(&x1);
+        let e = combined(h, (&k1, E1), [(&k3, E3), (&k4, E4), (&k5, E5), (&k6, E6), (&k7, E7)]);
+
+        let (rtol, atol) = (number(self.tolerance.rtol), number(self.tolerance.atol));
+        let larger = |a: Registers<S, K>, b: Registers<S, K>| a.less(b, set).select(b, a);
+        let smaller = |a: Registers<S, K>, b: Registers<S, K>| b.less(a, set).select(b, a);
+        let mut square = number(0.0);
+        for i in 0..N {
+            let q = e[i] / (atol + rtol * larger(x0[i].size(), x1[i].size()));
+            square += q * q;
+        }
+        let square = square / number(N as f64);
+        // 0 times a finite number is 0; anything else makes a NaN.
+        let mut probe = square * number(0.0);
+        for i in 0..N {
+            probe += x1[i] * number(0.0) + k7[i] * number(0.0);
+        }
+        let sound = probe.size().at_most(number(0.0), set);
+        let accepted = sound.and(square.at_most(number(1.0), set));
+
+        let log = rough_log2(larger(square, number(control::LEAST_SQUARE)));
+        let after_success = number(0.5) * (number(control::ALPHA) * log - number(control::BETA) * of(self.last_log));
+        let after_failure = number(0.5 * control::ALPHA) * log;
+        let factor = rough_exp2(accepted.select(after_success, after_failure)) / number(control::SAFETY);
+        let factor = smaller(factor, number(1.0 / control::SHRINK));
+        let least = accepted.select(number(1.0 / control::GROW), factor);
+        let next = h / larger(factor, least);
+        let again = number(0.5).less(of(self.rejected_before), set);
+        let next = accepted.and(again).select(smaller(next, h), next);
+        let next = accepted.select(smaller(next, of(self.max_step)), next);
+
+        // What every step does.
+        let (one, zero) = (number(1.0), number(0.0));
+        let t1 = last.select(of(self.t_end), t0 + h);
+        self.h = next.parts();
+        self.t = accepted.select(t1, t0).parts();
+        self.last_log = accepted.select(larger(log, number(control::LEAST_LOG)), of(self.last_log)).parts();
+        self.rejected_before = accepted.select(zero, one).parts();
+        let steps = of(self.steps) + accepted.select(one, zero);
+        self.steps = steps.parts();
+        self.rejected = (of(self.rejected) + accepted.select(zero, one)).parts();
+        for i in 0..N {
+            self.x[i] = accepted.select(x1[i], x0[i]).parts();
+            self.fsal[i] = accepted.select(k7[i], k1[i]).parts();
+        }
+
+        // What few do.
+        let tiny = h.size().at_most(t0.size() * number(f64::EPSILON), set).or(h.less(number(f64::MIN_POSITIVE), set));
+        let ended = accepted.and(last.or(of(self.max_steps).at_most(steps, set)));
+        let unsound = sound.select(zero, one).size();
+        let mut noted = tiny.or(ended).or(number(0.5).less(unsound, set));
+        let mut met = None;
+        if let Some(Plane { coordinate, value }) = plane {
+            let may = may_meet(coordinate, number(value), h, &x0, &x1, [&k1, &k3, &k4, &k5, &k6, &k7], set);
+            let may = may.and(accepted);
+            met = Some(may.select(one, zero).parts());
+            noted = noted.or(may);
+        }
+        if !noted.any() {
+            return false;
+        }
+        let lanes = |mask: Mask<S, K>| mask.select(one, zero).parts();
+        let seen = Seen {
+            t0: t0.parts(),
+            h: h.parts(),
+            tiny: lanes(tiny),
+            accepted: lanes(accepted),
+            sound: lanes(sound),
+            last: lanes(last),
+            met,
+            x: bare(&x0),
+            k: [bare(&k1), bare(&k3), bare(&k4), bare(&k5), bare(&k6), bare(&k7)],
+        };
+        self.attend(field, &seen, ends)
+    }
+
+    /// The scalar part of a step, for the lanes that need one. Says whether a lane has become empty.
+    #[inline(never)]
+    fn attend<F: VectorField<N>>(&mut self, field: &F, seen: &Seen<S, N, K>, ends: &mut [Option<End<O, N>>]) -> bool {
+        let mut emptied = false;
+        for l in 0..Registers::<S, K>::WIDTH {
+            let Some(run) = self.lanes[l].as_ref().map(|lane| lane.run) else { continue };
+            if let Some(stop) = self.attend_one(l, field, seen) {
+                ends[run] = self.finish(l, stop);
+                emptied = true;
+            }
+        }
+        emptied
+    }
+
+    /// As the loop of [`drive`](super::drive) and [`Dopri5::step`] do it; gives the end of the run.
+    fn attend_one<F: VectorField<N>>(
+        &mut self,
+        l: usize,
+        field: &F,
+        seen: &Seen<S, N, K>,
+    ) -> Option<Result<StopReason, Failure>> {
+        let yes = |parts: &[S::f64s; K]| get(parts, l) > 0.5;
+        let (t0, h) = (get(&seen.t0, l), get(&seen.h, l));
+        let x0 = SVector::from_fn(|i, _| get(&seen.x[i], l));
+        if yes(&seen.tiny) {
+            return Some(Err(Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) }));
+        }
+        if !yes(&seen.accepted) {
+            if !yes(&seen.sound) {
+                let shorter = h * 0.1;
+                put(&mut self.h, l, shorter);
+                if shorter <= t0.abs() * f64::EPSILON || shorter < 1e-300 {
+                    return Some(Err(Failure::NotFinite { t: t0, state: Failure::state(&x0) }));
+                }
+            }
+            return None;
+        }
+        let (t1, x1, steps) = (get(&self.t, l), self.state(l), get(&self.steps, l));
+        let lane = self.lanes[l].as_mut()?;
+        let mut flow = Flow::Continue;
+        if seen.met.as_ref().is_some_and(yes) {
+            let k = std::array::from_fn(|j| SVector::from_fn(|i, _| get(&seen.k[j][i], l)));
+            let dense = Dense { h, x0, x1, k };
+            flow = lane.observer.step(&Step { t0, t1, x0, x1, interpolant: &dense });
+        }
+        let stop = if flow == Flow::Stop {
+            Some(StopReason::Observer)
+        } else {
+            (steps >= lane.course.max_steps as f64 && t1 < lane.course.t_end).then_some(StopReason::StepBudget)
+        };
+        if stop.is_some() || yes(&seen.last) {
+            lane.most_steps_in_segment = lane.most_steps_in_segment.max(steps - lane.steps_before);
+            lane.steps_before = steps;
+        }
+        if stop.is_some() || !yes(&seen.last) {
+            return stop.map(Ok);
+        }
+        if let (true, Some(kicker)) = (lane.segment.kick, lane.kicker.as_mut()) {
+            let kicked = kicker.apply(x1);
+            lane.observer.kick(t1, &x1, &kicked);
+            for i in 0..N {
+                put(&mut self.x[i], l, kicked[i]);
+            }
+        }
+        match lane.segments.next() {
+            None => Some(Ok(StopReason::EndTime)),
+            Some(segment) => {
+                lane.segment = segment;
+                self.restart(l, field).map(Err)
+            }
+        }
+    }
+}
+
+/// A trial step, for whom it concerns.
+struct Seen<S: Simd, const N: usize, const K: usize> {
+    t0: [S::f64s; K],
+    h: [S::f64s; K],
+    tiny: [S::f64s; K],
+    accepted: [S::f64s; K],
+    sound: [S::f64s; K],
+    last: [S::f64s; K],
+    met: Option<[S::f64s; K]>,
+    x: [[S::f64s; K]; N],
+    /// Stages 1, 3, 4, 5, 6, 7.
+    k: [[[S::f64s; K]; N]; 6],
+}
+
+/// f at the state `x`: a function of its own in the instruction set, so that the equation is compiled once and not for every stage.
+struct Field<'a, F, S: Simd, const N: usize, const K: usize> {
+    set: S,
+    field: &'a F,
+    x: [[S::f64s; K]; N],
+}
+
+impl<F: VectorField<N>, S: Simd, const N: usize, const K: usize> WithSimd for Field<'_, F, S, N, K> {
+    type Output = [[S::f64s; K]; N];
+    #[inline(always)]
+    fn with_simd<T: Simd>(self, _: T) -> Self::Output {
+        // The instruction set is that of the caller, who has chosen it.
+        let mut x = SVector::<Registers<S, K>, N>::from_element(Registers::splat(self.set, 0.0));
+        for i in 0..N {
+            x[i] = Registers::new(self.set, self.x[i]);
+        }
+        bare(&self.field.eval(&x))
+    }
+}
+
+/// The registers of a vector.
+#[inline(always)]
+fn bare<S: Simd, const N: usize, const K: usize>(v: &SVector<Registers<S, K>, N>) -> [[S::f64s; K]; N] {
+    let mut parts = [v[0].parts(); N];
+    for i in 0..N {
+        parts[i] = v[i].parts();
+    }
+    parts
+}
+
+/// Where the step may meet the plane: as [`Passages::through_plane`](super::roots::Passages::through_plane) decides it.
+#[inline(always)]
+fn may_meet<S: Simd, const N: usize, const K: usize>(
+    coordinate: usize,
+    value: Registers<S, K>,
+    h: Registers<S, K>,
+    x0: &SVector<Registers<S, K>, N>,
+    x1: &SVector<Registers<S, K>, N>,
+    k: [&SVector<Registers<S, K>, N>; 6],
+    set: S,
+) -> Mask<S, K> {
+    let zero = Registers::splat(set, 0.0);
+    // A run-time index would send every vector through memory.
+    let component = |v: &SVector<Registers<S, K>, N>| {
+        let mut found = zero;
+        for i in 0..N {
+            if i == coordinate {
+                found = v[i];
+            }
+        }
+        found
+    };
+    let number = |value: f64| Registers::<S, K>::splat(set, value);
+    let (a, b) = (component(x0), component(x1));
+    let [k1, k3, k4, k5, k6, k7] =
+        [component(k[0]), component(k[1]), component(k[2]), component(k[3]), component(k[4]), component(k[5])];
+    let r2 = b - a;
+    let r3 = k1 * h - r2;
+    let r3_and_r4 = r2 - k7 * h;
+    let r5 =
+        (k1 * number(D1) + k3 * number(D3) + k4 * number(D4) + k5 * number(D5) + k6 * number(D6) + k7 * number(D7)) * h;
+    let larger = r3.size().less(r3_and_r4.size(), set).select(r3_and_r4.size(), r3.size());
+    let reach = number(0.25) * (larger + number(0.25) * r5.size());
+    let (h0, h1) = (a - value, b - value);
+    let margin = number(1e-12) * (h0.size() + h1.size() + value.size() + reach);
+    let nearer = h0.size().less(h1.size(), set).select(h0.size(), h1.size());
+    let clear = (reach + margin).less(nearer, set);
+    let same = zero.less(h0, set).and(zero.less(h1, set)).or(h0.less(zero, set).and(h1.less(zero, set)));
+    let far = clear.and(same).select(number(1.0), zero);
+    far.less(number(0.5), set)
 }
 
 /// x0 + k_1 (h a_1) + k_2 (h a_2) + ..., from the left.
 #[inline(always)]
-fn advanced<const N: usize, const W: usize, const M: usize>(
-    x0: &SVector<Lanes<W>, N>,
-    h: Lanes<W>,
-    terms: [(&SVector<Lanes<W>, N>, f64); M],
-) -> SVector<Lanes<W>, N> {
+fn advanced<S: Simd, const N: usize, const K: usize, const M: usize>(
+    x0: &SVector<Registers<S, K>, N>,
+    h: Registers<S, K>,
+    terms: [(&SVector<Registers<S, K>, N>, f64); M],
+) -> SVector<Registers<S, K>, N> {
     let mut sum = *x0;
     for (k, a) in terms {
-        let ha = h * Lanes::from_f64(a);
+        let ha = h * Registers::from_f64(a);
         for i in 0..N {
-            sum[i] += k[i] * ha;
+            sum[i] = sum[i] + k[i] * ha;
         }
     }
     sum
@@ -292,12 +611,15 @@ fn advanced<const N: usize, const W: usize, const M: usize>(
 
 /// k_1 (h a_1) + k_2 (h a_2) + ..., from the left.
 #[inline(always)]
-fn combined<const N: usize, const W: usize, const M: usize>(
-    h: Lanes<W>,
-    first: (&SVector<Lanes<W>, N>, f64),
-    terms: [(&SVector<Lanes<W>, N>, f64); M],
-) -> SVector<Lanes<W>, N> {
-    let ha = h * Lanes::from_f64(first.1);
-    let start = SVector::from_fn(|i, _| first.0[i] * ha);
+fn combined<S: Simd, const N: usize, const K: usize, const M: usize>(
+    h: Registers<S, K>,
+    first: (&SVector<Registers<S, K>, N>, f64),
+    terms: [(&SVector<Registers<S, K>, N>, f64); M],
+) -> SVector<Registers<S, K>, N> {
+    let ha = h * Registers::from_f64(first.1);
+    let mut start = *first.0;
+    for i in 0..N {
+        start[i] = start[i] * ha;
+    }
     advanced(&start, h, terms)
 }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::step::{Stepper, Tolerance};
-use super::{Dopri5, Lsoda, Radau5, Taylor};
+use super::{Dopri5, Layered, Lsoda, Radau5, Taylor};
 
 /// An integration method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -20,6 +20,8 @@ pub enum Method {
     /// The same in double-double arithmetic, about 32 digits: the reference. The equation's constants and the start are the decimal numbers that
     /// they are written as: 0.1 is one tenth.
     TaylorExtended,
+    /// Taylor series outside the layer and its own variable inside, for smoothed systems that are polynomials outside.
+    Layered,
 }
 
 /// Something that can be done with any stepper. A trait, because a stepper's type depends on the method.
@@ -32,8 +34,8 @@ pub trait WithStepper<const N: usize> {
 
 impl Method {
     /// Every method.
-    pub const ALL: [Method; 5] =
-        [Method::Lsoda, Method::Dopri5, Method::Radau5, Method::Taylor, Method::TaylorExtended];
+    pub const ALL: [Method; 6] =
+        [Method::Lsoda, Method::Dopri5, Method::Radau5, Method::Taylor, Method::TaylorExtended, Method::Layered];
 
     /// The name on the command line, in files and in small print.
     pub fn name(self) -> &'static str {
@@ -43,6 +45,7 @@ impl Method {
             Method::Radau5 => "radau5",
             Method::Taylor => "taylor",
             Method::TaylorExtended => "taylor-extended",
+            Method::Layered => "layered",
         }
     }
 
@@ -54,6 +57,7 @@ impl Method {
             Method::Radau5 => user.with(Radau5::new(tolerance)),
             Method::Taylor => user.with(Taylor::new(tolerance)),
             Method::TaylorExtended => user.with(Taylor::extended(tolerance).with_decimal_constants()),
+            Method::Layered => user.with(Layered::new(tolerance)),
         }
     }
 }

@@ -29,6 +29,7 @@ pub mod dopri5;
 pub mod driver;
 pub mod ensemble;
 pub mod filippov;
+pub mod layered;
 mod linear;
 pub mod lsoda;
 pub mod method;
@@ -41,6 +42,7 @@ pub mod taylor;
 
 pub use dopri5::Dopri5;
 pub use driver::{Course, Ignore, Observer, Summary, Watch, drive};
+pub use layered::Layered;
 pub use lsoda::Lsoda;
 pub use method::{Method, WithStepper};
 pub use radau5::Radau5;

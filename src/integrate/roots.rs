@@ -88,8 +88,12 @@ impl Passages {
     /// `g` is sampled at two points more than the interpolant's degree; between samples that keep their sign, a smallest |g| in the
     /// middle is followed to its minimum, so that two zeros between neighbouring samples are found as well.
     pub fn in_step<const N: usize>(&mut self, step: &Step<'_, N>, g: impl Fn(&SVector<f64, N>) -> f64) -> Vec<Passage> {
-        let n = step.interpolant.degree() + 2;
-        let value = |theta: f64| g(&step.at(theta));
+        self.of(step.interpolant.degree(), |theta| g(&step.at(theta)))
+    }
+
+    /// [`Passages::in_step`] for a function of the fraction of the step, on an interpolant of this degree.
+    fn of(&mut self, degree: usize, value: impl Fn(f64) -> f64) -> Vec<Passage> {
+        let n = degree + 2;
         let sample = |i: usize| {
             let s = i as f64 / n as f64;
             (s, value(s))
@@ -104,7 +108,7 @@ impl Passages {
             if point.1 != 0.0 {
                 let side = point.1.signum();
                 if side != self.side && self.side != 0.0 {
-                    let theta = if last.1 == 0.0 { last.0 } else { brent(value, last.0, point.0, last.1, point.1) };
+                    let theta = if last.1 == 0.0 { last.0 } else { brent(&value, last.0, point.0, last.1, point.1) };
                     found.push(Passage { theta, upward: side > 0.0 });
                 }
                 self.side = side;
@@ -155,7 +159,7 @@ impl Passages {
                 return Vec::new();
             }
         }
-        self.in_step(step, |x| x[coordinate] - value)
+        self.of(step.interpolant.degree(), |theta| step.coordinate(theta, coordinate) - value)
     }
 }
 

@@ -9,6 +9,10 @@ use crate::system::VectorField;
 pub trait Interpolant<const N: usize> {
     /// The state at the fraction `theta` of the step, in [0, 1].
     fn at(&self, theta: f64) -> SVector<f64, N>;
+    /// One coordinate of that state, to the same bits.
+    fn coordinate(&self, theta: f64, coordinate: usize) -> f64 {
+        self.at(theta)[coordinate]
+    }
     /// The degree of the interpolant as a polynomial in `theta`.
     fn degree(&self) -> usize;
     /// A bound, up to rounding, on how far the coordinate leaves the range between its values at the step's two ends. Infinite where
@@ -42,6 +46,17 @@ impl<const N: usize> Step<'_, N> {
             self.x1
         } else {
             self.interpolant.at(theta)
+        }
+    }
+
+    /// One coordinate of the state at the fraction `theta`: [`Step::at`]'s, to the same bits.
+    pub fn coordinate(&self, theta: f64, coordinate: usize) -> f64 {
+        if theta <= 0.0 {
+            self.x0[coordinate]
+        } else if theta >= 1.0 {
+            self.x1[coordinate]
+        } else {
+            self.interpolant.coordinate(theta, coordinate)
         }
     }
 
@@ -210,6 +225,14 @@ pub enum Failure {
         limit: u64,
         /// State reached.
         state: Vec<f64>,
+    },
+    /// The method is made for another kind of equation.
+    #[error("the method {method} cannot integrate this equation: {why}; take another method")]
+    NotApplicable {
+        /// The method's name.
+        method: &'static str,
+        /// What it is about the equation.
+        why: String,
     },
     /// An implicit method's nonlinear equations could not be solved even with tiny steps.
     #[error(

@@ -396,6 +396,7 @@ fn without_tangents(mut failure: Failure, states: usize) -> Failure {
         | Failure::StepUnderflow { state, .. }
         | Failure::TooManySteps { state, .. }
         | Failure::NotConverged { state, .. } => state.truncate(states),
+        Failure::NotApplicable { .. } => {}
     }
     failure
 }

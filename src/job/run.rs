@@ -44,6 +44,7 @@ impl Question for Run {
             Method::Dopri5 => 1.0,
             Method::Taylor => 10.0,
             Method::TaylorExtended => 500.0,
+            Method::Layered => 0.3,
         };
         self.0.t_end * switch * method
     }

@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::integrate::Method;
 use crate::integrate::filippov::ExitRule;
-use crate::integrate::{Schedule, StepCap, Tolerance};
+use crate::integrate::{Schedule, StepCap, Tolerance, layered};
 use crate::num::elementary::exp10;
-use crate::system::{Relaxation, System, Transition};
+use crate::system::{Field, Relaxation, System, Transition};
 
 /// One run: system, switch, start, method, schedule, and what is recorded.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -235,6 +235,9 @@ impl RunSpec {
             SwitchSpec::Filippov { exit, funnel } => self.validate_filippov(exit, funnel)?,
         }
         self.method.validate()?;
+        if self.method.name == Method::Layered {
+            self.validate_layered()?;
+        }
         self.validate_schedule()?;
         self.validate_observation()
     }
@@ -305,6 +308,19 @@ impl RunSpec {
             });
         }
         Ok(())
+    }
+
+    fn validate_layered(&self) -> Checked {
+        let refused = |rule| Err(SpecError { field: "method", value: Method::Layered.name().into(), rule });
+        let SwitchSpec::Smoothed { eps, transition } = self.switch else {
+            return refused("it is for smoothed systems, whose layer it crosses; take lsoda or radau5");
+        };
+        match layered::applicable(Field::smoothed(&self.system, transition, eps).tape()) {
+            Ok(()) => Ok(()),
+            Err(_) => refused(
+                "it needs fields f+ and f- that are polynomials, and the transition tanh between them: this system has others; take taylor, lsoda or dopri5",
+            ),
+        }
     }
 
     fn validate_schedule(&self) -> Checked {

@@ -50,7 +50,7 @@ impl Caricature {
     }
 
     /// The re-injection term's y and z components.
-    #[inline]
+    #[inline(always)]
     fn reinjection<S: Elementary>(&self, x: &SVector<S, 3>) -> (S, S) {
         let r2 = x[0].squared() + x[1].squared() + x[2].squared();
         let alpha = S::from_f64(self.alpha);
@@ -59,18 +59,18 @@ impl Caricature {
 }
 
 impl PiecewiseSmooth<3> for Caricature {
-    #[inline]
+    #[inline(always)]
     fn switching<S: Elementary>(&self, x: &SVector<S, 3>) -> S {
         x[0]
     }
 
-    #[inline]
+    #[inline(always)]
     fn plus<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
         let (dy, dz) = self.reinjection(x);
         vector![-x[1], S::one() + dy, S::from_f64(self.v_plus) + dz]
     }
 
-    #[inline]
+    #[inline(always)]
     fn minus<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
         let (dy, dz) = self.reinjection(x);
         let first = match self.first_component_of_minus {

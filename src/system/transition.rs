@@ -27,7 +27,7 @@ pub enum Transition {
 
 impl Transition {
     /// phi at the value `h` of the switching function, for the stiffness parameter `eps`.
-    #[inline]
+    #[inline(always)]
     pub fn eval<S: Elementary>(&self, h: S, eps: f64) -> S {
         let u = h / S::from_f64(eps);
         match *self {
@@ -58,7 +58,7 @@ impl Transition {
 }
 
 /// (1 + step)/2
-#[inline]
+#[inline(always)]
 fn half<S: Elementary>(step: S) -> S {
     (S::one() + step).scale(0.5)
 }

@@ -40,7 +40,9 @@ pub(crate) const TANH_IS_ONE: f64 = 19.1;
 /// The polynomial with the coefficients `c`, lowest first, by Estrin's scheme for 7 coefficients.
 #[inline(always)]
 fn polynomial7<T: Pointwise>(u: T, c: [f64; 7]) -> T {
-    let [c0, c1, c2, c3, c4, c5, c6] = c.map(T::from_f64);
+    // Written out: `map` would stay a call, compiled for another instruction set than the lanes around it.
+    let [c0, c1, c2, c3] = [T::from_f64(c[0]), T::from_f64(c[1]), T::from_f64(c[2]), T::from_f64(c[3])];
+    let [c4, c5, c6] = [T::from_f64(c[4]), T::from_f64(c[5]), T::from_f64(c[6])];
     let u2 = u * u;
     let (low, middle, high) = (c0 + c1 * u, c2 + c3 * u, c4 + c5 * u);
     (low + u2 * middle) + (u2 * u2) * (high + u2 * c6)
@@ -143,7 +145,8 @@ pub(crate) fn exp<T: Pointwise>(x: T) -> T {
     let low = k * T::from_f64(L2);
     let r = high - low;
     let r2 = r * r;
-    let [h0, h1, h2, h3] = Q_HIGH.map(T::from_f64);
+    let [h0, h1] = [T::from_f64(Q_HIGH[0]), T::from_f64(Q_HIGH[1])];
+    let [h2, h3] = [T::from_f64(Q_HIGH[2]), T::from_f64(Q_HIGH[3])];
     let r4 = r2 * r2;
     let top = (h0 + h1 * r) + r2 * (h2 + h3 * r);
     let q = r2 * (polynomial7(r, Q) + ((r4 * r2) * r) * top);
@@ -215,7 +218,7 @@ pub(crate) fn rough_exp2<T: Pointwise>(x: T) -> T {
     let f = x - (rounded - T::from_f64(ROUNDER));
     let power = rounded.map(|v| f64::from_bits(v.to_bits().wrapping_add(1023) << 52));
     let f2 = f * f;
-    let [g0, g1, g2] = G_HIGH.map(T::from_f64);
+    let [g0, g1, g2] = [T::from_f64(G_HIGH[0]), T::from_f64(G_HIGH[1]), T::from_f64(G_HIGH[2])];
     let top = (g0 + g1 * f) + f2 * g2;
     let f4 = f2 * f2;
     (T::from_f64(1.0) + f * (polynomial7(f, G) + ((f4 * f2) * f) * top)) * power

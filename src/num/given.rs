@@ -1,0 +1,139 @@
+//! A number that is told what tanh is.
+
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+use super::scalar::{Arithmetic, Elementary};
+
+/// A number in an equation whose every tanh has a value that is known beforehand, whatever its argument: how an equation looks at a given place
+/// in its layer.
+#[derive(Clone, Copy, Debug)]
+pub struct Given<T = f64> {
+    value: T,
+    /// That tanh; a constant has not been told. All that have been told have been told the same.
+    tanh: Option<T>,
+}
+
+impl<T: Elementary> Given<T> {
+    /// The number `value`, in an equation where tanh is `tanh`.
+    #[inline(always)]
+    pub fn new(value: T, tanh: T) -> Self {
+        Self { value, tanh: Some(tanh) }
+    }
+
+    /// The number.
+    #[inline(always)]
+    pub fn value(self) -> T {
+        self.value
+    }
+
+    #[inline(always)]
+    fn map(self, f: impl Fn(T) -> T) -> Self {
+        Self { value: f(self.value), ..self }
+    }
+}
+
+impl<T: PartialEq> PartialEq for Given<T> {
+    fn eq(&self, other: &Self) -> bool {
+        self.value == other.value
+    }
+}
+
+macro_rules! as_number {
+    ($($trait:ident, $function:ident, $operator:tt);*) => {$(
+        impl<T: Elementary> $trait for Given<T> {
+            type Output = Self;
+            #[inline(always)]
+            fn $function(self, other: Self) -> Self {
+                let tanh = if self.tanh.is_some() { self.tanh } else { other.tanh };
+                Self { value: self.value $operator other.value, tanh }
+            }
+        }
+    )*};
+}
+as_number!(Add, add, +; Sub, sub, -; Mul, mul, *; Div, div, /);
+
+impl<T: Elementary> Neg for Given<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        self.map(|v| -v)
+    }
+}
+
+impl<T: Elementary> AddAssign for Given<T> {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl<T: Elementary> SubAssign for Given<T> {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}
+
+impl<T: Elementary> Arithmetic for Given<T> {
+    #[inline(always)]
+    fn from_f64(value: f64) -> Self {
+        Self { value: T::from_f64(value), tanh: None }
+    }
+}
+
+impl<T: Elementary> Elementary for Given<T> {
+    #[inline(always)]
+    fn tanh(self) -> Self {
+        Self { value: self.tanh.unwrap_or_else(|| self.value.tanh()), ..self }
+    }
+    #[inline]
+    fn exp(self) -> Self {
+        self.map(Elementary::exp)
+    }
+    #[inline]
+    fn sin(self) -> Self {
+        self.map(Elementary::sin)
+    }
+    #[inline]
+    fn cos(self) -> Self {
+        self.map(Elementary::cos)
+    }
+    #[inline]
+    fn sqrt(self) -> Self {
+        self.map(Elementary::sqrt)
+    }
+    #[inline]
+    fn ln(self) -> Self {
+        self.map(Elementary::ln)
+    }
+    #[inline]
+    fn atan(self) -> Self {
+        self.map(Elementary::atan)
+    }
+    #[inline]
+    fn erf(self) -> Self {
+        self.map(Elementary::erf)
+    }
+    #[inline(always)]
+    fn pi() -> Self {
+        Self { value: T::pi(), tanh: None }
+    }
+    #[inline]
+    fn sign(self) -> Self {
+        self.map(Elementary::sign)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tanh_is_what_it_was_told() {
+        let [x, y] = [0.3_f64, -2.0].map(|v| Given::new(v, -0.25));
+        let f = (x * y / Given::from_f64(1e-3)).tanh() * y + Given::from_f64(3.0) - x;
+        assert_eq!(f.value(), -0.25 * -2.0 + 3.0 - 0.3);
+        // Zero is no different.
+        assert_eq!((Given::new(5.0_f64, 0.0) + Given::one()).tanh().value(), 0.0);
+    }
+}
