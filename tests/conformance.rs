@@ -62,6 +62,13 @@ fn walk<const N: usize, F: VectorField<N>, M: Stepper<N>>(
             let gap = (step.interpolant.at(theta) - end).amax();
             assert!(gap <= 1e-9 * scale, "gap {gap:e} at theta {theta} of the step at t = {t}");
         }
+        // One coordinate by itself is the same number.
+        for theta in [0.0, 0.3, 0.77, 1.0] {
+            let whole = step.at(theta);
+            for i in 0..N {
+                assert_eq!(step.coordinate(theta, i).to_bits(), whole[i].to_bits(), "coordinate {i} at {theta}");
+            }
+        }
         (t, x) = (step.t1, step.x1);
         trace.push((t, std::array::from_fn(|i| x[i].to_bits())));
         assert!(trace.len() < 2_000_000, "no end in sight");
@@ -164,6 +171,7 @@ conforms!(lsoda, Lsoda);
 conforms!(radau5, Radau5);
 conforms!(taylor, Taylor);
 conforms!(taylor_extended, Extended);
+conforms!(layered, Layered);
 
 /// The same promises in double-double arithmetic.
 struct Extended;

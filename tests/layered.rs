@@ -130,7 +130,7 @@ fn every_kind_of_step_has_its_interpolant_and_ends_where_it_should() {
     for (schedule, step_cap, t_end) in [
         (Schedule::default(), StepCap::None, 60.0),
         (Schedule { restart_every: Some(0.31), kick: Some(kick) }, StepCap::FractionOfSegment(0.1), 60.0),
-        (Schedule::default(), StepCap::Absolute(3e-4), 6.0),
+        (Schedule::default(), StepCap::Absolute(3e-4), 14.0),
     ] {
         let mut looking = Looking { kinds: [0; 3], worst: 0.0 };
         let course = Course { schedule, step_cap, ..Course::to(t_end) };

@@ -103,6 +103,15 @@ impl<const N: usize> Interpolant<N> for Dense<N> {
         let r5 = (k1 * D1 + k3 * D3 + k4 * D4 + k5 * D5 + k6 * D6 + k7 * D7) * *h;
         x0 + (r2 + (r3 + (r4 + r5 * one_minus) * theta) * one_minus) * theta
     }
+    fn coordinate(&self, theta: f64, i: usize) -> f64 {
+        let (h, x0, [k1, k3, k4, k5, k6, k7]) = (self.h, self.x0[i], self.k.each_ref().map(|k| k[i]));
+        let one_minus = 1.0 - theta;
+        let r2 = self.x1[i] - x0;
+        let r3 = k1 * h - r2;
+        let r4 = r2 - k7 * h - r3;
+        let r5 = (k1 * D1 + k3 * D3 + k4 * D4 + k5 * D5 + k6 * D6 + k7 * D7) * h;
+        x0 + (r2 + (r3 + (r4 + r5 * one_minus) * theta) * one_minus) * theta
+    }
     fn degree(&self) -> usize {
         4
     }

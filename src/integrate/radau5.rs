@@ -134,6 +134,10 @@ impl<const N: usize> Interpolant<N> for Collocation<N> {
         let [p1, p2, p3] = &self.p;
         self.x0 + (p1 + (p2 + p3 * theta) * theta) * theta
     }
+    fn coordinate(&self, theta: f64, i: usize) -> f64 {
+        let [p1, p2, p3] = self.p.each_ref().map(|p| p[i]);
+        self.x0[i] + (p1 + (p2 + p3 * theta) * theta) * theta
+    }
     fn degree(&self) -> usize {
         3
     }

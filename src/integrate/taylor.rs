@@ -81,6 +81,9 @@ impl<const N: usize> Interpolant<N> for Polynomial<N> {
     fn at(&self, theta: f64) -> SVector<f64, N> {
         self.coefficients.iter().rev().fold(SVector::zeros(), |sum, c| sum * theta + c)
     }
+    fn coordinate(&self, theta: f64, i: usize) -> f64 {
+        self.coefficients.iter().rev().fold(0.0, |sum, c| sum * theta + c[i])
+    }
     fn degree(&self) -> usize {
         self.coefficients.len() - 1
     }

@@ -74,6 +74,9 @@ pub enum NotPolynomial {
     /// It has several tanh.
     #[error("it has more than one tanh, and so more than one layer")]
     Layers,
+    /// It is too long.
+    #[error("it has too many different products")]
+    Size,
 }
 
 impl Reduced {
@@ -142,21 +145,18 @@ impl Reduced {
     }
 }
 
-/// A sum as it is computed.
-#[derive(Clone, Copy, Debug)]
+/// A sum as it is computed: constant + terms + products.
+#[derive(Clone, Debug)]
 struct Sum {
     constant: f64,
-    /// Its terms: a range of [`Flow::terms`].
-    first: usize,
-    last: usize,
+    /// Series and their factors.
+    terms: Vec<(usize, f64)>,
+    /// Pairs of series and the factors of their products.
+    products: Vec<(usize, usize, f64)>,
 }
 
-/// How the next coefficient of a series comes from those of others.
-#[derive(Clone, Copy, Debug)]
-enum Rule {
-    Sum(Sum),
-    Product(usize, usize),
-}
+/// Most series of an equation.
+const MANY: usize = 64;
 
 /// Most coefficients of a series.
 const LONG: usize = 32;
@@ -174,14 +174,12 @@ const RECIPROCALS: [f64; LONG] = {
 
 /// Series being computed. Products are sums over two rows, one of them backwards, in eight lanes at a time: what lies beyond
 /// the degree reached is multiplied by zeros.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Series {
     /// Row s: coefficients 0, 1, ... of series s.
-    forward: Vec<[f64; LONG + 8]>,
+    forward: Box<[[f64; 2 * LONG]; MANY]>,
     /// Row s: coefficient k of series s, for k > 0, at `LONG - k`; zeros from `LONG` on.
-    backward: Vec<[f64; 2 * LONG]>,
-    /// The coefficients of the degree that is being computed.
-    now: Vec<f64>,
+    backward: Box<[[f64; 2 * LONG]; MANY]>,
 }
 
 impl Series {
@@ -195,13 +193,19 @@ impl Series {
     }
 }
 
+impl Default for Series {
+    fn default() -> Self {
+        let rows = || Box::new([[0.0; 2 * LONG]; MANY]);
+        Self { forward: rows(), backward: rows() }
+    }
+}
+
 /// A polynomial equation x' = f(x), made ready for series of its solutions.
 #[derive(Clone, Debug)]
 pub struct Flow {
     dimension: usize,
-    /// Series number `dimension + i` comes by rule i.
-    rules: Vec<Rule>,
-    terms: Vec<(usize, f64)>,
+    /// Series number `dimension + i` is sum i.
+    sums: Vec<Sum>,
     derivatives: Vec<Sum>,
     argument: Option<Sum>,
     /// The argument's gradient and value at 0, if it is a sum of states.
@@ -212,58 +216,39 @@ impl Flow {
     /// The equation on `tape` with every tanh replaced by the number `tanh`.
     ///
     /// # Errors
-    /// If that is no polynomial, or if there are tanh of two arguments.
+    /// If that is no polynomial, if there are tanh of two arguments, or if it is very long.
     pub fn new(tape: &Tape, tanh: f64) -> Result<Self, NotPolynomial> {
         let reduced = Reduced::new(tape, tanh)?;
         let dimension = tape.variables();
-        let mut flow = Self {
-            dimension,
-            rules: Vec::new(),
-            terms: Vec::new(),
-            derivatives: Vec::new(),
-            argument: None,
-            linear: None,
-        };
-        // The series of each quantity, and those of the sums that are factors.
-        let mut series: Vec<usize> = (0..dimension).collect();
-        let mut sums: Vec<(Affine, usize)> = Vec::new();
-        for (a, b) in &reduced.products {
-            let [a, b] = [a, b].map(|factor| match factor.single() {
-                Some((quantity, _)) => series[quantity],
-                None => match sums.iter().find(|(known, _)| known == factor) {
-                    Some((_, at)) => *at,
-                    None => {
-                        let sum = flow.sum(factor, &series);
-                        let at = flow.push(Rule::Sum(sum));
-                        sums.push((factor.clone(), at));
-                        at
-                    }
-                },
-            });
-            let product = flow.push(Rule::Product(a, b));
-            series.push(product);
-        }
-        flow.derivatives = reduced.derivatives.iter().map(|sum| flow.sum(sum, &series)).collect();
-        if let Some(argument) = &reduced.argument {
-            flow.argument = Some(flow.sum(argument, &series));
-            if argument.terms.iter().all(|(quantity, _)| *quantity < dimension) {
-                let mut gradient = vec![0.0; dimension];
-                argument.terms.iter().for_each(|&(state, factor)| gradient[state] = factor);
-                flow.linear = Some((gradient, argument.constant));
+        // Factors that are no single quantity are series of their own, and so are products that are wanted more than once.
+        let mut factors: Vec<&Affine> = Vec::new();
+        for factor in reduced.products.iter().flat_map(|(a, b)| [a, b]) {
+            if factor.single().is_none() && !factors.contains(&factor) {
+                factors.push(factor);
             }
         }
-        Ok(flow)
-    }
-
-    fn push(&mut self, rule: Rule) -> usize {
-        self.rules.push(rule);
-        self.dimension + self.rules.len() - 1
-    }
-
-    fn sum(&mut self, sum: &Affine, series: &[usize]) -> Sum {
-        let first = self.terms.len();
-        self.terms.extend(sum.terms.iter().map(|&(quantity, factor)| (series[quantity], factor)));
-        Sum { constant: sum.constant, first, last: self.terms.len() }
+        let mut wanted = vec![0; dimension + reduced.products.len()];
+        for sum in factors.iter().copied().chain(&reduced.derivatives).chain(&reduced.argument) {
+            sum.terms.iter().for_each(|(quantity, _)| wanted[*quantity] += 1);
+        }
+        for factor in reduced.products.iter().flat_map(|(a, b)| [a, b]) {
+            if let Some((quantity, _)) = factor.single() {
+                wanted[quantity] += 2;
+            }
+        }
+        let mut writer = Writer { reduced: &reduced, wanted, places: Vec::new(), sums: Vec::new(), dimension };
+        let derivatives = reduced.derivatives.iter().map(|sum| writer.sum(sum)).collect();
+        let argument = reduced.argument.as_ref().map(|sum| writer.sum(sum));
+        let linear = reduced.argument.as_ref().filter(|sum| sum.terms.iter().all(|(q, _)| *q < dimension)).map(|sum| {
+            let mut gradient = vec![0.0; dimension];
+            sum.terms.iter().for_each(|&(state, factor)| gradient[state] = factor);
+            (gradient, sum.constant)
+        });
+        let sums = writer.sums;
+        if dimension + sums.len() > MANY {
+            return Err(NotPolynomial::Size);
+        }
+        Ok(Self { dimension, sums, derivatives, argument, linear })
     }
 
     /// Whether the equation has a layer.
@@ -276,57 +261,41 @@ impl Flow {
         self.linear.as_ref().map(|(gradient, constant)| (&gradient[..], *constant))
     }
 
-    /// Room for series up to `degree`, at most [`Series::MOST`].
-    ///
-    /// # Panics
-    /// If that is too much.
-    pub fn room(&self, degree: usize) -> Series {
-        assert!(degree <= Series::MOST, "series have {} coefficients at most", LONG);
-        let count = self.dimension + self.rules.len();
-        Series { forward: vec![[0.0; LONG + 8]; count], backward: vec![[0.0; 2 * LONG]; count], now: vec![0.0; count] }
-    }
-
     /// Computes the Taylor coefficients, up to `degree`, of the solution through `x` at t = 0.
     ///
     /// # Panics
-    /// If `series` is not this equation's [`Flow::room`], or `x` not as long as the equation.
+    /// If `x` is not as long as the equation, or `degree` more than [`Series::MOST`].
     #[inline]
     pub fn expand(&self, x: &[f64], degree: usize, series: &mut Series) {
         assert!(
-            x.len() == self.dimension && series.now.len() == self.dimension + self.rules.len(),
-            "one number a component"
+            x.len() == self.dimension && degree <= Series::MOST,
+            "one number a component, and a degree that there is room for"
         );
         pulp::Arch::new().dispatch(Expansion { flow: self, x, degree, series });
     }
 
     #[inline(always)]
     fn expand_here(&self, x: &[f64], degree: usize, series: &mut Series) {
-        // As slices, whose places stay in registers.
-        let (forward, backward) = (series.forward.as_mut_slice(), series.backward.as_mut_slice());
-        let (now, terms, dimension) = (series.now.as_mut_slice(), self.terms.as_slice(), self.dimension);
+        let Series { forward, backward } = series;
+        let mut now = [0.0; MANY];
         now[..x.len()].copy_from_slice(x);
-        for k in 0..degree.min(Series::MOST) {
-            for (i, rule) in self.rules.iter().enumerate() {
-                now[dimension + i] = match *rule {
-                    Rule::Sum(sum) => total(sum, terms, k, |at| now[at]),
-                    Rule::Product(a, b) if k == 0 => now[a] * now[b],
-                    Rule::Product(a, b) => {
-                        let (left, right) = (&forward[a], &backward[b]);
-                        left[0] * now[b] + now[a] * forward[b][0] + middle(left, right, k)
-                    }
-                };
-            }
-            for ((now, forward), backward) in now.iter().zip(forward.iter_mut()).zip(backward.iter_mut()) {
-                forward[k] = *now;
-                // What would be the coefficient 0 is never read.
-                backward[LONG - k.max(1)] = *now;
+        let mut next = [0.0; MANY];
+        for k in 0..degree {
+            for (i, sum) in self.sums.iter().enumerate() {
+                now[(self.dimension + i) % MANY] = sum.coefficient(k, &now, forward, backward);
             }
             for (i, sum) in self.derivatives.iter().enumerate() {
-                forward[i][k + 1] = total(*sum, terms, k, |at| now[at]) * RECIPROCALS[k];
+                next[i % MANY] = sum.coefficient(k, &now, forward, backward) * RECIPROCALS[k % LONG];
             }
-            for (now, forward) in now[..dimension].iter_mut().zip(forward.iter()) {
-                *now = forward[k + 1];
+            for s in 0..(self.dimension + self.sums.len()).min(MANY) {
+                forward[s][k % LONG] = now[s];
+                // What would be the coefficient 0 is never read.
+                backward[s][(LONG - k.max(1)) % LONG] = now[s];
             }
+            now[..x.len()].copy_from_slice(&next[..x.len()]);
+        }
+        for (i, now) in now[..x.len()].iter().enumerate() {
+            forward[i][degree % LONG] = *now;
         }
     }
 
@@ -334,18 +303,102 @@ impl Flow {
     /// the argument is a sum of states.
     #[inline]
     pub fn argument(&self, k: usize, series: &Series) -> f64 {
-        self.argument.map_or(0.0, |sum| total(sum, &self.terms, k, |at| series.forward[at][k]))
+        let Some(sum) = &self.argument else { return 0.0 };
+        let at = |s: usize, k: usize| series.forward[s][k];
+        let mut value = if k == 0 { sum.constant } else { 0.0 };
+        for (s, factor) in &sum.terms {
+            value += at(*s, k) * factor;
+        }
+        for (a, b, factor) in &sum.products {
+            value += (0..=k).map(|j| at(*a, j) * at(*b, k - j)).sum::<f64>() * factor;
+        }
+        value
     }
 }
 
-/// A sum's coefficient of degree `k`.
-#[inline(always)]
-fn total(sum: Sum, terms: &[(usize, f64)], k: usize, coefficient: impl Fn(usize) -> f64) -> f64 {
-    let mut value = if k == 0 { sum.constant } else { 0.0 };
-    for (at, factor) in &terms[sum.first..sum.last] {
-        value += coefficient(*at) * factor;
+impl Sum {
+    /// The coefficient of degree `k`, those of all factors being known in rows below that degree, and at it in `now`.
+    #[inline(always)]
+    fn coefficient(
+        &self,
+        k: usize,
+        now: &[f64; MANY],
+        forward: &[[f64; 2 * LONG]; MANY],
+        backward: &[[f64; 2 * LONG]; MANY],
+    ) -> f64 {
+        // The remainders change nothing, since there are fewer than MANY series, and spare the checks.
+        let mut value = if k == 0 { self.constant } else { 0.0 };
+        for (s, factor) in &self.terms {
+            value += now[s % MANY] * factor;
+        }
+        for (a, b, factor) in &self.products {
+            let (a, b) = (a % MANY, b % MANY);
+            let product = if k == 0 {
+                now[a] * now[b]
+            } else {
+                middle(&forward[a], &backward[b], k) + (forward[a][0] * now[b] + now[a] * forward[b][0])
+            };
+            value += product * factor;
+        }
+        value
     }
-    value
+}
+
+/// Puts sums into the order in which they can be computed.
+struct Writer<'a> {
+    reduced: &'a Reduced,
+    /// How often each quantity is wanted.
+    wanted: Vec<usize>,
+    /// Factors that have become series.
+    places: Vec<(Affine, usize)>,
+    sums: Vec<Sum>,
+    dimension: usize,
+}
+
+impl Writer<'_> {
+    fn sum(&mut self, of: &Affine) -> Sum {
+        let mut sum = Sum { constant: of.constant, terms: Vec::new(), products: Vec::new() };
+        for &(quantity, factor) in &of.terms {
+            if quantity < self.dimension {
+                sum.terms.push((quantity, factor));
+            } else if self.wanted[quantity] > 1 {
+                sum.terms.push((self.place(&Affine::quantity(quantity)), factor));
+            } else {
+                let (a, b) = self.factors(quantity);
+                sum.products.push((a, b, factor));
+            }
+        }
+        sum
+    }
+
+    fn factors(&mut self, product: usize) -> (usize, usize) {
+        let reduced = self.reduced;
+        let (a, b) = &reduced.products[product - self.dimension];
+        (self.place(a), self.place(b))
+    }
+
+    /// The series of a factor.
+    fn place(&mut self, factor: &Affine) -> usize {
+        let factor = match factor.single() {
+            Some((quantity, _)) if quantity < self.dimension => return quantity,
+            Some((quantity, _)) => Affine::quantity(quantity),
+            None => factor.clone(),
+        };
+        if let Some((_, place)) = self.places.iter().find(|(known, _)| *known == factor) {
+            return *place;
+        }
+        let sum = match factor.single() {
+            Some((product, _)) => {
+                let (a, b) = self.factors(product);
+                Sum { constant: 0.0, terms: Vec::new(), products: vec![(a, b, 1.0)] }
+            }
+            None => self.sum(&factor),
+        };
+        self.sums.push(sum);
+        let place = self.dimension + self.sums.len() - 1;
+        self.places.push((factor, place));
+        place
+    }
 }
 
 /// [`Flow::expand`], in the machine's own instructions: each lane rounds by itself and sums have one order, so that they change no bit.
@@ -365,11 +418,11 @@ impl pulp::WithSimd for Expansion<'_> {
     }
 }
 
-/// sum of a_j b_(k-j) over 0 < j < k, for 0 < k < LONG.
+/// sum of a_j b_(k-j) over 0 < j < k, for 0 < k < LONG, from a row and a backward row.
 #[inline(always)]
-fn middle(a: &[f64; LONG + 8], b: &[f64; 2 * LONG], k: usize) -> f64 {
+fn middle(a: &[f64; 2 * LONG], b: &[f64; 2 * LONG], k: usize) -> f64 {
     // Term m = j - 1; from m = k - 1 on they are zero.
-    let (a, b) = (&a[1..=LONG], &b[LONG + 1 - k..][..LONG]);
+    let (a, b) = (&a[1..=LONG], &b[(LONG + 1 - k) % (LONG + 1)..][..LONG]);
     let mut sums = [0.0; 8];
     for j in 0..8 {
         sums[j] = a[j] * b[j];
@@ -411,11 +464,10 @@ mod tests {
         let tape = Tape::record(3, blend);
         for (side, x) in [(1.0, [0.3, -0.7, 0.4]), (-1.0, [-0.3, 0.9, 0.2])] {
             let flow = Flow::new(&tape, side).unwrap();
-            // Three squares, their sum, two factors, two products; the other field has cancelled.
-            assert_eq!(flow.rules.len(), 8, "{flow:?}");
-            let mut found = flow.room(12);
+            // The sum of three squares and two factors; the other field has cancelled.
+            assert_eq!(flow.sums.len(), 3, "{flow:?}");
+            let mut found = Series::default();
             for degree in [7, 12, 13, 15, 16, 17, 31] {
-                found = flow.room(degree);
                 let mut solution = Solution::new(degree, &tape, Constants::Binary);
                 // What an earlier expansion has left is not in the way.
                 for x in [[1e3, 7.0, -2.0], x] {
@@ -436,11 +488,39 @@ mod tests {
     }
 
     #[test]
+    fn products_of_products_used_again_and_arguments_that_are_products() {
+        // a = x y is wanted twice, a^2 once, x a once; the layer is at x y = 1.
+        let tape = Tape::record(2, |x| {
+            let a = x[0] * x[1];
+            let phi = (a - Recorded::one()).tanh();
+            vec![a * a - x[0].scale(2.0) * a + phi, a - x[1] * x[1] * x[1] - phi]
+        });
+        let flow = Flow::new(&tape, -1.0).unwrap();
+        assert!(flow.has_layer() && flow.linear_argument().is_none());
+        let (mut found, mut solution) = (Series::default(), Solution::new(11, &tape, Constants::Binary));
+        // So far inside the other half of the layer that tanh is -1.
+        let x = [-9.0, 8.0];
+        flow.expand(&x, 11, &mut found);
+        solution.expand(&x);
+        for i in 0..2 {
+            for (k, want) in solution.component(i).iter().enumerate() {
+                let got = found.component(i)[k];
+                assert!((got - want).abs() <= 1e-13 * (1.0 + want.abs()), "{i} {k}: {got} {want}");
+            }
+        }
+        let w = solution.layer_arguments().next().unwrap();
+        for (k, want) in w.iter().enumerate() {
+            let got = flow.argument(k, &found);
+            assert!((got - want).abs() <= 1e-13 * (1.0 + want.abs()), "{k}: {got} {want}");
+        }
+    }
+
+    #[test]
     fn instructions_change_no_bit() {
         use pulp::WithSimd;
         let flow = Flow::new(&Tape::record(3, blend), 1.0).unwrap();
         for degree in [9, 14, 25] {
-            let (mut plain, mut here) = (flow.room(degree), flow.room(degree));
+            let (mut plain, mut here) = (Series::default(), Series::default());
             let x = [0.3, -0.7, 0.4];
             Expansion { flow: &flow, x: &x, degree, series: &mut plain }.with_simd(pulp::Scalar);
             flow.expand(&x, degree, &mut here);

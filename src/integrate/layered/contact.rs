@@ -48,7 +48,7 @@ impl Contact {
         reduced[..self.count - from].copy_from_slice(&c[from..self.count]);
         let mut bernstein = [0.0; MOST];
         for (j, b) in bernstein[..self.count].iter_mut().enumerate() {
-            let row = &self.to_bernstein[j * self.count..][..self.count];
+            let row = &self.to_bernstein[j * self.count..][..=j];
             *b = row.iter().zip(&reduced).map(|(a, b)| a * b).sum();
         }
         self.first_in(&reduced, bernstein, 0.0, 1.0, 0)

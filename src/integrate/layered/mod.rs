@@ -232,9 +232,7 @@ impl<const N: usize> Layered<N> {
 
     /// Makes the equation ready, unless it is the last one again.
     fn read(&mut self, tape: Arc<Tape>) -> Result<(), NotPolynomial> {
-        if let Some(known) = self.equation.as_ref().filter(|known| known.tape == tape) {
-            // Nothing is left of what may have been infinite.
-            self.series = known.sides.each_ref().map(|side| side.room(self.degree));
+        if self.equation.as_ref().is_some_and(|known| known.tape == tape) {
             return Ok(());
         }
         let sides = [Flow::new(&tape, -1.0)?, Flow::new(&tape, 1.0)?];
@@ -243,7 +241,6 @@ impl<const N: usize> Layered<N> {
             // An argument that is one number everywhere has no layer to cross.
             gradient.iter().any(|g| *g != 0.0).then(|| Layer::new(gradient, constant, self.edge, self.tolerance.atol))
         });
-        self.series = sides.each_ref().map(|side| side.room(self.degree));
         self.equation = Some(Equation { tape, sides, layer });
         Ok(())
     }
@@ -299,6 +296,8 @@ impl<const N: usize> Layered<N> {
                 size = if q > size || q.is_nan() { q } else { size };
             }
             if !size.is_finite() {
+                // Nothing infinite is left for a next start.
+                *series = Series::default();
                 return Err(Failure::NotFinite { t: self.t, state: Failure::state(&self.x) });
             }
             log = log.max(rough_log2(size) / k as f64);

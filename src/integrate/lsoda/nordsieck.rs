@@ -84,6 +84,10 @@ impl<const N: usize> Interpolant<N> for Nordsieck<N> {
         }
         x
     }
+    fn coordinate(&self, theta: f64, i: usize) -> f64 {
+        let s = theta - 1.0;
+        self.y[..self.degree].iter().rev().fold(self.y[self.degree][i], |x, y| x * s + y[i])
+    }
     fn degree(&self) -> usize {
         self.degree
     }
