@@ -67,6 +67,10 @@ pub struct Taylor<const N: usize, S = f64> {
     max_step: f64,
     /// Length of the last step.
     h: S,
+    /// exp([`SAFETY_EXPONENT`]/(p - 1)).
+    safety: f64,
+    /// A layer's argument, rounded.
+    argument: Vec<f64>,
     /// The last step's series, rounded.
     rounded: Polynomial<N>,
 }
@@ -130,6 +134,8 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
             t_end: S::zero(),
             max_step: f64::INFINITY,
             h: S::zero(),
+            safety: exp(SAFETY_EXPONENT / (order - 1) as f64),
+            argument: Vec::with_capacity(order),
             rounded: Polynomial { coefficients: vec![SVector::zeros()] },
         }
     }
@@ -209,19 +215,19 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
                 h = h.min(rough_pow(size, -1.0 / degree as f64));
             }
         }
-        h * exp(SAFETY_EXPONENT / (p - 1) as f64)
+        h * self.safety
     }
 
     /// The longest step up to `h` that respects every layer.
-    fn resolved_step(&self, mut h: f64) -> f64 {
-        let mut series = Vec::with_capacity(self.order);
+    fn resolved_step(&mut self, mut h: f64) -> f64 {
+        let series = &mut self.argument;
         for w in self.solution.layer_arguments() {
             series.clear();
             series.extend(w.iter().map(|c| c.to_f64()));
             h = if series[0].abs() >= S::TANH_SATURATION + EDGE_MARGIN {
-                free_time(&series, S::TANH_SATURATION, h)
+                free_time(series, S::TANH_SATURATION, h)
             } else {
-                stride_time(&series, h)
+                stride_time(series, h)
             };
         }
         h

@@ -162,9 +162,9 @@ impl<S: Elementary + FromDecimal> Solution<S> {
             self.coefficients[i * width] = *value;
         }
         for k in 0..self.degree {
-            for (i, recurrence) in self.recurrences.iter().enumerate() {
+            for i in 0..self.recurrences.len() {
                 let series = self.dimension + i;
-                self.coefficients[series * width + k] = self.coefficient(*recurrence, series, k);
+                self.coefficients[series * width + k] = self.coefficient(&self.recurrences[i], series, k);
             }
             for i in 0..self.dimension {
                 let output = self.outputs[i];
@@ -176,10 +176,10 @@ impl<S: Elementary + FromDecimal> Solution<S> {
 
     /// Coefficient `k` of a series, those below `k` of itself and up to `k` of its arguments being known.
     #[inline]
-    fn coefficient(&self, recurrence: Recurrence<S>, this: Series, k: usize) -> S {
+    fn coefficient(&self, recurrence: &Recurrence<S>, this: Series, k: usize) -> S {
         let series = |n: Series| &self.coefficients[self.range(n)];
         let one_over = |sum: S| sum / S::from_f64(k as f64);
-        match recurrence {
+        match *recurrence {
             Recurrence::Constant(c) if k == 0 => c,
             Recurrence::Constant(_) => S::zero(),
             Recurrence::Add(a, b) => series(a)[k] + series(b)[k],
@@ -325,8 +325,9 @@ impl<S: Elementary> Compiler<S> {
 #[inline]
 fn convolution<S: Arithmetic>(a: &[S], b: &[S], first: usize, k: usize) -> S {
     let mut sum = S::zero();
-    for j in first..=k {
-        sum += a[j] * b[k - j];
+    // As slices of one length, so that nothing is checked term by term.
+    for (a, b) in a[first..=k].iter().zip(b[..=k - first].iter().rev()) {
+        sum += *a * *b;
     }
     sum
 }
@@ -341,8 +342,9 @@ fn tail<S: Arithmetic>(c: &[S], b: &[S], k: usize) -> S {
 #[inline]
 fn square<S: Arithmetic>(a: &[S], k: usize) -> S {
     let mut sum = S::zero();
-    for j in 0..k.div_ceil(2) {
-        sum += a[j] * a[k - j];
+    let half = k.div_ceil(2);
+    for (left, right) in a[..half].iter().zip(a[k + 1 - half..=k].iter().rev()) {
+        sum += *left * *right;
     }
     sum += sum;
     if k.is_multiple_of(2) {
@@ -355,8 +357,8 @@ fn square<S: Arithmetic>(a: &[S], k: usize) -> S {
 #[inline]
 fn weighted<S: Arithmetic>(a: &[S], b: &[S], k: usize) -> S {
     let mut sum = S::zero();
-    for j in 1..=k {
-        sum += a[j].scale(j as f64) * b[k - j];
+    for ((j, a), b) in (1..).zip(&a[1..=k]).zip(b[..k].iter().rev()) {
+        sum += a.scale(f64::from(j)) * *b;
     }
     sum
 }
