@@ -3,7 +3,7 @@
 CARGO   ?= cargo
 # Flags of `twofold figure`; --fresh takes nothing from the store and keeps nothing.
 FIGURE_FLAGS ?=
-PROOFS  := printed-cycle coexistence sensitivity crossings
+PROOFS  := printed-cycle coexistence sensitivity contraction crossings horseshoe
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help

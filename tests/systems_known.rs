@@ -27,6 +27,8 @@ fn run(system: &System, switch: SwitchSpec, t_end: f64, observe: Observation) ->
         tolerance: Tolerance { rtol: 1e-11, atol: 1e-11 },
         step_cap: StepCap::None,
         max_steps: 10_000_000,
+        precision: None,
+        order: None,
     };
     let start = system.definition().start().unwrap().to_vec();
     let spec = RunSpec { system: system.clone(), switch, start, t_end, method, schedule: Schedule::default(), observe };

@@ -13,7 +13,8 @@ use crate::integrate::filippov::{
     self, AllModes, ExitRule, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent, SlidingFlow,
 };
 use crate::integrate::{
-    Course, Flow, Observer, Statistics, Step, Stepper, StopReason, Summary, Watch, WithStepper, drive,
+    Course, Flow, Observer, PRECISIONS, Statistics, Step, Stepper, StopReason, Summary, Watch, WithStepper, drive,
+    with_extended,
 };
 use crate::system::{Bound, Compiled, Field, Hysteretic, PiecewiseSmooth, Smoothed, VectorField};
 
@@ -474,9 +475,13 @@ fn integrate<'a, F: VectorField<N>, const N: usize>(
     observer: &'a mut (dyn Observer<N> + 'a),
     watch: &'a dyn Watch,
 ) -> Result<Summary<N>, JobError> {
-    let MethodSpec { name, tolerance, step_cap, max_steps } = spec.method;
+    let MethodSpec { name, tolerance, step_cap, max_steps, precision, order } = spec.method;
     let course = Course { t_end: spec.t_end, schedule: spec.schedule, step_cap, max_steps, kicked_states: states };
-    name.with_stepper(tolerance, Drive { field, x0, course, observer: AnyObserver(observer), watch })
+    let orbit = Drive { field, x0, course, observer: AnyObserver(observer), watch };
+    match (precision, order) {
+        (None, None) => name.with_stepper(tolerance, orbit),
+        _ => with_extended(precision.unwrap_or(PRECISIONS[0]), order, tolerance, orbit),
+    }
 }
 
 /// A run that waits for its method.
