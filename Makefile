@@ -64,6 +64,14 @@ browser-test: ## the report in a headless Chromium, if there is one (needs Node)
 	@$(CARGO) build --release --locked --bins
 	@if command -v node >/dev/null; then node scripts/browser_test.mjs $(BROWSER_TEST); else echo "browser test SKIPPED: no Node found"; fi
 
+.PHONY: report-test
+REPORT_TEST := target/report-test
+report-test: ## the same with axe-core's and html-validate's rules (needs Node with npm, a Chromium, and poppler-utils for the printed page)
+	@$(CARGO) build --release --locked --bin twofold
+	@mkdir -p $(REPORT_TEST) && cp scripts/report-test/package.json scripts/report-test/package-lock.json $(REPORT_TEST)
+	@cd $(REPORT_TEST) && npm ci --ignore-scripts --no-audit --no-fund --silent
+	@node scripts/browser_test.mjs --require --modules $(REPORT_TEST)/node_modules $(BROWSER_TEST)
+
 .PHONY: python-test deny
 PYTHON  ?= python3
 VENV    := target/python

@@ -31,7 +31,7 @@ const ARTICLE: &str = "https://research-information.bris.ac.uk/en/publications/s
 /// That university: address, name.
 const AFFILIATION: (&str, &str) = ("https://www.bristol.ac.uk/", "University of Bristol");
 /// Where the article appeared, in that list's words.
-const PROCEEDINGS: &str = "Proc. 5th International Conference on Structural Dynamics SEMS, Cape Town";
+pub(super) const PROCEEDINGS: &str = "Proc. 5th International Conference on Structural Dynamics SEMS, Cape Town";
 
 /// The metadata of a folder that holds `made` and what the report adds to it (`added`: name and bytes).
 pub fn archive(report: &Report, made: &[FileBytes], added: &[(&str, &[u8])]) -> Vec<u8> {
@@ -151,6 +151,7 @@ fn name(report: &Report, path: &str) -> String {
         names::PAGE => "The report, for people",
         names::REPORT => "The report, for programs",
         names::VERDICTS => "All verdicts with their evidence",
+        names::MAKING => "Programs, machines and times of the computations",
         _ => "",
     };
     if !known.is_empty() {
