@@ -81,6 +81,15 @@ python-test: ## the Python package, installed into an environment of its own and
 	@$(CARGO) build --release --locked --bin twofold
 	@TWOFOLD_PROGRAM=$(CURDIR)/target/release/twofold $(VENV)/bin/python -m pytest python $(PYTEST_FLAGS)
 
+.PHONY: wheel package
+wheel: ## the Python package as a wheel for this machine, into target/wheels (needs Python and PyPI)
+	@$(PYTHON) -m venv $(VENV)
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check 'maturin>=1.9.4,<2'
+	@$(VENV)/bin/maturin build --release --locked --quiet --manifest-path python/Cargo.toml --out target/wheels
+
+package: ## the crate, packed, unpacked and built as the registry would have it; nothing is published
+	@$(CARGO) publish --dry-run --locked --registry crates-io
+
 deny: ## licences, duplicates, sources and known defects of every dependency (needs cargo-deny: cargo install --locked cargo-deny)
 	@$(CARGO) deny --workspace check
 

@@ -92,9 +92,11 @@ fn command(figure: &Figure) -> clap::Command {
         examples += &format!("\n  {id} --reading printed");
     }
     if let Some(panel) = figure.pictures.iter().flat_map(|p| &p.panels).next() {
+        let several = figure.pictures.iter().any(|p| p.panels.len() > 1);
+        let only = if several { format!(" --only {}", panel.label) } else { String::new() };
+        let reading = if figure.pictures.len() > 1 { " --reading printed" } else { "" };
         examples += &format!(
-            "\n  {id} --t-end 100\n  {id} --only {0} --reading printed --print-spec > spec.json && twofold run --spec spec.json",
-            panel.label
+            "\n  {id} --t-end 100\n  {id}{only}{reading} --print-spec > spec.json && twofold run --spec spec.json"
         );
     }
     Arguments::command()
@@ -235,6 +237,11 @@ fn refuse_idle(figures: &[Figure], arguments: &FigureFlags) -> Result<(), CliErr
         && pictures().all(|p| p.panels.is_empty())
     {
         return Err(CliError::no_effect(flag, format!("{names}: made in one piece, not of single runs; leave it out")));
+    }
+    if let Some(only) = &arguments.only
+        && pictures().all(|p| p.panels.len() < 2 && p.panels.iter().all(|panel| panel.label == label(only)))
+    {
+        return Err(CliError::no_effect("--only", format!("{names}: there is no other panel; leave it out")));
     }
     if arguments.reading.is_some() && pictures().all(|p| p.reading.is_none()) {
         return Err(CliError::no_effect("--reading", format!("{names}: the same in every reading; leave it out")));

@@ -13,6 +13,9 @@ use crate::render::read_provenance;
 /// differ from run to run.
 pub const RELEASE_DATE: &str = "2026-11-21";
 
+/// Where the program is documented, as Cargo.toml has it.
+const DOCUMENTATION: &str = "https://docs.rs/twofold-dynamics";
+
 /// The licence of program and pictures, either of two: address, name, what it allows in a line.
 const LICENCES: [(&str, &str, &str); 2] = [
     (
@@ -71,6 +74,8 @@ pub fn archive(report: &Report, made: &[FileBytes], added: &[(&str, &[u8])]) -> 
             "@id": "#authors",
             "@type": "Organization",
             "name": "The twofold authors",
+            // Where they can be found: an organisation in RO-Crate should have an address.
+            "url": DOCUMENTATION,
         }),
         json!({
             "@id": "#software",

@@ -844,7 +844,7 @@ a = 0
         );
         assert_eq!(d.tape(&[0.0.into()]).outputs().len(), 10);
         for (from, to, place, message) in [
-            ("8 + a", "8 + b", "9:19", "unknown name `b`"),
+            ("8 + a", "8 + b", "9:20", "unknown name `b`"),
             ("[\"5\", \"6\"]", "[\"5\"]", "8:8", "second.plus has 1 component, but there are 2 states"),
             ("h = \"y\"", "h = \"a\"", "7:5", "nothing ever switches at it"),
             ("h = \"y\"", "h = \"x\"", "7:5", "both surfaces are the same"),
