@@ -180,8 +180,9 @@ const LATEST: f64 = 1e12;
 const FINEST_ATOL: f64 = 1e-140;
 
 /// Columns of recorded data beside the states'.
-const COLUMNS: [&str; 15] = [
+const COLUMNS: [&str; 16] = [
     "t",
+    "signs",
     "direction",
     "mode",
     "piece",
@@ -244,6 +245,13 @@ impl RunSpec {
                     finite("sigma", sigma)?;
                 }
             }
+            SwitchSpec::Hysteretic { .. } if self.system.definition().second().is_some() => {
+                return Err(SpecError {
+                    field: "switch",
+                    value: "hysteretic".into(),
+                    rule: "hysteresis is for systems with one switching surface; this one has two, so smooth them or take filippov",
+                });
+            }
             SwitchSpec::Hysteretic { eps, eps_prime, phi0, .. } => {
                 positive("eps", eps)?;
                 positive("eps-prime", eps_prime)?;
@@ -289,6 +297,11 @@ impl RunSpec {
         }
         if (exit == ExitRule::All) != funnel.is_some() {
             return wrong_exit("\"all\" and a description of the funnel go together");
+        }
+        if funnel.is_some() && self.system.definition().second().is_some() {
+            return wrong_exit(
+                "all futures are followed at one switching surface; this system has two, so give another rule",
+            );
         }
         if let Some(funnel) = funnel {
             positive("funnel-shortest", funnel.shortest)?;
