@@ -412,6 +412,8 @@ fn two_blocks_that_stick_at_once_are_refused() {
         tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
         step_cap: StepCap::None,
         max_steps: 10_000_000,
+        precision: None,
+        order: None,
     };
     let of = |switch| RunSpec {
         system: pair.clone(),
