@@ -3,7 +3,7 @@
 CARGO   ?= cargo
 # Flags of `twofold figure`; --fresh takes nothing from the store and keeps nothing.
 FIGURE_FLAGS ?=
-PROOFS  := printed-cycle coexistence sensitivity crossings
+PROOFS  := printed-cycle coexistence sensitivity contraction crossings horseshoe
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help
@@ -64,6 +64,14 @@ browser-test: ## the report in a headless Chromium, if there is one (needs Node)
 	@$(CARGO) build --release --locked --bins
 	@if command -v node >/dev/null; then node scripts/browser_test.mjs $(BROWSER_TEST); else echo "browser test SKIPPED: no Node found"; fi
 
+.PHONY: report-test
+REPORT_TEST := target/report-test
+report-test: ## the same with axe-core's and html-validate's rules (needs Node with npm, a Chromium, and poppler-utils for the printed page)
+	@$(CARGO) build --release --locked --bin twofold
+	@mkdir -p $(REPORT_TEST) && cp scripts/report-test/package.json scripts/report-test/package-lock.json $(REPORT_TEST)
+	@cd $(REPORT_TEST) && npm ci --ignore-scripts --no-audit --no-fund --silent
+	@node scripts/browser_test.mjs --require --modules $(REPORT_TEST)/node_modules $(BROWSER_TEST)
+
 .PHONY: python-test deny
 PYTHON  ?= python3
 VENV    := target/python
@@ -72,6 +80,15 @@ python-test: ## the Python package, installed into an environment of its own and
 	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check './python[test]'
 	@$(CARGO) build --release --locked --bin twofold
 	@TWOFOLD_PROGRAM=$(CURDIR)/target/release/twofold $(VENV)/bin/python -m pytest python $(PYTEST_FLAGS)
+
+.PHONY: wheel package
+wheel: ## the Python package as a wheel for this machine, into target/wheels (needs Python and PyPI)
+	@$(PYTHON) -m venv $(VENV)
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check 'maturin>=1.9.4,<2'
+	@$(VENV)/bin/maturin build --release --locked --quiet --manifest-path python/Cargo.toml --out target/wheels
+
+package: ## the crate, packed, unpacked and built as the registry would have it; nothing is published
+	@$(CARGO) publish --dry-run --locked --registry crates-io
 
 deny: ## licences, duplicates, sources and known defects of every dependency (needs cargo-deny: cargo install --locked cargo-deny)
 	@$(CARGO) deny --workspace check

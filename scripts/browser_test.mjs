@@ -1,7 +1,8 @@
 // The report in a real browser: loads, no errors, nothing from the network, pictures there, sorting by keyboard, a forced mismatch
-// shows its triptych, no sideways scrolling on a phone, dark mode, contrast, works without script.
+// shows its triptych, panels turn in space, no sideways scrolling on a phone, dark mode, contrast, works without script, no heading alone at the foot
+// of a printed page. With --modules (see `make report-test`): no violation of axe-core's rules in any of these views, valid HTML by html-validate's.
 //
-//   node scripts/browser_test.mjs [--bins DIR] [--screenshots DIR] [--require]
+//   node scripts/browser_test.mjs [--bins DIR] [--screenshots DIR] [--modules DIR] [--require]
 //
 // Needs Node 18 or later and a Chromium or Chrome (found on PATH, or named by $CHROMIUM); no npm packages: the browser is spoken to
 // over a pipe. Without a browser that starts it says so and exits with 0, with --require with 1. --bins: where twofold
@@ -19,6 +20,7 @@ const argument = (name) => {
   return at < 0 ? null : process.argv[at + 1];
 };
 const shots = argument('--screenshots');
+const modules = argument('--modules');
 
 function findBrowser() {
   const names = ['chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable', 'chrome'];
@@ -305,7 +307,7 @@ async function test(browser, { page, forced }) {
     const figures = [...(box?.querySelectorAll('figure') ?? [])];
     return { words, captions: figures.map((f) => f.querySelector('figcaption').textContent), widths: figures.map((f) => f.querySelector('img').naturalWidth) };
   }, forced);
-  check('the forced mismatch shows expected, difference, actual', same(triptych.captions, ['Expected', 'Difference', 'Actual']), JSON.stringify(triptych));
+  check('the forced mismatch shows ours, difference, reference', same(triptych.captions, ['Ours', 'Difference', 'Reference']), JSON.stringify(triptych));
   check('its three pictures have one size', triptych.widths.length === 3 && triptych.widths[0] > 0 && new Set(triptych.widths).size === 1);
   check('it names the layer and the numbers', ['pixels', 'changed', 'RMS', 'SSIM'].every((w) => triptych.words.includes(w)), triptych.words);
   check('and it is the only one', (await browser.run(() => document.querySelectorAll('[data-triptych]').length)) === 1);
@@ -328,6 +330,9 @@ async function test(browser, { page, forced }) {
     check('the focus is visible', outline !== 'none', outline);
   }
 
+  await space(browser);
+  if (modules) await rules(browser, page);
+
   for (const scheme of ['light', 'dark']) {
     await browser.scheme(scheme);
     await browser.run(openAll);
@@ -348,12 +353,14 @@ async function test(browser, { page, forced }) {
   await browser.load(url);
   const plain = await browser.run(() => ({
     buttons: document.querySelectorAll('th button').length,
+    spaces: document.querySelectorAll('button, canvas').length,
     rows: document.querySelectorAll('#all-verdicts tbody tr').length,
     images: [...document.images].filter((i) => i.naturalWidth > 0).length,
   }));
-  check('without script the tables and pictures are there, and no dead buttons', plain.buttons === 0 && plain.rows > 0 && plain.images === pictures.length, JSON.stringify(plain));
+  check('without script the tables and pictures are there, and no dead buttons', plain.buttons === 0 && plain.spaces === 0 && plain.rows > 0 && plain.images === pictures.length, JSON.stringify(plain));
   await browser.send('Emulation.setScriptExecutionDisabled', { value: false });
 
+  await print(browser);
   check('no errors in the console', complaints.length === 0, complaints.join(' | '));
   const foreign = requests.filter((u) => !u.startsWith('data:') && u !== url);
   check('nothing was asked of the network', foreign.length === 0, foreign.join(' '));
@@ -370,6 +377,90 @@ async function test(browser, { page, forced }) {
       await browser.run(() => window.scrollTo(0, 0));
     }
   }
+}
+
+// How much of a canvas is inked, and a digest of it.
+async function canvasState() {
+  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  const canvas = document.querySelector('.space-view canvas');
+  const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+  let inked = 0;
+  let digest = 0;
+  for (let i = 0; i < data.length; i += 4) {
+    if (data[i + 3] > 0) inked++;
+    digest = (31 * digest + data[i] + 7 * data[i + 1] + 13 * data[i + 3]) | 0;
+  }
+  return { share: inked / (canvas.width * canvas.height), digest, said: document.querySelector('.space-view .turned').textContent, label: canvas.getAttribute('aria-label') };
+}
+
+// Panels in space: opened, turned by button and by arrow key, back to where the picture is.
+async function space(browser) {
+  const buttons = await browser.run(() => [...document.querySelectorAll('button.open')].map((b) => b.textContent));
+  check('every panel of figs 2 and 6 can be turned', buttons.length === 9, buttons.join(', '));
+  await browser.run(() => document.querySelector('button.open').click());
+  const first = await browser.run(canvasState);
+  check('a panel in space is drawn', first.share > 0.02 && first.share < 0.95, JSON.stringify(first));
+  await browser.shot('space-light.png');
+  await browser.run(() => document.querySelector('.space-view button').focus());
+  await browser.press('ArrowRight', 39);
+  const turned = await browser.run(canvasState);
+  check('an arrow key turns it, and that is said', turned.digest !== first.digest && turned.said !== first.said && turned.label.includes('azimuth'), JSON.stringify(turned));
+  await browser.run(() => document.querySelector('.space-view button[aria-label="Tilt up"]').click());
+  check('a button tilts it', (await browser.run(canvasState)).digest !== turned.digest);
+  await browser.run(() => document.querySelector('.space-view button[aria-label="As in the picture"]').click());
+  check('and back as it was', (await browser.run(canvasState)).digest === first.digest);
+  await browser.scheme('dark');
+  check('it is drawn anew in dark mode', (await browser.run(canvasState)).digest !== first.digest);
+  await browser.run(() => document.querySelector('.space-view').scrollIntoView({ behavior: 'instant', block: 'center' }));
+  await browser.shot('space-dark.png');
+  await browser.scheme('light');
+}
+
+// The rules of axe-core in every view, and of html-validate on the page's text.
+async function rules(browser, page) {
+  const axe = readFileSync(join(modules, 'axe-core', 'axe.min.js'), 'utf8');
+  const version = JSON.parse(readFileSync(join(modules, 'axe-core', 'package.json'), 'utf8')).version;
+  await browser.send('Runtime.evaluate', { expression: axe });
+  const views = [['light', 1280, false], ['dark', 1280, false], ['light', 360, true], ['dark', 360, true]];
+  for (const [scheme, width, mobile] of views) {
+    await browser.scheme(scheme);
+    await browser.size(width, 900, mobile);
+    for (const open of [false, true]) {
+      await browser.run((all) => document.querySelectorAll('details').forEach((d) => (d.open = all)), open);
+      const found = await browser.run(() => axe.run(document, { resultTypes: ['violations'] }).then((r) => ({
+        passes: r.passes.length,
+        violations: r.violations.map((v) => `${v.id} (${v.nodes.length}: ${v.nodes[0].html.slice(0, 120)})`),
+      })));
+      check(`axe-core ${version}: no violation, ${scheme}, ${width} pixels, details ${open ? 'open' : 'closed'} (${found.passes} rules hold)`, found.violations.length === 0 && found.passes > 20, found.violations.join(' | '));
+    }
+  }
+  await browser.scheme('light');
+  await browser.size(1280, 900);
+  const { HtmlValidate, StaticConfigLoader } = await import(pathToFileURL(join(modules, 'html-validate', 'dist', 'esm', 'index.js')).href);
+  // The page is also XML: void elements close themselves. Views in space name themselves by more than a heading's words.
+  const settings = { extends: ['html-validate:standard', 'html-validate:a11y'], rules: { 'void-style': ['error', { style: 'selfclosing' }] } };
+  const report = await new HtmlValidate(new StaticConfigLoader(settings)).validateString(readFileSync(page, 'utf8'));
+  const wrong = report.results.flatMap((r) => r.messages.map((m) => `${m.line}:${m.column} ${m.ruleId} ${m.message}`));
+  const htmlVersion = JSON.parse(readFileSync(join(modules, 'html-validate', 'package.json'), 'utf8')).version;
+  check(`html-validate ${htmlVersion}: the page is valid HTML`, wrong.length === 0, `${wrong.length}: ${wrong.slice(0, 8).join(' | ')}`);
+}
+
+// On paper no page ends with a heading. Looked at with pdftotext (Debian: poppler-utils), if it is there.
+async function print(browser) {
+  const headings = await browser.run(() => [...document.querySelectorAll('h1,h2,h3,h4,summary,caption')].map((h) => h.innerText.replace(/\s+/g, ' ').trim()));
+  const { data } = await browser.send('Page.printToPDF', { preferCSSPageSize: true, paperWidth: 8.27, paperHeight: 11.69 });
+  const pdf = Buffer.from(data, 'base64');
+  check('the page prints', pdf.length > 100000);
+  if (shots) writeFileSync(join(shots, 'print.pdf'), pdf);
+  const read = spawnSync('pdftotext', ['-', '-'], { input: pdf, encoding: 'utf8', maxBuffer: 1 << 28 });
+  if (read.error) {
+    console.log('NOT RUN: headings at the foot of a printed page (no pdftotext)');
+    return;
+  }
+  const pages = read.stdout.split('\f').filter((text) => text.trim());
+  const last = pages.slice(0, -1).map((text) => text.trim().split('\n').at(-1).replace(/\s+/g, ' ').trim());
+  const alone = last.filter((line) => line.length > 3 && headings.some((h) => h === line || h.endsWith(line) && h.length < 2 * line.length));
+  check(`no heading stands alone at the foot of a printed page (${pages.length} pages)`, pages.length > 3 && alone.length === 0, alone.join(' | '));
 }
 
 function skip(why) {

@@ -27,4 +27,6 @@ filippov="--switch filippov --exit at-once:plus"
     plot buck --set supply=33 --t-end 120
     plot gene-switch $filippov --t-end 12
     plot fused-focus $filippov --set mu=-0.01 --t-end 120
+    plot relay-square $filippov --t-end 6
+    plot two-blocks $filippov --t-end 40
 }

@@ -41,6 +41,8 @@ fn run(alpha: f64, method: Method, tolerance: f64, t_end: f64) -> Vec<twofold::a
             tolerance: Tolerance { rtol: tolerance, atol: tolerance },
             step_cap: StepCap::None,
             max_steps: 1_000_000,
+            precision: None,
+            order: None,
         },
         schedule: Schedule::default(),
         observe: Observation::Section { coordinate: 1, value: 0.0 },

@@ -22,6 +22,8 @@ fn run(sign: MinusSign, t_end: f64) -> ([f64; 3], usize) {
             tolerance: Tolerance { rtol: 1e-8, atol: 1e-8 },
             step_cap: StepCap::None,
             max_steps: 10_000_000,
+            precision: None,
+            order: None,
         },
         schedule: Schedule::default(),
         observe: Observation::Section { coordinate: 1, value: 0.0 },

@@ -141,6 +141,8 @@ fn futures_come_back_as_often_as_readme_says() {
                 tolerance: Tolerance { rtol: 1e-12, atol: 1e-12 },
                 step_cap: StepCap::None,
                 max_steps: DEFAULT_MAX_STEPS,
+                precision: None,
+                order: None,
             },
             schedule: Schedule::default(),
             observe: Observation::Path { chord: 1e-3 },

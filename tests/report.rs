@@ -240,7 +240,7 @@ fn spoil(png: &Path) -> u64 {
 }
 
 #[test]
-fn a_mismatch_shows_expected_difference_and_actual() {
+fn a_mismatch_shows_ours_difference_and_theirs() {
     let bench = Bench::new();
     let changed = spoil(&bench.expected().join("fig7/fig7-printed.png"));
     bench.edit(&bench.expected().join("fig7/expected.json"), |m| m["pictures"][0]["pixels"] = "0".repeat(64).into());
@@ -262,7 +262,7 @@ fn a_mismatch_shows_expected_difference_and_actual() {
         .filter(|n| n.has_tag_name(("http://www.w3.org/1999/xhtml", "figcaption")))
         .map(|n| n.text().unwrap().to_owned())
         .collect();
-    assert_eq!(texts, ["Expected", "Difference", "Actual"]);
+    assert_eq!(texts, ["Ours", "Difference", "Reference"]);
     let sources: BTreeSet<&str> = boxes[0].descendants().filter_map(|n| n.attribute("src")).collect();
     assert_eq!(sources.len(), 3, "three different pictures");
     let notice = document.descendants().find(|n| n.attribute("data-mismatch") == Some("fig7-printed")).unwrap();
@@ -270,6 +270,60 @@ fn a_mismatch_shows_expected_difference_and_actual() {
     for word in ["pixels", &changed.to_string(), "RMS", "SSIM"] {
         assert!(words.contains(word), "no {word} in: {words}");
     }
+}
+
+/// What a referee looks for: findings in sentences, rules with every threshold, how it was made, how to cite; and a page that is light.
+#[test]
+fn a_referee_finds_findings_rules_making_and_citation() {
+    let bench = Bench::new();
+    let making = serde_json::json!({ "format": "twofold-making", "version": 1, "runs": [{
+        "figures": ["fig7"], "program": "twofold 9.9.9", "commit": "0123abcd", "compiler": "rustc 1", "target": "here", "profile": "release",
+        "threads": 3, "store": false, "seconds": 12.345, "computed": [{ "what": "fig7 <b>", "seconds": 11.5 }],
+    }]});
+    fs::write(bench.made().join("making.json"), making.to_string()).unwrap();
+    bench.run(&[]);
+    let html = bench.read("index.html");
+    sound(&html);
+    let document = parse(&html);
+    let text = |id: &str| -> String {
+        let section = document.descendants().find(|n| n.attribute("aria-labelledby") == Some(id)).unwrap();
+        section.descendants().filter_map(|n| n.text().filter(|_| n.is_text())).collect()
+    };
+    let record: Value = serde_json::from_str(&bench.read("fig7/fig7-printed.json")).unwrap();
+    let verdict = &record["verdicts"][1];
+    let said = format!(
+        "fig. 7(ii) (said: {}; found: {})",
+        verdict["claim_text"].as_str().unwrap(),
+        verdict["found"].as_str().unwrap()
+    );
+    assert!(text("findings").contains(&said), "{said} is not in: {}", text("findings"));
+    assert!(text("findings").contains("The singularity eats digits."));
+    let thresholds = verdict["evidence"]["section"]["thresholds"].as_object().unwrap();
+    for (name, value) in thresholds {
+        assert!(
+            text("rules").contains(name.as_str()) && text("rules").contains(&value.to_string()),
+            "{name} = {value}"
+        );
+    }
+    for word in ["twofold 9.9.9", "0123abcd", "rustc 1", "here, profile release", "12.3 s", "fig7 <b>", "11.50"] {
+        assert!(text("making").contains(word), "no {word} in: {}", text("making"));
+    }
+    for word in [
+        "@software{twofold",
+        "@inproceedings{jeffrey2013",
+        env!("CARGO_PKG_VERSION"),
+        "Proc. 5th International Conference",
+    ] {
+        assert!(text("citing").contains(word), "no {word}");
+    }
+    // Two pictures of 70 and 200 kB; without previews they alone would take 370 kB.
+    assert!(html.len() < 300_000, "the page weighs {} bytes", html.len());
+
+    fs::write(bench.made().join("making.json"), "{").unwrap();
+    bench.run(&[]);
+    let report: Value = serde_json::from_str(&bench.read("report.json")).unwrap();
+    assert_eq!(report["making"], serde_json::json!([]));
+    assert!(report["problems"][0].as_str().unwrap().starts_with("making.json: cannot be read"));
 }
 
 #[test]

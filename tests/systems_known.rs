@@ -27,6 +27,8 @@ fn run(system: &System, switch: SwitchSpec, t_end: f64, observe: Observation) ->
         tolerance: Tolerance { rtol: 1e-11, atol: 1e-11 },
         step_cap: StepCap::None,
         max_steps: 10_000_000,
+        precision: None,
+        order: None,
     };
     let start = system.definition().start().unwrap().to_vec();
     let spec = RunSpec { system: system.clone(), switch, start, t_end, method, schedule: Schedule::default(), observe };
@@ -350,4 +352,100 @@ fn grazing_and_set_valued_orbits_are_refused() {
     // From the attracting region of the two-fold, into it.
     let set_valued = refused(&system("two-fold"), 2, &[0.0, 0.1, 0.0]);
     assert!(set_valued.contains("many futures") || set_valued.contains("did not return"), "{set_valued}");
+}
+
+/// Two surfaces: squares |x| + |y| = c around the origin, each side in the time c; a surface is crossed at every corner.
+#[test]
+fn two_relays_run_around_a_square() {
+    let system = system("relay-square");
+    let answer = run(&system, FILIPPOV, 60.0, Observation::Path { chord: 1e-3 });
+    let crossings = events(&answer, &system, "crossing");
+    assert_eq!(crossings.len(), 80);
+    for (k, (t, x)) in crossings.iter().enumerate() {
+        assert!((t - (0.5 + 0.75 * k as f64)).abs() < 1e-10, "corner {k} at {t}");
+        assert!((x[0].abs() + x[1].abs() - 0.75).abs() < 1e-10, "corner {k}: {x:?}");
+    }
+    let signs: Vec<&str> = answer.table("events").unwrap().words("signs").take(4).collect();
+    assert_eq!(signs, ["0+", "-0", "0-", "+0"]);
+}
+
+/// Two surfaces, no spring between the blocks: each moves as if it were alone. The first is the system `stick-slip`, also while the second comes to
+/// rest and turns; the second, -x2 - F sign(v2), turns at atan(v/(x + F)) + k pi, and loses 2 F of its amplitude each time.
+#[test]
+fn two_blocks_without_a_spring_move_alone() {
+    let (pair, alone) = (system("two-blocks"), system("stick-slip"));
+    let both = run(&pair, FILIPPOV, 40.0, Observation::Path { chord: 1e-3 });
+    let one = run(&alone, FILIPPOV, 40.0, Observation::Path { chord: 1e-3 });
+    let mut sticking = 0;
+    for kind in ["landing", "left-by-tangency"] {
+        let (found, known) = (events(&both, &pair, kind), events(&one, &alone, kind));
+        assert!(known.len() >= 3 && found.len() == known.len(), "{kind}: {} of {}", found.len(), known.len());
+        for ((t, x), (u, y)) in found.iter().zip(&known) {
+            assert!(
+                (t - u).abs() < 1e-8 && (x[0] - y[0]).abs() < 1e-8 && (x[1] - y[1]).abs() < 1e-8,
+                "{kind}: {t} {u}"
+            );
+        }
+    }
+    let friction = 0.1f64;
+    let amplitude = (10.0 + friction).hypot(0.5) - friction;
+    let table = both.table("events").unwrap();
+    let signs: Vec<&str> = table.words("signs").collect();
+    let turns: Vec<usize> = (0..table.len()).filter(|row| signs[*row].ends_with('0')).collect();
+    assert_eq!(turns.len(), 13);
+    for (k, row) in turns.into_iter().enumerate() {
+        let t = (0.5f64).atan2(10.0 + friction) + k as f64 * PI;
+        let x = if k % 2 == 0 { 1.0 } else { -1.0 } * (amplitude - 2.0 * friction * k as f64);
+        assert!((table.numbers("t")[row] - t).abs() < 1e-8, "turn {k}: {} instead of {t}", table.numbers("t")[row]);
+        assert!((table.numbers("x2")[row] - x).abs() < 1e-8, "turn {k}: {} instead of {x}", table.numbers("x2")[row]);
+        sticking += usize::from(signs[row] == "00");
+    }
+    assert!(sticking >= 2, "the second block never turns while the first sticks: the test would prove less");
+}
+
+/// Where both blocks would stick at once a Filippov run ends and says so; smoothed it goes on.
+#[test]
+fn two_blocks_that_stick_at_once_are_refused() {
+    let pair = system("two-blocks");
+    let method = MethodSpec {
+        name: Method::Dopri5,
+        tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
+        step_cap: StepCap::None,
+        max_steps: 10_000_000,
+        precision: None,
+        order: None,
+    };
+    let of = |switch| RunSpec {
+        system: pair.clone(),
+        switch,
+        // The second block is slow enough to stay where it comes to rest.
+        start: vec![0.0, 0.0, 0.05, -0.02],
+        t_end: 20.0,
+        method,
+        schedule: Schedule::default(),
+        observe: Observation::Path { chord: 1e-3 },
+    };
+    let refused = Desk::quiet().ask(&Run(of(FILIPPOV))).unwrap_err().to_string();
+    assert!(refused.contains("intersection of the two switching surfaces at t = "), "{refused}");
+    let smoothed = Desk::quiet().ask(&Run(of(SwitchSpec::tanh(1e-3)))).unwrap();
+    assert!((smoothed.table("path").unwrap().numbers("t").last().unwrap() - 20.0).abs() < 1e-12);
+    let hysteretic = SwitchSpec::hysteretic(1e-3, twofold::system::Relaxation::Single);
+    let refused = Desk::quiet().ask(&Run(of(hysteretic))).unwrap_err().to_string();
+    assert!(refused.contains("one switching surface"), "{refused}");
+}
+
+/// The smoothed pair is the product of the two smoothings: without a spring the first block moves as the smoothed system `stick-slip`.
+#[test]
+fn two_smoothed_switches_do_not_mix() {
+    let (pair, alone) = (system("two-blocks"), system("stick-slip"));
+    let at = |x: [f64; 4]| {
+        let both = Field::smoothed(&pair, twofold::system::Transition::Tanh, 0.1).bind::<4>().unwrap();
+        let one = Field::smoothed(&alone, twofold::system::Transition::Tanh, 0.1).bind::<2>().unwrap();
+        use twofold::system::VectorField;
+        let (f, g) = (both.eval(&SVector::from(x)), one.eval(&SVector::from([x[0], x[1]])));
+        assert!((f[0] - g[0]).abs() < 1e-14 && (f[1] - g[1]).abs() < 1e-14, "{f} {g}");
+        let phi = 0.5 * (1.0 + (x[3] / 0.1).tanh());
+        assert!((f[3] - (-x[2] - 0.1 * (2.0 * phi - 1.0))).abs() < 1e-14);
+    };
+    [[0.2, 0.3, 1.0, 0.05], [0.2, 0.25, -1.0, -0.15], [0.2, 0.4, 0.0, 0.0]].into_iter().for_each(at);
 }

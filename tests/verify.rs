@@ -7,7 +7,7 @@ use assert_cmd::Command;
 use serde_json::{Value, json};
 use twofold::verify::{Refused, verify};
 
-const NAMES: [&str; 4] = ["printed-cycle", "coexistence", "sensitivity", "crossings"];
+const NAMES: [&str; 6] = ["printed-cycle", "coexistence", "sensitivity", "contraction", "crossings", "horseshoe"];
 
 fn path(name: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("proofs/certificates").join(format!("{name}.json"))
@@ -63,6 +63,14 @@ fn may_pass(name: &str, at: &str, up: bool) -> bool {
         "printed-cycle" | "coexistence" => at.contains("derivative_on_candidate") || at.contains("preconditioner"),
         // The numbers of the flow: distances tie places together, the rest is ordered and narrow.
         "sensitivity" => at.contains("/time/") || at.contains("growth_until") || ends("/radius") || ends("/states/z"),
+        // What the images' enclosures say is used in inequalities alone; a set's shape is tied to nothing below 1e-12.
+        "horseshoe" => at.contains("/seen/"),
+        // Places are tied to each other by the distances, at the singularity by plain orbits to 1e-4.
+        "contraction" => {
+            ends("/radius")
+                || at.contains("/time/")
+                || ["/0/", "/1/", "/2/"].iter().any(|n| at.contains(&format!("/crossings{n}")))
+        }
         // Rows are tied to the table: the enclosures may be wider.
         "crossings" => ends("/radius") && up,
         _ => false,
@@ -90,7 +98,8 @@ fn what_is_altered_is_noticed() {
         }
         println!("{name}: {tried} alterations, {} unnoticed", passed.len());
         assert!(unexpected.is_empty(), "{name}: not noticed: {unexpected:#?}");
-        assert!(passed.len() * 3 < tried, "{name}: {} of {tried} pass", passed.len());
+        let most = if name == "horseshoe" { 0.5 } else { 1.0 / 3.0 };
+        assert!((passed.len() as f64) < most * f64::from(tried), "{name}: {} of {tried} pass", passed.len());
     }
 }
 

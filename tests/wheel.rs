@@ -22,6 +22,8 @@ fn returns_to_the_singularity_and_stays_bounded() {
             tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
             step_cap: StepCap::None,
             max_steps: 10_000_000,
+            precision: None,
+            order: None,
         },
         schedule: Schedule::default(),
         observe: Observation::Path { chord: 1e-3 },

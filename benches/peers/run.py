@@ -31,6 +31,7 @@ PEERS = [
 ]
 METHODS = {
     "dopri5": (W1 + ["W2 B"], "Boost.odeint dopri5", 0.8),
+    "layered": (W1 + ["W2 B"], "Boost.odeint dopri5", 0.4),
     "dopri5-lanes-avx2": (["W2 B"], "Boost.odeint dopri5", 1 / 12),
     "dopri5-lanes-avx512": (["W2 B"], "Boost.odeint dopri5", 1 / 12),
     "lsoda": (W1, "CVODE Adams", 1 / 7),

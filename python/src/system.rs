@@ -89,6 +89,10 @@ impl Definition {
             let text = format!("a point of {} numbers; the system has {n} states", x.len());
             return Err(errors::SpecError::new_err((text, "x")));
         }
+        if self.0.definition().second().is_some() {
+            let text = "a system with two switching surfaces has four fields, not two".to_owned();
+            return Err(errors::SpecError::new_err((text, "system")));
+        }
         let mut out = vec![0.0; 1 + 2 * n];
         Program::new(self.0.tape()).evaluate(x, &mut out);
         Ok((out[0], PyArray1::from_slice(py, &out[1..=n]), PyArray1::from_slice(py, &out[n + 1..])))

@@ -143,3 +143,22 @@ def test_texts_with_odd_letters():
     odd = 'a "quoted" \\ text\twith \x7f, \u00e9 and a\nline'
     system = block(about=odd)
     assert system.about == odd and pickle.loads(pickle.dumps(system)) == system
+
+
+def test_two_surfaces():
+    square = twofold.System(
+        states=["x", "y"],
+        h="x",
+        plus=["-1", "1"],
+        minus=["-1", "-1"],
+        second={"h": "y", "plus": ["1", "1"], "minus": ["1", "-1"]},
+    )
+    run = twofold.solve(square, [0.5, 0.25], 3, switch="filippov")
+    # Around |x| + |y| = 0.75 once.
+    assert np.allclose(run.y[:, -1], [0.5, 0.25], atol=1e-10)
+    assert list(run.events["signs"]) == ["0+", "-0", "0-", "+0"]
+    assert run.signs[0] == "++"
+    with pytest.raises(TypeError, match="minus"):
+        twofold.System(states=["x"], h="x", plus=["1"], minus=["1"], second={"h": "x", "plus": ["1"]})
+    with pytest.raises(twofold.SpecError, match="four fields"):
+        square.evaluate([1.0, 1.0])

@@ -450,6 +450,12 @@ class Solution(_Answer):
         return self._table["mode"] if "mode" in self._table else None
 
     @property
+    def signs(self) -> Optional[NDArray[np.str_]]:
+        """The signs of both switching functions at each point, such as ``"+-"`` or ``"0+"`` (0: on the surface), shape (points,); None unless
+        the switch is Filippov's and the system has two surfaces."""
+        return self._table["signs"] if "signs" in self._table else None
+
+    @property
     def piece(self) -> Optional[NDArray[np.int64]]:
         """Number of the piece of one mode to which each point belongs, shape (points,); None if the switch is not Filippov's."""
         return self._table["piece"] if "piece" in self._table else None

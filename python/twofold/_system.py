@@ -51,6 +51,7 @@ def _toml(
     h: str,
     plus: Sequence[str],
     minus: Sequence[str],
+    second: Optional[Mapping[str, Any]],
     parameters: Mapping[str, Union[Number, Mapping[str, Any]]],
     let: Mapping[str, str],
     start: Optional[Sequence[Number]],
@@ -75,6 +76,11 @@ def _toml(
     if axes:
         text += _texts("axes", axes)
     text += f"h = {_text(h)}\n" + _texts("plus", plus) + _texts("minus", minus)
+    if second is not None:
+        unknown = set(second) ^ {"h", "plus", "minus"}
+        if unknown:
+            raise TypeError(f'second is {{"h": "...", "plus": [...], "minus": [...]}}: look at {sorted(unknown)}')
+        text += f"[second]\nh = {_text(second['h'])}\n" + _texts("plus", second["plus"]) + _texts("minus", second["minus"])
     if parameters:
         text += "[parameters]\n"
         for name, value in parameters.items():
@@ -107,6 +113,9 @@ class System:
         The switching function.
     plus, minus : list of str
         The vector fields where h > 0 and where h < 0: one expression a state, the derivatives.
+    second : dict, optional
+        A second switching surface, ``{"h": "...", "plus": [...], "minus": [...]}``: ``plus`` and ``minus`` above then hold where its h is positive,
+        its own where that is negative.
     parameters : dict of str to number, optional
         ``{"alpha": 0.1}``, ``{"alpha": "0.1000000000000000000001"}`` or ``{"alpha": {"value": 0.1, "meaning": "...", "unit": "..."}}``.
     let : dict of str to str, optional
@@ -151,6 +160,7 @@ class System:
         h: Optional[str] = None,
         plus: Optional[Sequence[str]] = None,
         minus: Optional[Sequence[str]] = None,
+        second: Optional[Mapping[str, Any]] = None,
         parameters: Optional[Mapping[str, Union[Number, Mapping[str, Any]]]] = None,
         let: Optional[Mapping[str, str]] = None,
         start: Optional[Sequence[Number]] = None,
@@ -164,10 +174,10 @@ class System:
             if states is None or h is None or plus is None or minus is None:
                 raise TypeError("give a name, a file or a text, or else states=, h=, plus= and minus=")
             words = {"name": name, "title": title, "about": about}
-            text = _toml(states, h, plus, minus, parameters or {}, let or {}, start, axes, references, words)
+            text = _toml(states, h, plus, minus, second, parameters or {}, let or {}, start, axes, references, words)
             self._definition = _native.Definition.from_toml(text, "<expressions>")
             return
-        others = (states, h, plus, minus, parameters, let, start, axes, name, title, about, references)
+        others = (states, h, plus, minus, second, parameters, let, start, axes, name, title, about, references)
         if any(other is not None and len(other) > 0 for other in others):
             raise TypeError("a name, a file or a text says everything: leave the other arguments out, or use with_(...)")
         self._definition = _native_from(source)

@@ -15,8 +15,9 @@ use crate::job::spec::{RunSpec, SwitchSpec};
 use crate::job::{Desk, Store};
 use crate::paper::pipeline::{Computed, PictureRecord, compute, questions};
 use crate::paper::{Alterations, Figure, Panel, Picture};
-use crate::record::files::{still_there, try_folder};
+use crate::record::files::{read, still_there, try_folder};
 use crate::record::{FileError, write};
+use crate::report::{Making, Makings, Timed, names};
 
 /// Compute a figure and write it as PNG, SVG and PDF, with its numbers as CSV.
 #[derive(Clone, Debug, Parser)]
@@ -91,9 +92,11 @@ fn command(figure: &Figure) -> clap::Command {
         examples += &format!("\n  {id} --reading printed");
     }
     if let Some(panel) = figure.pictures.iter().flat_map(|p| &p.panels).next() {
+        let several = figure.pictures.iter().any(|p| p.panels.len() > 1);
+        let only = if several { format!(" --only {}", panel.label) } else { String::new() };
+        let reading = if figure.pictures.len() > 1 { " --reading printed" } else { "" };
         examples += &format!(
-            "\n  {id} --t-end 100\n  {id} --only {0} --reading printed --print-spec > spec.json && twofold run --spec spec.json",
-            panel.label
+            "\n  {id} --t-end 100\n  {id}{only}{reading} --print-spec > spec.json && twofold run --spec spec.json"
         );
     }
     Arguments::command()
@@ -137,6 +140,7 @@ pub fn run(figures: Vec<Figure>, arguments: &FigureFlags) -> Result<(), CliError
     let progress = Progress::new(arguments.quiet);
     let desk = Desk::new(arguments.store.store(), &progress);
     let records = in_pool(arguments.threads, || make(&figures, &arguments.out, &desk))??;
+    say_how(&figures, arguments, &progress)?;
     if arguments.json {
         print_json(&records)?;
     }
@@ -167,6 +171,31 @@ pub fn make(figures: &[Figure], out: &Path, desk: &Desk<'_>) -> Result<Vec<Pictu
     let (records, written): (Vec<_>, Vec<_>) = results.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
     still_there(&written.concat())?;
     Ok(records)
+}
+
+/// Writes down by which build, with how many threads and in what time the figures were made: for the report. No picture depends on it.
+fn say_how(figures: &[Figure], arguments: &FigureFlags, progress: &Progress) -> Result<(), CliError> {
+    let path = arguments.out.join(names::MAKING);
+    // What cannot be read is not worth keeping.
+    let before: Makings = read(&path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default();
+    let threads = in_pool(arguments.threads, rayon::current_num_threads)?;
+    let rounded = |seconds: f64| (1e3 * seconds).round() / 1e3;
+    let computed = progress.computed().into_iter().map(|(what, s)| Timed { what, seconds: rounded(s) }).collect();
+    let making = Making {
+        figures: figures.iter().map(|f| f.id.to_owned()).collect(),
+        program: concat!("twofold ", env!("CARGO_PKG_VERSION")).into(),
+        commit: env!("TWOFOLD_COMMIT").into(),
+        compiler: env!("TWOFOLD_RUSTC").into(),
+        target: env!("TWOFOLD_TARGET").into(),
+        profile: env!("TWOFOLD_PROFILE").into(),
+        threads,
+        store: arguments.store.store().is_some(),
+        seconds: rounded(progress.seconds()),
+        computed,
+    };
+    let mut json = serde_json::to_vec_pretty(&before.with(making)).expect("times are plain data");
+    json.push(b'\n');
+    Ok(write(&path, &json)?)
 }
 
 /// A file and its length.
@@ -208,6 +237,11 @@ fn refuse_idle(figures: &[Figure], arguments: &FigureFlags) -> Result<(), CliErr
         && pictures().all(|p| p.panels.is_empty())
     {
         return Err(CliError::no_effect(flag, format!("{names}: made in one piece, not of single runs; leave it out")));
+    }
+    if let Some(only) = &arguments.only
+        && pictures().all(|p| p.panels.len() < 2 && p.panels.iter().all(|panel| panel.label == label(only)))
+    {
+        return Err(CliError::no_effect("--only", format!("{names}: there is no other panel; leave it out")));
     }
     if arguments.reading.is_some() && pictures().all(|p| p.reading.is_none()) {
         return Err(CliError::no_effect("--reading", format!("{names}: the same in every reading; leave it out")));

@@ -74,7 +74,7 @@ pub struct RunFlags {
     /// Integration method [default: lsoda; dopri5 with --switch filippov].
     #[arg(long, value_enum, help_heading = "Method")]
     pub method: Option<Method>,
-    /// Relative tolerance [default: 10^-7.97727, NDSolve's; 1e-32 with taylor-extended; of exponents 1e-9, of closed orbits 1e-11].
+    /// Relative tolerance [default: 10^-7.97727, NDSolve's; with taylor-extended 1e-32 or what --precision allows; of exponents 1e-9, of closed orbits 1e-11].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub rtol: Option<f64>,
     /// Absolute tolerance [default: that of --rtol's default].
@@ -86,6 +86,12 @@ pub struct RunFlags {
     /// Most steps before the run is given up [default: 400000000].
     #[arg(long, allow_negative_numbers = true, help_heading = "Method")]
     pub max_steps: Option<u64>,
+    /// Bits of taylor-extended's numbers: 106, 192, 256, 384 or 512 [default: 106].
+    #[arg(long, value_name = "BITS", allow_negative_numbers = true, help_heading = "Method")]
+    pub precision: Option<u16>,
+    /// Degree of taylor-extended's series [default: what the tolerance asks for].
+    #[arg(long, value_name = "DEGREE", allow_negative_numbers = true, help_heading = "Method")]
+    pub order: Option<u16>,
     /// Start the method afresh after each such interval [default: never].
     #[arg(long, value_name = "INTERVAL", allow_hyphen_values = true, help_heading = "Schedule")]
     pub restart: Option<f64>,
@@ -208,6 +214,9 @@ impl RunFlags {
     fn exit_begins(&self, word: &str) -> bool {
         self.filippov() && self.exit.as_deref().is_some_and(|e| e.split(':').next() == Some(word))
     }
+    fn extended(&self) -> bool {
+        self.method == Some(Method::TaylorExtended)
+    }
     fn kicked(&self) -> bool {
         !self.filippov() && self.kick_every.is_some()
     }
@@ -222,10 +231,12 @@ const OF_FUNNELS: &str =
 const OF_RANDOM: &str = "nothing in this run is random; leave it out, or give --kick-every or a random --exit";
 const NOT_FILIPPOV: &str = "restarts and kicks belong to smoothed and hysteretic runs (kicks to exponents, too); leave it out, or choose another --switch";
 const OF_ORBITS: &str = "a closed orbit's steps are chosen by its tolerance alone; leave it out";
+const OF_EXTENDED: &str =
+    "other methods compute in f64, and choose their order; leave it out, or use --method taylor-extended";
 const OF_KICKS: &str = "there are no kicks; leave it out, or give --kick-every";
 
 /// The table. Every flag of [`RunFlags`] but --spec stands in it once.
-const EFFECTS: [Effect; 35] = {
+const EFFECTS: [Effect; 37] = {
     const fn always(flag: &'static str, given: fn(&RunFlags) -> bool) -> Effect {
         Effect { flag, given, works: |_, _| true, why: "" }
     }
@@ -301,6 +312,8 @@ const EFFECTS: [Effect; 35] = {
         always("--atol", |f| f.atol.is_some()),
         when("--max-step", |f| f.max_step.is_some(), |_, c| c != Use::Orbit, OF_ORBITS),
         when("--max-steps", |f| f.max_steps.is_some(), |_, c| c != Use::Orbit, OF_ORBITS),
+        when("--precision", |f| f.precision.is_some(), |f, c| f.extended() && c.is_a_run(), OF_EXTENDED),
+        when("--order", |f| f.order.is_some(), |f, c| f.extended() && c.is_a_run(), OF_EXTENDED),
         when("--restart", |f| f.restart.is_some(), |f, c| !f.filippov() && c.is_a_run(), NOT_FILIPPOV),
         when("--kick-every", |f| f.kick_every.is_some(), |f, c| !f.filippov() && c != Use::Orbit, NOT_FILIPPOV),
         when("--kick-size", |f| f.kick_size.is_some(), |f, c| f.kicked() && c != Use::Orbit, OF_KICKS),
@@ -561,6 +574,10 @@ impl RunFlags {
         };
         let method = self.method.unwrap_or(if self.filippov() { Method::Dopri5 } else { Method::Lsoda });
         let mut defaults = MethodSpec::defaults(integrate::Method::from(method));
+        if let Some(bits) = self.precision {
+            let finest = finest_extended(bits);
+            defaults.tolerance = Tolerance { rtol: finest, atol: finest };
+        }
         match command {
             Use::Orbit => defaults.tolerance = Tolerance { rtol: 1e-11, atol: 1e-11 },
             Use::Exponent => {
@@ -569,6 +586,8 @@ impl RunFlags {
                     tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
                     step_cap: StepCap::None,
                     max_steps: DEFAULT_MAX_STEPS,
+                    precision: None,
+                    order: None,
                 }
             }
             Use::Any | Use::Picture | Use::Passages => {}
@@ -581,6 +600,8 @@ impl RunFlags {
             },
             step_cap: self.max_step.map_or(defaults.step_cap, StepCap::Absolute),
             max_steps: self.max_steps.unwrap_or(DEFAULT_MAX_STEPS),
+            precision: self.precision,
+            order: self.order,
         };
         let kick = self.kick_every.map(|every| Kick {
             every,

@@ -27,6 +27,9 @@ pub(super) fn clear() {
 pub struct Progress {
     style: Style,
     grace: Option<Grace>,
+    begun: Instant,
+    /// What was computed, and the seconds it took.
+    computed: Mutex<Vec<(String, f64)>>,
 }
 
 enum Style {
@@ -46,7 +49,7 @@ impl Progress {
         } else {
             Style::Lines
         };
-        Self { style, grace: None }
+        Self { style, grace: None, begun: Instant::now(), computed: Mutex::default() }
     }
 
     /// Runs shown here stop when a signal comes, so that what they have can be kept.
@@ -57,6 +60,18 @@ impl Progress {
     /// The exit code of the signal for which runs shown here stop, if it came.
     pub fn asked_to_stop(&self) -> Option<Exit> {
         self.grace.as_ref().and_then(Grace::asked_to_stop)
+    }
+
+    /// Seconds since the beginning.
+    pub fn seconds(&self) -> f64 {
+        self.begun.elapsed().as_secs_f64()
+    }
+
+    /// The jobs that were finished and the seconds that each took, the longest first.
+    pub fn computed(&self) -> Vec<(String, f64)> {
+        let mut jobs = self.computed.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        jobs.sort_by(|a, b| b.1.total_cmp(&a.1));
+        jobs
     }
 
     fn run(&self, name: &str, t_end: f64) -> RunProgress<'_> {
@@ -115,7 +130,11 @@ impl job::JobWatch for RunProgress<'_> {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
-        self.progress.line(&format!("{}: {what}, {}", self.name, human(self.begun.elapsed())));
+        let time = self.begun.elapsed();
+        let mut computed = self.progress.computed.lock().unwrap_or_else(PoisonError::into_inner);
+        computed.push((self.name.clone(), time.as_secs_f64()));
+        drop(computed);
+        self.progress.line(&format!("{}: {what}, {}", self.name, human(time)));
     }
 }
 

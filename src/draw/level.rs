@@ -70,6 +70,29 @@ impl<'a> Level<'a> {
         Some(Self { h: Program::new(&system.tape().select([0])), shown: shown.to_vec(), base, lie })
     }
 
+    /// The surfaces of a system, each as [`Level::new`] has it: one, or two of a system with two. A point of one of two is coloured by what happens
+    /// there with the sign that the other's function has.
+    pub fn all(system: &System, shown: &[usize], fixed: &[(usize, f64)]) -> Vec<Self> {
+        let Some(faces) = system.faces() else { return Self::new(system, shown, fixed).into_iter().collect() };
+        [0, 1]
+            .into_iter()
+            .filter_map(|i| {
+                let level = Self::new(&faces[i][0], shown, fixed)?;
+                let other = Program::new(&faces[1 - i][0].tape().select([0]));
+                let lie = level.lie.and_then(|above| {
+                    let below = lie_of(&faces[i][1])?;
+                    let chosen = move |x: &[f64]| {
+                        let mut h = [f64::NAN];
+                        other.evaluate(x, &mut h);
+                        if h[0] < 0.0 { below(x) } else { above(x) }
+                    };
+                    Some(Box::new(chosen) as Box<Lie<'a>>)
+                });
+                Some(Self { lie, ..level })
+            })
+            .collect()
+    }
+
     /// Whether points can be coloured by what happens there.
     pub fn has_regions(&self) -> bool {
         self.lie.is_some()

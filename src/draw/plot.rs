@@ -301,7 +301,7 @@ fn series(mut sheet: Sheet, run: &RunSpec, lines: &[Line], shown: &[usize]) -> S
         let time = if i + 1 == shown.len() { "*t*" } else { "" };
         let mut panel =
             PlanePanel::new(Axis::linear(time, 0.0, end), Axis::linear(title(&run.system, *state), low, high));
-        for zero in Level::new(&run.system, &[*state], &[]).map_or(Vec::new(), |l| l.points((low, high))) {
+        for zero in Level::all(&run.system, &[*state], &[]).iter().flat_map(|l| l.points((low, high))) {
             surface_shown = true;
             panel = panel.line(vec![[0.0, zero], [end, zero]], SURFACE_LEVEL);
         }
@@ -318,9 +318,13 @@ fn series(mut sheet: Sheet, run: &RunSpec, lines: &[Line], shown: &[usize]) -> S
     sheet
 }
 
-/// The curve h = 0 in a panel, under everything else; returns what of it is there.
-fn surface_curve(mut panel: PlanePanel, level: &Level<'_>, ranges: [(f64, f64); 2]) -> (PlanePanel, Vec<CurveLook>) {
-    let mut seen = Vec::new();
+/// The curve h = 0 in a panel, under everything else; adds to `seen` what of it is there.
+fn surface_curve(
+    mut panel: PlanePanel,
+    level: &Level<'_>,
+    ranges: [(f64, f64); 2],
+    seen: &mut Vec<CurveLook>,
+) -> PlanePanel {
     for (region, points) in level.curves(ranges) {
         let look = curve_look(region);
         panel = panel.line(points, look.0);
@@ -328,7 +332,7 @@ fn surface_curve(mut panel: PlanePanel, level: &Level<'_>, ranges: [(f64, f64); 
             seen.push(look);
         }
     }
-    (panel, seen)
+    panel
 }
 
 type CurveLook = (LineStyle, &'static str);
@@ -355,8 +359,8 @@ fn plane(sheet: Sheet, run: &RunSpec, lines: &[Line], shown: &[usize]) -> Sheet 
     let axis = |k: usize| Axis::linear(title(&run.system, shown[k]), ranges[k].0, ranges[k].1);
     let mut panel = PlanePanel::new(axis(0), axis(1));
     let mut looks = Vec::new();
-    if let Some(level) = Level::new(&run.system, shown, &[]) {
-        (panel, looks) = surface_curve(panel, &level, ranges);
+    for level in Level::all(&run.system, shown, &[]) {
+        panel = surface_curve(panel, &level, ranges, &mut looks);
     }
     for line in lines {
         panel = panel.line(line.points([u, v]), line_style(line.look, line.t.len()));
@@ -383,9 +387,12 @@ fn space(
         panel = panel.camera(azimuth, elevation);
     }
     let (mut regions, mut seen) = (false, Vec::new());
-    if let Some(level) = Level::new(&run.system, &order, &[]) {
-        regions = level.has_regions();
-        let patches = level.patches(&ranges);
+    let mut patches = Vec::new();
+    for level in Level::all(&run.system, &order, &[]) {
+        regions |= level.has_regions();
+        patches.extend(level.patches(&ranges));
+    }
+    if !patches.is_empty() {
         for colour in [style::ATTRACTING, style::REPELLING, style::CROSSING] {
             if patches.iter().any(|p| p.colour == colour) {
                 seen.push(colour);
@@ -455,10 +462,10 @@ fn section(sheet: Sheet, run: &RunSpec, answer: &Answer, shown: &[usize]) -> Res
     let ranges = [(x.lower, x.upper), (y.lower, y.upper)];
     let mut panel = PlanePanel::new(x, y);
     let mut looks = Vec::new();
-    if let (Some(u), Some(v)) = (horizontal, vertical)
-        && let Some(level) = Level::new(&run.system, &[u, v], &[(coordinate, value)])
-    {
-        (panel, looks) = surface_curve(panel, &level, ranges);
+    if let (Some(u), Some(v)) = (horizontal, vertical) {
+        for level in Level::all(&run.system, &[u, v], &[(coordinate, value)]) {
+            panel = surface_curve(panel, &level, ranges, &mut looks);
+        }
     }
     let points =
         |late: bool| (0..t.len()).filter(|i| (t[*i] > half) == late).map(|i| [xs[i], ys[i]]).collect::<Vec<_>>();

@@ -3,7 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use super::step::{Stepper, Tolerance};
+use super::taylor::Precision;
 use super::{Dopri5, Layered, Lsoda, Radau5, Taylor};
+use crate::num::MultiFloat;
+
+/// How many bits a number of [`Method::TaylorExtended`] can have: double-double numbers, then those of [`MultiFloat`].
+pub const PRECISIONS: [u16; 5] = [106, 192, 256, 384, 512];
 
 /// An integration method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -59,6 +64,30 @@ impl Method {
             Method::TaylorExtended => user.with(Taylor::extended(tolerance).with_decimal_constants()),
             Method::Layered => user.with(Layered::new(tolerance)),
         }
+    }
+}
+
+/// [`Method::TaylorExtended`] with numbers of `bits` bits (the next of [`PRECISIONS`], at most the last) and series of degree `order`, or of
+/// the one that the tolerance asks for.
+pub fn with_extended<U: WithStepper<N>, const N: usize>(
+    bits: u16,
+    order: Option<u16>,
+    tolerance: Tolerance,
+    user: U,
+) -> U::Answer {
+    fn of_order<const N: usize, S: Precision>(stepper: Taylor<N, S>, order: Option<u16>) -> Taylor<N, S> {
+        let stepper = stepper.with_decimal_constants();
+        match order {
+            Some(order) => stepper.with_order(usize::from(order)),
+            None => stepper,
+        }
+    }
+    match bits {
+        ..=106 => user.with(of_order(Taylor::extended(tolerance), order)),
+        ..=192 => user.with(of_order(Taylor::<N, MultiFloat<3>>::multi(tolerance), order)),
+        ..=256 => user.with(of_order(Taylor::<N, MultiFloat<4>>::multi(tolerance), order)),
+        ..=384 => user.with(of_order(Taylor::<N, MultiFloat<6>>::multi(tolerance), order)),
+        _ => user.with(of_order(Taylor::<N, MultiFloat<8>>::multi(tolerance), order)),
     }
 }
 

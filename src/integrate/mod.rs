@@ -44,7 +44,7 @@ pub use dopri5::Dopri5;
 pub use driver::{Course, Ignore, Observer, Summary, Watch, drive};
 pub use layered::Layered;
 pub use lsoda::Lsoda;
-pub use method::{Method, WithStepper};
+pub use method::{Method, PRECISIONS, WithStepper, with_extended};
 pub use radau5::Radau5;
 pub use schedule::{Kick, KickLaw, Kicker, Schedule, StepCap};
 pub use step::{Failure, Flow, Interpolant, Statistics, Step, Stepper, StopReason, Tolerance};

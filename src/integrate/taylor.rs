@@ -1,6 +1,6 @@
 //! Taylor series of the solution, order and step size after Jorba & Zou (2005), layer-resolved.
 //!
-//! The series come from the equation itself ([`crate::num::series`]), in `f64` or in [`DoubleDouble`].
+//! The series come from the equation itself ([`crate::num::series`]), in `f64`, in [`DoubleDouble`] or in [`MultiFloat`]s.
 //!
 //! **Layers.** A smoothed switch, tanh(h/eps), is constant to working precision outside a layer |h/eps| < w. There all
 //! its derivatives vanish, so that a high-order method with long steps jumps across the layer and its own error
@@ -15,7 +15,7 @@ use nalgebra::SVector;
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
 use crate::num::elementary::{exp, ln, rough_pow};
 use crate::num::series::{Constants, Solution};
-use crate::num::{DoubleDouble, FromDecimal, Scalar, Tape};
+use crate::num::{DoubleDouble, FromDecimal, MultiFloat, Scalar, Tape};
 use crate::system::VectorField;
 
 /// How far a step inside a layer may move the argument of its tanh.
@@ -32,12 +32,25 @@ const EDGE_MARGIN: f64 = 1.0;
 /// be free is taken.
 const EDGE_SEARCH: usize = 100;
 
+/// The order at which the work per unit of time is least for analytic solutions (Jorba & Zou 2005, sec. 3), with numbers of relative spacing `epsilon`.
+pub fn order_for(tolerance: Tolerance, epsilon: f64) -> u16 {
+    let smallest = tolerance.rtol.min(tolerance.atol).clamp(epsilon / 16.0, 1e-2);
+    (1.0 - 0.5 * ln(smallest)).ceil() as u16
+}
+
 /// A number type that this method can work in.
 pub trait Precision: Scalar + FromDecimal {
     /// Relative spacing of the numbers.
     const EPSILON: f64;
     /// tanh is exactly +-1 beyond this argument.
     const TANH_SATURATION: f64;
+    /// Whether series of the orders that this precision asks for have coefficients beyond the range of `f64`.
+    const BEYOND_F64: bool = false;
+
+    /// log2 of the absolute value, to some digits; minus infinity for zero.
+    fn size(self) -> f64 {
+        log2(self.to_f64().abs())
+    }
 }
 
 impl Precision for f64 {
@@ -48,6 +61,16 @@ impl Precision for f64 {
 impl Precision for DoubleDouble {
     const EPSILON: f64 = DoubleDouble::EPSILON;
     const TANH_SATURATION: f64 = 38.0;
+}
+
+impl<const L: usize> Precision for MultiFloat<L> {
+    const EPSILON: f64 = MultiFloat::<L>::EPSILON;
+    const TANH_SATURATION: f64 = MultiFloat::<L>::TANH_SATURATION;
+    const BEYOND_F64: bool = true;
+
+    fn size(self) -> f64 {
+        self.log2()
+    }
 }
 
 /// The Taylor-series stepper in the arithmetic `S`.
@@ -109,6 +132,24 @@ impl<const N: usize> Taylor<N, DoubleDouble> {
     pub fn extended(tolerance: Tolerance) -> Self {
         Self::with_tolerance(tolerance)
     }
+}
+
+impl<const N: usize, const L: usize> Taylor<N, MultiFloat<L>> {
+    /// A stepper in multi-precision arithmetic; tolerances down to [`MultiFloat::EPSILON`] make sense.
+    pub fn multi(tolerance: Tolerance) -> Self {
+        Self::with_tolerance(tolerance)
+    }
+}
+
+impl<const N: usize, S: Precision> Taylor<N, S> {
+    /// Series of another degree than the tolerance asks for, at least 2.
+    pub fn with_order(mut self, order: usize) -> Self {
+        self.order = order.max(2);
+        self.safety = exp(SAFETY_EXPONENT / (self.order - 1) as f64);
+        self.statistics.highest_order = self.order as u64;
+        self.solution = Solution::new(self.order, &Tape::default(), Constants::Binary);
+        self
+    }
 
     /// Reads the equation's constants, and a start at t = 0, as decimal numbers ([`Constants::Decimal`]), from the next restart on.
     pub fn with_decimal_constants(mut self) -> Self {
@@ -119,9 +160,7 @@ impl<const N: usize> Taylor<N, DoubleDouble> {
 
 impl<const N: usize, S: Precision> Taylor<N, S> {
     fn with_tolerance(tolerance: Tolerance) -> Self {
-        // Jorba & Zou (2005), sec. 3: for analytic solutions the work per unit of time is least at this order.
-        let smallest = tolerance.rtol.min(tolerance.atol).clamp(S::EPSILON / 16.0, 1e-2);
-        let order = (1.0 - 0.5 * ln(smallest)).ceil() as usize;
+        let order = usize::from(order_for(tolerance, S::EPSILON));
         let zero = SVector::from_element(S::zero());
         Self {
             tolerance,
@@ -197,6 +236,9 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
     /// component. With p as in [`Taylor::with_tolerance`] this is Jorba & Zou's step (2005, sec. 3), a factor e^2
     /// inside the radius of convergence that these two terms suggest.
     fn accurate_step(&self) -> f64 {
+        if S::BEYOND_F64 {
+            return self.accurate_step_beyond_f64();
+        }
         let p = self.order;
         let mut h = f64::INFINITY;
         for degree in [p - 1, p] {
@@ -218,8 +260,50 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         h * self.safety
     }
 
+    /// The same by logarithms.
+    fn accurate_step_beyond_f64(&self) -> f64 {
+        let p = self.order;
+        let mut h = f64::INFINITY;
+        for degree in [p - 1, p] {
+            let mut size = f64::NEG_INFINITY;
+            for i in 0..N {
+                let allowed = self.tolerance.atol + self.tolerance.rtol * self.x[i].to_f64().abs();
+                let q = self.solution.component(i)[degree].size() - log2(allowed);
+                size = if q > size || q.is_nan() { q } else { size };
+            }
+            if size.is_nan() {
+                return f64::NAN;
+            }
+            h = h.min(exp(-size / degree as f64 * std::f64::consts::LN_2));
+        }
+        h * exp(SAFETY_EXPONENT / (p - 1) as f64)
+    }
+
+    /// [`Taylor::resolved_step`] with the series in fractions of `h`, whose coefficients are of ordinary size.
+    fn resolved_step_beyond_f64(&self, mut h: f64) -> f64 {
+        let mut series = Vec::with_capacity(self.order);
+        for w in self.solution.layer_arguments() {
+            series.clear();
+            let (step, mut power) = (S::from_f64(h), S::one());
+            for c in w {
+                series.push((*c * power).to_f64());
+                power = power * step;
+            }
+            let fraction = if series[0].abs() >= S::TANH_SATURATION + EDGE_MARGIN {
+                free_time(&series, S::TANH_SATURATION, 1.0)
+            } else {
+                stride_time(&series, 1.0)
+            };
+            h *= fraction;
+        }
+        h
+    }
+
     /// The longest step up to `h` that respects every layer.
     fn resolved_step(&mut self, mut h: f64) -> f64 {
+        if S::BEYOND_F64 {
+            return self.resolved_step_beyond_f64(h);
+        }
         let series = &mut self.argument;
         for w in self.solution.layer_arguments() {
             series.clear();
@@ -232,6 +316,10 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         }
         h
     }
+}
+
+fn log2(x: f64) -> f64 {
+    ln(x) * std::f64::consts::LOG2_E
 }
 
 /// The polynomial `c` at s.

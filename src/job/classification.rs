@@ -221,6 +221,8 @@ mod tests {
                 tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
                 step_cap: StepCap::None,
                 max_steps: DEFAULT_MAX_STEPS,
+                precision: None,
+                order: None,
             },
             schedule: Schedule::default(),
             observe: Observation::Section { coordinate: 1, value: 0.0 },

@@ -45,6 +45,7 @@ pub mod desk;
 pub mod digits;
 pub mod encode;
 pub mod exponent;
+pub mod horizon;
 pub mod limit;
 pub mod orbit;
 #[cfg(feature = "parquet")]
@@ -66,6 +67,7 @@ pub use comparison::PathComparison;
 pub use desk::{Desk, JobWatch, Progress};
 pub use digits::MethodDigits;
 pub use exponent::LargestExponent;
+pub use horizon::Horizon;
 pub use limit::{AfterVisit, SmoothingLimit};
 pub use orbit::ClosedOrbit;
 pub use passage::{Leaving, TwoFoldPassage};

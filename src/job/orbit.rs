@@ -212,6 +212,8 @@ impl ClosedOrbit {
                     tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
                     step_cap: crate::integrate::StepCap::None,
                     max_steps: super::spec::DEFAULT_MAX_STEPS,
+                    precision: None,
+                    order: None,
                 },
                 schedule: Schedule::default(),
                 observe: Observation::Section { coordinate: self.plane.axis, value: self.plane.value },

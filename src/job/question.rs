@@ -11,7 +11,7 @@ use super::spec::SpecError;
 use crate::integrate::filippov::FilippovError;
 use crate::integrate::{Failure, Watch};
 use crate::record::Hash;
-use crate::system::DimensionError;
+use crate::system::BindError;
 
 /// Version of the numerics: a digest of the sources that numbers depend on, made when the program is built. Answers of another version
 /// are never taken for this one's.
@@ -88,7 +88,7 @@ pub enum JobError {
     },
     /// The question is for systems with another number of states.
     #[error(transparent)]
-    Dimension(#[from] DimensionError),
+    Dimension(#[from] BindError),
     /// Another answer, on which this one rests, is not what it should be.
     #[error(transparent)]
     Fact(#[from] NoSuchFact),

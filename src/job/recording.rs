@@ -5,6 +5,7 @@
 //! | path | `path` | t, state |
 //! | section | `section` | t, state, direction |
 //! | Filippov motion | `motion`, `events` | t, state, mode, piece; t, state and what happened |
+//! | the same of a system with two switching surfaces | `motion`, `events` | the same with the signs of both functions |
 //! | funnel | `motion`, `events` | the same with the number of the future (0 is the approach), its exit time and side |
 
 use nalgebra::SVector;
@@ -12,10 +13,11 @@ use nalgebra::SVector;
 use super::answer::{Answer, NoSuchFact, Stop};
 use super::question::JobError;
 use super::spec::RunSpec;
-use super::table::{Column, Entry, Table};
+use super::table::{Cells, Column, Entry, Table};
 use crate::analyse::{Crossing, Direction, Motion, Sample};
-use crate::integrate::filippov::{EventKind, ExitRule, Mode, ModeEvent, Side};
+use crate::integrate::filippov::{EventKind, ExitRule, INTERSECTION, Mode, ModeEvent, Side};
 use crate::integrate::{Statistics, StopReason};
+use crate::num::tape::Program;
 use crate::record::hash::canonical_json;
 
 /// What a run left behind.
@@ -110,6 +112,7 @@ impl<const D: usize> Recording<D> {
                 motion_tables(&names, &members, 0)
             }
         };
+        let tables = tables.into_iter().map(|table| signed(run, table)).collect();
         Answer { statistics: Some(self.statistics.clone()), stop: self.stop.into(), ..Answer::of_tables(tables) }
             .with_fact("t", &self.t)
             .with_fact("state", &self.x.as_slice())
@@ -120,14 +123,15 @@ impl<const D: usize> Recording<D> {
     /// `first_piece` on. A funnel has no parts.
     pub(super) fn part(run: &RunSpec, data: &Data<D>, first_piece: usize) -> Option<Table> {
         let names = run.system.coordinates();
-        match data {
+        let table = match data {
             Data::Path(samples) => Some(path_table(&names, samples)),
             Data::Section(crossings) => Some(section_table(&names, crossings)),
             Data::Motion(motion) => {
                 motion_tables(&names, &[Member { motion, future: None }], first_piece).into_iter().next()
             }
             Data::Funnel { .. } => None,
-        }
+        };
+        table.map(|table| signed(run, table))
     }
 
     /// The recording that an answer to `run` holds.
@@ -182,6 +186,38 @@ impl<const D: usize> Recording<D> {
             },
         })
     }
+}
+
+/// A Filippov motion's table with a column `signs` if the system has two switching surfaces: the signs of both functions, 0 on the
+/// surface ("+-", "0+"). With one surface the mode says it.
+fn signed(run: &RunSpec, mut table: Table) -> Table {
+    if run.system.definition().second().is_none() || !matches!(table.name.as_str(), "motion" | "events") {
+        return table;
+    }
+    let (names, n) = (run.system.coordinates(), run.system.dimension());
+    let functions = Program::new(&run.system.tape().select([0, 2 * n + 1]));
+    let mut column = Column::words("signs");
+    if let Cells::Words(words) = &mut column.cells {
+        let states: Vec<&[f64]> = names.iter().map(|name| table.numbers(name)).collect();
+        for row in 0..table.len() {
+            let x: Vec<f64> = states.iter().map(|s| s[row]).collect();
+            let mut h = [0.0; 2];
+            functions.evaluate(&x, &mut h);
+            let on = INTERSECTION * (1.0 + x.iter().fold(0.0f64, |a, v| a.max(v.abs())));
+            let sign = |h: f64| {
+                if h.abs() <= on {
+                    "0"
+                } else if h > 0.0 {
+                    "+"
+                } else {
+                    "-"
+                }
+            };
+            words.push(&format!("{}{}", sign(h[0]), sign(h[1])));
+        }
+    }
+    table.columns.push(column);
+    table
 }
 
 fn point_columns(names: &[&str]) -> Vec<Column> {
@@ -415,6 +451,8 @@ mod tests {
                 tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
                 step_cap: StepCap::None,
                 max_steps: DEFAULT_MAX_STEPS,
+                precision: None,
+                order: None,
             },
             schedule: Schedule::default(),
             observe,

@@ -13,7 +13,8 @@ use crate::integrate::filippov::{
     self, AllModes, ExitRule, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent, SlidingFlow,
 };
 use crate::integrate::{
-    Course, Flow, Observer, Statistics, Step, Stepper, StopReason, Summary, Watch, WithStepper, drive,
+    Course, Flow, Observer, PRECISIONS, Statistics, Step, Stepper, StopReason, Summary, Watch, WithStepper, drive,
+    with_extended,
 };
 use crate::system::{Bound, Compiled, Field, Hysteretic, PiecewiseSmooth, Smoothed, VectorField};
 
@@ -301,9 +302,15 @@ where
             let x0 = SVector::<f64, M>::from_fn(|i, _| if i < D { x0[i] } else { phi0 });
             observe(spec, &field, x0, aside, watch)
         }
-        SwitchSpec::Filippov { exit, funnel } => {
-            discontinuous(spec, &spec.system.bind::<D>()?, x0, exit, funnel, aside, watch)
-        }
+        SwitchSpec::Filippov { exit, funnel } => match spec.system.faces() {
+            None => discontinuous(spec, &spec.system.bind::<D>()?, x0, exit, funnel, aside, watch),
+            Some([[a, b], [c, d]]) => {
+                let faces = [[a.bind()?, b.bind()?], [c.bind()?, d.bind()?]];
+                watched(spec, aside, &mut |settings, observer| {
+                    filippov::run_two_surfaces(&faces, x0, spec.t_end, settings, exit, observer, watch)
+                })
+            }
+        },
     }
 }
 
@@ -324,16 +331,39 @@ fn discontinuous<P: PiecewiseSmooth<D>, const D: usize, const M: usize>(
 where
     for<'a> SlidingFlow<'a, P, D>: VectorField<M>,
 {
-    let settings = filippov::Settings {
+    match funnel {
+        Some(funnel) => futures(spec, system, x0, &settings(spec), &funnel),
+        None => watched(spec, aside, &mut |settings, observer| {
+            filippov::run_watched(system, x0, spec.t_end, settings, exit, observer, watch)
+        }),
+    }
+}
+
+/// How a Filippov run is made.
+fn settings(spec: &RunSpec) -> filippov::Settings {
+    filippov::Settings {
         tolerance: spec.method.tolerance,
         max_step: spec.method.step_cap.for_segment(spec.t_end),
         max_steps: spec.method.max_steps,
         ..filippov::Settings::default()
-    };
-    let run = |observer: &mut dyn FilippovObserver<D>| {
-        filippov::run_watched(system, x0, spec.t_end, &settings, exit, &mut AnyObserver(observer), watch)?
-            .within_budget()
-    };
+    }
+}
+
+/// A Filippov run, given what looks on.
+type FilippovRun<'a, const D: usize> = dyn FnMut(
+        &filippov::Settings,
+        &mut AnyObserver<'_, dyn FilippovObserver<D> + '_>,
+    ) -> Result<FilippovSummary<D>, filippov::FilippovError>
+    + 'a;
+
+/// A Filippov run, and what is to be recorded of it.
+fn watched<const D: usize>(
+    spec: &RunSpec,
+    aside: &mut Aside<'_, D>,
+    run: &mut FilippovRun<'_, D>,
+) -> Result<Recording<D>, JobError> {
+    let settings = settings(spec);
+    let mut run = |observer: &mut dyn FilippovObserver<D>| run(&settings, &mut AnyObserver(observer))?.within_budget();
     let recording = |data, summary: FilippovSummary<D>| Recording {
         data,
         t: summary.t,
@@ -342,19 +372,18 @@ where
         statistics: summary.statistics,
         stop: summary.stop,
     };
-    match (spec.observe, funnel) {
-        (_, Some(funnel)) => futures(spec, system, x0, &settings, &funnel),
-        (Observation::Path { chord }, None) => {
+    match spec.observe {
+        Observation::Path { chord } => {
             let mut draining = Draining { recorder: MotionRecorder::new(chord), aside };
             let end = run(&mut draining)?;
             Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
         }
-        (Observation::Times { every }, None) => {
-            let mut draining = Draining { recorder: TimedMotion::new(&x0, every), aside };
+        Observation::Times { every } => {
+            let mut draining = Draining { recorder: TimedMotion::new(&start(spec), every), aside };
             let end = run(&mut draining)?;
             Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
         }
-        (Observation::Section { coordinate, value }, None) => {
+        Observation::Section { coordinate, value } => {
             let mut draining = Draining { recorder: SectionRecorder::new(coordinate, value), aside };
             let end = run(&mut AllModes(&mut draining))?;
             Ok(recording(Data::Section(draining.recorder.into_crossings()), end))
@@ -474,9 +503,13 @@ fn integrate<'a, F: VectorField<N>, const N: usize>(
     observer: &'a mut (dyn Observer<N> + 'a),
     watch: &'a dyn Watch,
 ) -> Result<Summary<N>, JobError> {
-    let MethodSpec { name, tolerance, step_cap, max_steps } = spec.method;
+    let MethodSpec { name, tolerance, step_cap, max_steps, precision, order } = spec.method;
     let course = Course { t_end: spec.t_end, schedule: spec.schedule, step_cap, max_steps, kicked_states: states };
-    name.with_stepper(tolerance, Drive { field, x0, course, observer: AnyObserver(observer), watch })
+    let orbit = Drive { field, x0, course, observer: AnyObserver(observer), watch };
+    match (precision, order) {
+        (None, None) => name.with_stepper(tolerance, orbit),
+        _ => with_extended(precision.unwrap_or(PRECISIONS[0]), order, tolerance, orbit),
+    }
 }
 
 /// A run that waits for its method.

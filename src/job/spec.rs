@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::integrate::Method;
 use crate::integrate::filippov::ExitRule;
-use crate::integrate::{Schedule, StepCap, Tolerance, layered};
+use crate::integrate::{PRECISIONS, Schedule, StepCap, Tolerance, layered};
 use crate::num::elementary::exp10;
 use crate::system::{Field, Relaxation, System, Transition};
 
@@ -103,6 +103,12 @@ pub struct MethodSpec {
     pub step_cap: StepCap,
     /// Most steps of the whole run before it is given up as a failure.
     pub max_steps: u64,
+    /// Bits of the numbers of [`Method::TaylorExtended`], one of [`PRECISIONS`]; 106 if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub precision: Option<u16>,
+    /// Degree of its series; what the tolerance asks for (Jorba & Zou 2005) if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub order: Option<u16>,
 }
 
 /// A budget far above what any run of the paper needs; a run on the stiff far attractor reaches it within minutes.
@@ -118,6 +124,8 @@ impl MethodSpec {
             tolerance: Tolerance { rtol: tolerance, atol: tolerance },
             step_cap: StepCap::FractionOfSegment(0.1),
             max_steps: DEFAULT_MAX_STEPS,
+            precision: None,
+            order: None,
         }
     }
 
@@ -133,6 +141,15 @@ impl MethodSpec {
 
 /// The finest tolerance that double-double arithmetic can hold.
 const FINEST_EXTENDED: f64 = 1e-32;
+
+/// Longest series that can be asked for: their cost grows with the square.
+const MOST_DEGREES: u16 = 1000;
+
+/// The finest tolerance that numbers of so many bits can hold: 1e-32 for 106, 2^(1 - bits) for more.
+pub fn finest_extended(bits: u16) -> f64 {
+    let most = PRECISIONS[PRECISIONS.len() - 1];
+    if bits <= PRECISIONS[0] { FINEST_EXTENDED } else { f64::from_bits((1024 - u64::from(bits.min(most))) << 52) }
+}
 
 /// What is recorded of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -163,8 +180,9 @@ const LATEST: f64 = 1e12;
 const FINEST_ATOL: f64 = 1e-140;
 
 /// Columns of recorded data beside the states'.
-const COLUMNS: [&str; 15] = [
+const COLUMNS: [&str; 16] = [
     "t",
+    "signs",
     "direction",
     "mode",
     "piece",
@@ -227,6 +245,13 @@ impl RunSpec {
                     finite("sigma", sigma)?;
                 }
             }
+            SwitchSpec::Hysteretic { .. } if self.system.definition().second().is_some() => {
+                return Err(SpecError {
+                    field: "switch",
+                    value: "hysteretic".into(),
+                    rule: "hysteresis is for systems with one switching surface; this one has two, so smooth them or take filippov",
+                });
+            }
             SwitchSpec::Hysteretic { eps, eps_prime, phi0, .. } => {
                 positive("eps", eps)?;
                 positive("eps-prime", eps_prime)?;
@@ -275,6 +300,11 @@ impl RunSpec {
         }
         if (exit == ExitRule::All) != funnel.is_some() {
             return wrong_exit("\"all\" and a description of the funnel go together");
+        }
+        if funnel.is_some() && self.system.definition().second().is_some() {
+            return wrong_exit(
+                "all futures are followed at one switching surface; this system has two, so give another rule",
+            );
         }
         if let Some(funnel) = funnel {
             positive("funnel-shortest", funnel.shortest)?;
@@ -365,17 +395,45 @@ impl MethodSpec {
     fn validate(&self) -> Checked {
         positive("rtol", self.tolerance.rtol)?;
         positive("atol", self.tolerance.atol)?;
-        let (finest, rule) = match self.name {
-            Method::TaylorExtended => {
-                (FINEST_EXTENDED, "double-double arithmetic carries 32 digits; give 1e-32 or more")
+        if let Some(bits) = self.precision {
+            if self.name != Method::TaylorExtended {
+                return wrong(
+                    "precision",
+                    f64::from(bits),
+                    "only taylor-extended has a choice of precision; leave it out",
+                );
             }
+            if !PRECISIONS.contains(&bits) {
+                return wrong(
+                    "precision",
+                    f64::from(bits),
+                    "numbers have 106, 192, 256, 384 or 512 bits; give one of these",
+                );
+            }
+        }
+        if let Some(order) = self.order {
+            if self.name != Method::TaylorExtended {
+                return wrong("order", f64::from(order), "only taylor-extended has a choice of order; leave it out");
+            }
+            if !(4..=MOST_DEGREES).contains(&order) {
+                return wrong("order", f64::from(order), "series have 4 to 1000 degrees");
+            }
+        }
+        let (finest, rule) = match self.name {
+            Method::TaylorExtended => match self.precision {
+                None | Some(106) => (FINEST_EXTENDED, "double-double arithmetic carries 32 digits; give 1e-32 or more"),
+                Some(bits) => (
+                    finest_extended(bits),
+                    "numbers of that precision do not carry so many digits; give more, or raise the precision",
+                ),
+            },
             Method::Taylor => (1e-17, "f64 carries 16 digits; give 1e-17 or more"),
             _ => (1e-15, "f64 carries 16 digits; give 1e-15 or more"),
         };
         if self.tolerance.rtol < finest {
             return wrong("rtol", self.tolerance.rtol, rule);
         }
-        if self.tolerance.atol < FINEST_ATOL {
+        if self.tolerance.atol < FINEST_ATOL && self.precision.is_none() {
             let rule = "errors are divided by it and squared, which f64 cannot hold below 1e-140; give that or more";
             return wrong("atol", self.tolerance.atol, rule);
         }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use serde::de::{Deserialize, Deserializer, Error, Visitor};
 use serde::ser::{Serialize, Serializer};
 
-use super::DoubleDouble;
+use super::{Arithmetic, DoubleDouble, MultiFloat};
 
 /// A finite number given in decimal. Plain arithmetic sees the nearest `f64`; extended precision can read the decimal number
 /// itself (0.1 is one tenth), to all digits that were given.
@@ -151,6 +151,15 @@ impl FromDecimal for DoubleDouble {
             Some(digits) => DoubleDouble::from_digits(digits).unwrap_or(DoubleDouble::from_decimal(number.value)),
             None => DoubleDouble::from_decimal(number.value),
         }
+    }
+}
+
+impl<const L: usize> FromDecimal for MultiFloat<L> {
+    fn from_decimal(number: &Decimal) -> Self {
+        // Rust prints the shortest digits that read back as the same number, on every platform.
+        let shortest = || format!("{:e}", number.value);
+        let digits = number.digits.as_deref().map_or_else(shortest, str::to_owned);
+        MultiFloat::from_digits(&digits).unwrap_or(MultiFloat::from_f64(number.value))
     }
 }
 

@@ -23,6 +23,7 @@ pub mod markup;
 pub mod number;
 pub mod sheet;
 pub mod style;
+pub mod ticks;
 
 mod backend;
 mod canvas;
@@ -34,6 +35,7 @@ mod pdf;
 mod plane;
 mod png_file;
 mod polyline;
+mod preview;
 mod provenance;
 mod raster;
 mod rich_text;
@@ -41,10 +43,11 @@ mod scene;
 mod seal;
 mod space;
 mod svg;
-mod ticks;
 
 pub use encode::encode_png;
 pub use png_file::{decode_png, png_size};
+pub use polyline::clip_polygon;
+pub use preview::{Shrink, encode_preview, shrunk};
 pub use provenance::{Format, Provenance, ProvenanceError, read_provenance};
 pub use raster::Pixels;
 pub use rich_text::RichTextError;

@@ -59,19 +59,24 @@ pub(super) fn rgb(pixels: &Pixels) -> Vec<u8> {
 /// Rows are not filtered: drawings repeat whole stretches of pixels, and filters made for photographs hide that. Compressed here rather
 /// than by the PNG crate, whose compressor is chosen by cargo features that any dependency can turn on.
 pub(super) fn image_stream(data: &[u8], row: usize) -> Vec<u8> {
+    image_stream_at(data, row, LEVEL)
+}
+
+/// The same at another effort of compression.
+pub(super) fn image_stream_at(data: &[u8], row: usize, level: u8) -> Vec<u8> {
     let mut rows = Vec::with_capacity(data.len() + data.len() / row + 1);
     for line in data.chunks_exact(row) {
         rows.push(0);
         rows.extend_from_slice(line);
     }
-    compress_to_vec_zlib(&rows, LEVEL)
+    compress_to_vec_zlib(&rows, level)
 }
 
 /// Effort of compression: higher levels cost more time than all the drawing.
 const LEVEL: u8 = 3;
 
 /// Palette and indices of a picture of at most 256 colours. The palette is sorted.
-fn indexed(pixels: &Pixels) -> Option<(Vec<u8>, Vec<u8>)> {
+pub(super) fn indexed(pixels: &Pixels) -> Option<(Vec<u8>, Vec<u8>)> {
     let mut table = ColourTable::new();
     let mut indices = Vec::with_capacity(pixels.rgba.len() / 4);
     let mut last = (u32::MAX, 0);

@@ -13,6 +13,9 @@ use crate::render::read_provenance;
 /// differ from run to run.
 pub const RELEASE_DATE: &str = "2026-11-21";
 
+/// Where the program is documented, as Cargo.toml has it.
+const DOCUMENTATION: &str = "https://docs.rs/twofold-dynamics";
+
 /// The licence of program and pictures, either of two: address, name, what it allows in a line.
 const LICENCES: [(&str, &str, &str); 2] = [
     (
@@ -31,7 +34,7 @@ const ARTICLE: &str = "https://research-information.bris.ac.uk/en/publications/s
 /// That university: address, name.
 const AFFILIATION: (&str, &str) = ("https://www.bristol.ac.uk/", "University of Bristol");
 /// Where the article appeared, in that list's words.
-const PROCEEDINGS: &str = "Proc. 5th International Conference on Structural Dynamics SEMS, Cape Town";
+pub(super) const PROCEEDINGS: &str = "Proc. 5th International Conference on Structural Dynamics SEMS, Cape Town";
 
 /// The metadata of a folder that holds `made` and what the report adds to it (`added`: name and bytes).
 pub fn archive(report: &Report, made: &[FileBytes], added: &[(&str, &[u8])]) -> Vec<u8> {
@@ -71,6 +74,8 @@ pub fn archive(report: &Report, made: &[FileBytes], added: &[(&str, &[u8])]) -> 
             "@id": "#authors",
             "@type": "Organization",
             "name": "The twofold authors",
+            // Where they can be found: an organisation in RO-Crate should have an address.
+            "url": DOCUMENTATION,
         }),
         json!({
             "@id": "#software",
@@ -151,6 +156,7 @@ fn name(report: &Report, path: &str) -> String {
         names::PAGE => "The report, for people",
         names::REPORT => "The report, for programs",
         names::VERDICTS => "All verdicts with their evidence",
+        names::MAKING => "Programs, machines and times of the computations",
         _ => "",
     };
     if !known.is_empty() {

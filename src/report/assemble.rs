@@ -6,13 +6,16 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::model::*;
+use super::space;
 use crate::compare;
+use crate::job::Table;
+use crate::job::encode::from_csv;
 use crate::job::spec::Method;
 use crate::paper::Reading;
 use crate::paper::pipeline::{PanelRecord, TableRecord, pixel_hash};
 use crate::paper::wording;
 use crate::record::{FileBytes, Hash, Layer, Manifest, PictureEntry};
-use crate::render::{Pixels, decode_png, encode_png};
+use crate::render::{Pixels, Shrink, decode_png, encode_preview, shrunk};
 
 /// The record beside a picture. Verdicts are read loosely: their evidence may hold numbers that JSON writes as null.
 #[derive(Deserialize)]
@@ -46,6 +49,7 @@ pub fn assemble(made: &[FileBytes], committed: &[FileBytes]) -> Report {
         .map(|((_, _, id), files)| figure(id, &files, &committed, &mut problems))
         .filter(|f| !f.pictures.is_empty() || !f.unrecorded.is_empty())
         .collect();
+    let making = making(made, &mut problems);
     Report {
         format: "twofold-report",
         version: VERSION,
@@ -53,12 +57,33 @@ pub fn assemble(made: &[FileBytes], committed: &[FileBytes]) -> Report {
         article: ARTICLE,
         summary: summary(&figures),
         figures,
+        making,
         problems,
     }
 }
 
+/// How the figures were made, as the folder says.
+fn making(made: &[FileBytes], problems: &mut Vec<String>) -> Vec<Making> {
+    let Some(file) = made.iter().find(|f| f.path == super::names::MAKING) else { return Vec::new() };
+    match serde_json::from_slice::<Makings>(&file.bytes) {
+        Ok(makings) => makings.runs,
+        Err(error) => {
+            problems.push(format!("{}: cannot be read ({error}); make the figures again to have it anew", file.path));
+            Vec::new()
+        }
+    }
+}
+
+/// A picture as the page shows it.
+fn preview(pixels: &Pixels, how: Shrink) -> Option<Preview> {
+    let small = shrunk(pixels, PREVIEW_WIDTH, how);
+    // What has no pixels is no picture, and there is nothing to show.
+    let png = encode_preview(&small).ok()?;
+    Some(Preview { png, size: [small.width, small.height] })
+}
+
 /// Whether a figure is one of the paper's; ours have names, not numbers, and come after them.
-fn of_the_paper(id: &str) -> bool {
+pub(super) fn of_the_paper(id: &str) -> bool {
     id.strip_prefix("fig").is_some_and(|number| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
 }
 
@@ -141,7 +166,7 @@ fn figure(id: &str, files: &[&FileBytes], committed: &Committed<'_>, problems: &
             continue;
         }
         match decode_png(&file.bytes) {
-            Ok(_) => spare.push(file),
+            Ok(pixels) => spare.extend(preview(&pixels, Shrink::Mean).map(|p| (file, p))),
             Err(error) => problems.push(unreadable(file, &error)),
         }
     }
@@ -149,8 +174,8 @@ fn figure(id: &str, files: &[&FileBytes], committed: &Committed<'_>, problems: &
     FigureReport {
         id: id.to_owned(),
         title,
-        unrecorded: spare.iter().map(|f| file_report(f, Role::Png, None, None)).collect(),
-        unrecorded_png: spare.iter().map(|f| f.bytes.clone()).collect(),
+        unrecorded: spare.iter().map(|(f, _)| file_report(f, Role::Png, None, None)).collect(),
+        unrecorded_png: spare.into_iter().map(|(_, preview)| preview).collect(),
         pictures,
     }
 }
@@ -215,8 +240,7 @@ fn picture(
     }
     listed.push(file_report(own, Role::Record, None, None));
 
-    let shown = png.filter(|_| pixels.is_some());
-    let mut images = Images { actual: shown.map(|f| f.bytes.clone()), ..Images::default() };
+    let mut images = Images { actual: pixels.as_ref().and_then(|p| preview(p, Shrink::Mean)), ..Images::default() };
     let reference = reference(id, &hashes, &record, pixels.as_ref(), committed, manifest, &mut images);
     let verdicts = record
         .verdicts
@@ -239,7 +263,9 @@ fn picture(
         })
         .collect();
     let panels: Vec<PanelReport> = record.panels.into_iter().map(panel).collect();
+    let spaces = spaces(id, &panels, &record.tables, files);
     PictureReport {
+        spaces,
         description: description(&name, &record.title, record.reading, &record.caption, &panels),
         title: record.title,
         reading: record.reading,
@@ -254,6 +280,24 @@ fn picture(
         verdicts,
         images,
     }
+}
+
+/// The panels in space, from their tables; none of a picture that is no view in space, or whose tables are not there.
+fn spaces(id: &str, panels: &[PanelReport], tables: &[TableRecord], files: &[&FileBytes]) -> Vec<space::SpaceView> {
+    let Some(camera) = space::camera(id) else { return Vec::new() };
+    let table = |panel: &PanelReport| -> Option<Table> {
+        let own = tables.iter().filter(|t| t.panel.as_deref() == Some(panel.label.as_str()));
+        let found = own.filter_map(|t| files.iter().find(|f| f.name() == t.file));
+        found.filter_map(|f| from_csv(&f.bytes).ok()).map(|(_, table)| table).find(|t| t.name != "events")
+    };
+    let sources: Vec<space::Source<'_>> = panels
+        .iter()
+        .filter(|p| p.run.system.dimension() == 3)
+        .filter_map(|p| {
+            Some(space::Source { label: &p.label, title: &p.title, system: &p.run.system, table: table(p)? })
+        })
+        .collect();
+    space::views(&sources, &camera)
 }
 
 fn unreadable(file: &FileBytes, error: &dyn std::fmt::Display) -> String {
@@ -328,10 +372,7 @@ fn reference(
     let (comparison, note) = match (committed.file(&format!("{id}/{}.png", actual.name)), pixels) {
         (None, _) => (None, Some("the expected picture itself is not committed, only its hashes".to_owned())),
         (Some(_), None) => (None, Some("the actual picture cannot be read".to_owned())),
-        (Some(bytes), Some(pixels)) => {
-            images.expected = Some(bytes.to_vec());
-            held_against(bytes, expected, pixels, images)
-        }
+        (Some(bytes), Some(pixels)) => held_against(bytes, expected, pixels, images),
     };
     Reference::Different {
         layer: difference.layer,
@@ -350,19 +391,14 @@ fn held_against(
 ) -> (Option<compare::Comparison>, Option<String>) {
     let before = match decode_png(bytes) {
         Ok(before) => before,
-        Err(error) => {
-            images.expected = None;
-            return (None, Some(format!("the expected picture cannot be read ({error})")));
-        }
+        Err(error) => return (None, Some(format!("the expected picture cannot be read ({error})"))),
     };
-    let mut note = (pixel_hash(&before) != expected.pixels)
+    images.expected = preview(&before, Shrink::Mean);
+    let note = (pixel_hash(&before) != expected.pixels)
         .then(|| "the committed PNG is itself not the picture whose hash is committed".to_owned());
     match (compare::compare(&before, actual), compare::difference_image(&before, actual)) {
         (Ok(comparison), Ok(difference)) => {
-            match encode_png(&difference) {
-                Ok(png) => images.difference = Some(png),
-                Err(error) => note = Some(format!("the difference cannot be drawn ({error})")),
-            }
+            images.difference = preview(&difference, Shrink::Strongest);
             (Some(comparison), note)
         }
         (Err(sizes), _) | (_, Err(sizes)) => (None, Some(sizes.to_string())),

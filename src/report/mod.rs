@@ -19,11 +19,15 @@ mod assemble;
 mod html;
 mod model;
 mod page;
+mod prose;
+mod rules;
+mod space;
 
 pub use archive::{RELEASE_DATE, archive};
 pub use assemble::assemble;
 pub use model::*;
 pub use page::{Links, page};
+pub use space::SpaceView;
 
 /// File names of what the report writes, in the folder of the figures.
 pub mod names {
@@ -33,6 +37,8 @@ pub mod names {
     pub const REPORT: &str = "report.json";
     /// All verdicts with their evidence.
     pub const VERDICTS: &str = "verdicts.json";
+    /// How the figures were made: program, machine, times. Written by `twofold figure`.
+    pub const MAKING: &str = "making.json";
     /// RO-Crate metadata.
     pub const ARCHIVE: &str = "ro-crate-metadata.json";
 }

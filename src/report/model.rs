@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::space::SpaceView;
 use crate::compare::Comparison;
 use crate::integrate::Statistics;
 use crate::job::spec::RunSpec;
@@ -29,8 +30,67 @@ pub struct Report {
     pub summary: Summary,
     /// The figures, in natural order of their folders' names.
     pub figures: Vec<FigureReport>,
+    /// By which programs, on which machines and in what time the figures were made, as far as the folder says.
+    pub making: Vec<Making>,
     /// What could not be read, a line each.
     pub problems: Vec<String>,
+}
+
+/// The file in the folder of the figures that says how they were made. It is the one file there that holds times, and no figure depends on it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Makings {
+    /// "twofold-making".
+    pub format: String,
+    /// Version of this file's form.
+    pub version: u32,
+    /// One entry for each call of the program that figures in the folder come from, the last one last.
+    pub runs: Vec<Making>,
+}
+
+/// A call of the program that made figures.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Making {
+    /// The figures that come from it.
+    pub figures: Vec<String>,
+    /// "twofold 0.2.0".
+    pub program: String,
+    /// The commit that the program was built from.
+    pub commit: String,
+    /// The compiler.
+    pub compiler: String,
+    /// The machine that it was built for.
+    pub target: String,
+    /// The build's profile.
+    pub profile: String,
+    /// Threads that computed.
+    pub threads: usize,
+    /// Whether answers kept from earlier calls could be used.
+    pub store: bool,
+    /// From the first question to the last file, in seconds.
+    pub seconds: f64,
+    /// What was computed, the longest first; what is missing here came from the store.
+    pub computed: Vec<Timed>,
+}
+
+/// A computation and the time it took.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Timed {
+    /// What was computed.
+    pub what: String,
+    /// Seconds, beside whatever else was computed.
+    pub seconds: f64,
+}
+
+impl Makings {
+    /// With another call's entry; figures that it made again no longer come from an earlier one.
+    pub fn with(mut self, making: Making) -> Self {
+        for run in &mut self.runs {
+            run.figures.retain(|f| !making.figures.contains(f));
+        }
+        self.runs.retain(|run| !run.figures.is_empty());
+        self.runs.push(making);
+        Self { format: "twofold-making".into(), version: 1, runs: self.runs }
+    }
 }
 
 /// An article.
@@ -112,9 +172,9 @@ pub struct FigureReport {
     pub pictures: Vec<PictureReport>,
     /// Pictures in the folder that no record speaks of.
     pub unrecorded: Vec<FileReport>,
-    /// The unrecorded pictures' bytes.
+    /// The unrecorded pictures' previews.
     #[serde(skip)]
-    pub unrecorded_png: Vec<Vec<u8>>,
+    pub unrecorded_png: Vec<Preview>,
 }
 
 /// A picture.
@@ -147,18 +207,33 @@ pub struct PictureReport {
     /// Bytes for the page.
     #[serde(skip)]
     pub images: Images,
+    /// Its panels in space, for the page.
+    #[serde(skip)]
+    pub spaces: Vec<SpaceView>,
 }
 
-/// PNG files of a picture, as far as they are there.
+/// Previews of a picture as PNG files, as far as it is there: smaller, and in fewer colours ([`PREVIEW_WIDTH`]).
 #[derive(Clone, Debug, Default)]
 pub struct Images {
     /// The picture as it is.
-    pub actual: Option<Vec<u8>>,
+    pub actual: Option<Preview>,
     /// The committed one, where it is wanted for comparison.
-    pub expected: Option<Vec<u8>>,
-    /// The difference.
-    pub difference: Option<Vec<u8>>,
+    pub expected: Option<Preview>,
+    /// The difference; of the pixels that one of its own stands for it shows the most different one.
+    pub difference: Option<Preview>,
 }
+
+/// A preview.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Preview {
+    /// The PNG file.
+    pub png: Vec<u8>,
+    /// Its width and height in pixels.
+    pub size: [u32; 2],
+}
+
+/// Width of previews in pixels.
+pub const PREVIEW_WIDTH: u32 = 960;
 
 /// How a picture stands to the committed reference.
 #[derive(Clone, Debug, Serialize)]

@@ -5,9 +5,10 @@ use std::fmt::Write as _;
 
 use sha2::{Digest, Sha256};
 
+use super::archive::{PROCEEDINGS, RELEASE_DATE};
 use super::html::{address, base64, data_address, escape, identifier, rich};
 use super::model::*;
-use super::names;
+use super::{names, prose, rules};
 use crate::compare::Comparison;
 use crate::paper::Reading;
 use crate::paper::wording;
@@ -40,10 +41,14 @@ pub fn page(report: &Report, links: Links) -> Vec<u8> {
     let mut html = String::new();
     head(&mut html, report);
     summary(&mut html, report);
+    findings(&mut html, report);
     for figure in &report.figures {
         self::figure(&mut html, figure, links);
     }
     all_verdicts(&mut html, report);
+    rules(&mut html, report);
+    making(&mut html, report);
+    citing(&mut html, report);
     foot(&mut html, report, links);
     html.into_bytes()
 }
@@ -86,11 +91,19 @@ fn head(html: &mut String, report: &Report) {
         escape(&report.made_by),
         escape(a.title)
     );
-    put!(html, "<nav aria-label=\"Figures\">\n<ul>");
+    put!(html, "<nav aria-label=\"Contents\">\n<ul>\n<li><a href=\"#findings\">Findings</a></li>");
     for figure in &report.figures {
         put!(html, "<li><a href=\"#{}\">{}</a></li>", figure_id(figure), escape(&figure_name(&figure.id)));
     }
-    put!(html, "<li><a href=\"#verdicts\">All verdicts</a></li>\n</ul>\n</nav>\n</header>\n<main>");
+    for (id, name) in [
+        ("verdicts", "All verdicts"),
+        ("rules", "Rules and thresholds"),
+        ("making", "How it was made"),
+        ("citing", "How to cite"),
+    ] {
+        put!(html, "<li><a href=\"#{id}\">{name}</a></li>");
+    }
+    put!(html, "</ul>\n</nav>\n</header>\n<main>");
 }
 
 /// "Figure 7" for fig7, the folder's name with a capital for others.
@@ -269,7 +282,7 @@ fn claims(html: &mut String, report: &Report) {
     let readings: Vec<Option<Reading>> = report.summary.readings.iter().map(|r| r.reading).collect();
     put!(html, "<h3 id=\"claims\">The paper’s claims, panel by panel</h3>");
     table_start(html, "What the paper says and what each reading shows", "claims-table", None);
-    put!(html, "<thead><tr><th scope=\"col\">Panel</th><th scope=\"col\">The paper</th>");
+    put!(html, "<thead><tr><th scope=\"col\">Panel, and what the paper says</th>");
     for reading in &readings {
         put!(html, "<th scope=\"col\">{}</th>", escape(&capitalised(reading_name(*reading))));
     }
@@ -277,7 +290,7 @@ fn claims(html: &mut String, report: &Report) {
     for line in &lines {
         put!(
             html,
-            "<tr><th scope=\"row\"><a href=\"#{}\">{} ({})</a></th><td>{}</td>",
+            "<tr><th scope=\"row\"><a href=\"#{}\">{} ({})</a>: {}</th>",
             figure_id(line.figure),
             escape(&line.base),
             escape(line.panel),
@@ -305,9 +318,10 @@ fn short(verdict: &VerdictReport) -> &str {
 
 /// A table in a box of its own that scrolls sideways, also with the keyboard.
 fn table_start(html: &mut String, caption: &str, id: &str, announce: Option<&str>) {
+    let class = if id == "claims-table" { "scroll claims" } else { "scroll" };
     put!(
         html,
-        "<div class=\"scroll\" role=\"region\" tabindex=\"0\" aria-labelledby=\"{id}-caption\">\n<table id=\"{id}\"{}>\n\
+        "<div class=\"{class}\" role=\"region\" tabindex=\"0\" aria-labelledby=\"{id}-caption\">\n<table id=\"{id}\"{}>\n\
          <caption id=\"{id}-caption\">{}</caption>",
         announce.map_or(String::new(), |a| format!(" data-sortable=\"{a}\"")),
         escape(caption)
@@ -321,7 +335,7 @@ fn figure(html: &mut String, figure: &FigureReport, links: Links) {
     for picture in &figure.pictures {
         self::picture(html, picture, links);
     }
-    for (file, bytes) in figure.unrecorded.iter().zip(&figure.unrecorded_png) {
+    for (file, preview) in figure.unrecorded.iter().zip(&figure.unrecorded_png) {
         let id = identifier(&file.path);
         put!(
             html,
@@ -329,7 +343,7 @@ fn figure(html: &mut String, figure: &FigureReport, links: Links) {
             escape(&file.path),
             tag("", "no record")
         );
-        let img = image(bytes, file.media_type, &format!("The picture {}; no record describes it", file.path), None);
+        let img = image(preview, &format!("The picture {}; no record describes it", file.path));
         put!(
             html,
             "<figure>{img}<figcaption>No record stands beside this picture. {}</figcaption></figure>\n</article>",
@@ -339,9 +353,13 @@ fn figure(html: &mut String, figure: &FigureReport, links: Links) {
     put!(html, "</section>");
 }
 
-fn image(bytes: &[u8], media_type: &str, alt: &str, size: Option<[u32; 2]>) -> String {
-    let size = size.map_or(String::new(), |[w, h]| format!(" width=\"{w}\" height=\"{h}\""));
-    format!("<img src=\"{}\" alt=\"{}\"{size}/>", data_address(media_type, bytes), escape(alt))
+fn image(preview: &Preview, alt: &str) -> String {
+    let [w, h] = preview.size;
+    format!(
+        "<img src=\"{}\" alt=\"{}\" width=\"{w}\" height=\"{h}\"/>",
+        data_address("image/png", &preview.png),
+        escape(alt)
+    )
 }
 
 fn picture(html: &mut String, picture: &PictureReport, links: Links) {
@@ -359,16 +377,21 @@ fn picture(html: &mut String, picture: &PictureReport, links: Links) {
     }
     put!(html, "<figure>");
     match &picture.images.actual {
-        Some(bytes) => put!(html, "{}", image(bytes, "image/png", &picture.description, picture.size)),
+        Some(preview) => put!(html, "{}", image(preview, &picture.description)),
         None => put!(html, "<p class=\"notice\">The PNG file is not there, or is none.</p>"),
     }
     put!(html, "<figcaption>{}</figcaption>\n</figure>", rich(&picture.caption));
+    spaces(html, picture, &id);
     put!(html, "<ul class=\"links\" aria-label=\"Files of {}\">", escape(&picture.name));
     for file in picture.files.iter().filter(|f| f.integrity != Integrity::Missing) {
         let text = match (file.role, &file.panel) {
+            (Role::Data, Some(panel)) if file.path.ends_with("-events.csv") => format!("CSV ({panel}), events"),
             (Role::Data, Some(panel)) => format!("CSV ({panel})"),
             (Role::Data, None) => file.path.rsplit('/').next().unwrap_or(&file.path).to_owned(),
-            (Role::Png, _) => "PNG".to_owned(),
+            (Role::Png, _) => match picture.size {
+                Some([w, h]) => format!("PNG, {w} × {h}"),
+                None => "PNG".to_owned(),
+            },
             (Role::Svg, _) => "SVG".to_owned(),
             (Role::Pdf, _) => "PDF".to_owned(),
             _ => "Record (JSON)".to_owned(),
@@ -387,7 +410,7 @@ fn picture(html: &mut String, picture: &PictureReport, links: Links) {
     put!(html, "</article>");
 }
 
-/// What differs: the layer, the numbers, and expected | difference | actual.
+/// What differs: the layer, the numbers, and ours | difference | theirs.
 fn mismatch(html: &mut String, picture: &PictureReport) {
     let (layer, panels, comparison, note) = match &picture.reference {
         Reference::Different { layer, panels, comparison, note, .. } => (layer, panels, comparison, note),
@@ -416,31 +439,49 @@ fn mismatch(html: &mut String, picture: &PictureReport) {
     put!(html, "</div>");
     let i = &picture.images;
     let name = &picture.name;
+    // Ours, what lies between, theirs.
     let shown = [
-        ("Expected", i.expected.as_ref(), format!("Expected: the committed {name}")),
+        ("Ours", i.actual.as_ref(), format!("Ours: {name} as it was computed")),
         (
             "Difference",
             i.difference.as_ref(),
-            format!(
-                "Difference of {name}: orange where only the expected picture has ink, blue where only the actual one has"
-            ),
+            format!("Difference of {name}: orange where only the reference has ink, blue where only ours has"),
         ),
-        ("Actual", i.actual.as_ref(), format!("Actual: {name} as it was computed")),
+        ("Reference", i.expected.as_ref(), format!("Reference: the committed {name}")),
     ];
     if i.expected.is_some() {
         put!(html, "<div class=\"triptych\" data-triptych=\"{}\">", identifier(name));
-        for (word, bytes, alt) in shown {
-            if let Some(bytes) = bytes {
-                put!(html, "<figure>{}<figcaption>{word}</figcaption></figure>", image(bytes, "image/png", &alt, None));
+        for (word, preview, alt) in shown {
+            if let Some(preview) = preview {
+                put!(html, "<figure>{}<figcaption>{word}</figcaption></figure>", image(preview, &alt));
             }
         }
         put!(html, "</div>");
         if i.difference.is_some() {
             put!(
                 html,
-                "<p>In the difference: orange, ink only in the expected picture; blue, only in the actual one; grey, shared.</p>"
+                "<p>In the difference: orange, ink only in the reference; blue, only in ours; grey, shared. It is smaller than the pictures: \
+                 where several of their pixels are one of its own, that shows the most different one.</p>"
             );
         }
+    }
+}
+
+/// What the page's script needs to turn a panel in space; without script nothing of it is seen.
+fn spaces(html: &mut String, picture: &PictureReport, id: &str) {
+    for view in &picture.spaces {
+        // Inside a script element no character reference is read, in HTML: what would end it or be markup in XML is written as JSON escapes.
+        let data = view.data.to_string().replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026");
+        let several = picture.spaces.len() > 1;
+        let panel = if several { format!(" ({}) {}", view.label, wording::plain(&view.title)) } else { String::new() };
+        put!(
+            html,
+            "<script type=\"application/json\" class=\"space\" id=\"{id}-{}-space\" data-title=\"{}{}\" data-panel=\"{}\">{data}</script>",
+            identifier(&view.label),
+            escape(&picture.name),
+            escape(panel.trim_end()),
+            if several { escape(&format!("({})", view.label)) } else { String::new() },
+        );
     }
 }
 
@@ -718,6 +759,176 @@ fn all_verdicts(html: &mut String, report: &Report) {
     put!(html, "</tbody>\n</table>\n</div>\n</section>");
 }
 
+/// What was found, in sentences.
+fn findings(html: &mut String, report: &Report) {
+    put!(html, "<section aria-labelledby=\"findings\">\n<h2 id=\"findings\">Findings</h2>\n<div class=\"prose\">");
+    put!(html, "<h3>In this folder</h3>");
+    let here = prose::of_this_folder(report);
+    if here.is_empty() {
+        put!(html, "<p>No claim of the paper was judged in these pictures.</p>");
+    }
+    for paragraph in here {
+        put!(html, "<p>{paragraph}</p>");
+    }
+    put!(
+        html,
+        "<p>A panel is one run, and which orbit a run ends on can hang on the ninth digit of its start: a verdict says what happened once, the \
+         census how often it does.</p>\n<h3>In the published figures of this version</h3>"
+    );
+    for block in prose::of_the_project() {
+        put!(html, "{block}");
+    }
+    put!(html, "</div>\n</section>");
+}
+
+/// The rules by which verdicts are reached, and every threshold.
+fn rules(html: &mut String, report: &Report) {
+    put!(
+        html,
+        "<section aria-labelledby=\"rules\">\n<h2 id=\"rules\">Rules and thresholds</h2>\n<div class=\"prose\">\n<p>One rule for each kind of \
+         claim, the same for every panel and reading; no panel is judged by hand.</p>\n</div>\n<dl class=\"rules\">"
+    );
+    for (claim, rule) in rules::CLAIMS {
+        put!(html, "<dt>{}</dt><dd>{}</dd>", escape(claim), escape(rule));
+    }
+    put!(html, "</dl>");
+    let (thresholds, alike) = rules::thresholds(report);
+    if !alike {
+        put!(
+            html,
+            "<p class=\"notice\">Not all verdicts in this folder were reached with the same thresholds; these are the first one’s. Each verdict’s own are in \
+             {}.</p>",
+            names::VERDICTS
+        );
+    }
+    table_start(
+        html,
+        "Thresholds of the verdicts on sections; lengths are shares of the section’s extent",
+        "thresholds",
+        None,
+    );
+    put!(
+        html,
+        "<thead><tr><th scope=\"col\">Name</th><th scope=\"col\" class=\"number\">Value</th><th scope=\"col\">Meaning</th></tr></thead>\n<tbody>"
+    );
+    for (name, value, meaning) in thresholds {
+        put!(
+            html,
+            "<tr><th scope=\"row\"><code>{}</code></th><td class=\"number\">{}</td><td>{}</td></tr>",
+            escape(&name),
+            escape(&value),
+            escape(meaning)
+        );
+    }
+    put!(html, "</tbody>\n</table>\n</div>\n</section>");
+}
+
+/// Programs, machines and times.
+fn making(html: &mut String, report: &Report) {
+    put!(html, "<section aria-labelledby=\"making\">\n<h2 id=\"making\">How it was made</h2>");
+    put!(
+        html,
+        "<p class=\"prose\">Figures and report by {}. The same version is made to give the same bytes on any machine; times are of \
+         the machine that computed.</p>",
+        escape(&report.made_by)
+    );
+    if report.making.is_empty() {
+        put!(
+            html,
+            "<p>The folder does not say by which build and in what time its figures were made ({} is not there).</p>",
+            names::MAKING
+        );
+    }
+    for (i, run) in report.making.iter().enumerate() {
+        let named: Vec<String> = run.figures.iter().map(|f| figure_name(f)).collect();
+        put!(html, "<h3>{}</h3>\n<dl class=\"small\">", escape(&named.join(", ")));
+        let computed: f64 = run.computed.iter().map(|c| c.seconds).sum();
+        let lines = [
+            ("Program", run.program.clone()),
+            ("Commit", run.commit.clone()),
+            ("Compiler", run.compiler.clone()),
+            ("Built for", format!("{}, profile {}", run.target, run.profile)),
+            ("Threads", run.threads.to_string()),
+            ("Time", format!("{} s from the first question to the last file", decimal(run.seconds, 1))),
+            (
+                "Computed",
+                match (run.computed.len(), run.store) {
+                    (0, true) => "nothing: every answer had been kept from an earlier call".to_owned(),
+                    (n, true) => format!(
+                        "{n} answers in {} s of work; the others had been kept from earlier calls",
+                        decimal(computed, 1)
+                    ),
+                    (n, false) => {
+                        format!("{n} answers in {} s of work, none taken from an earlier call", decimal(computed, 1))
+                    }
+                },
+            ),
+        ];
+        for (term, text) in lines {
+            put!(html, "<dt>{term}</dt><dd>{}</dd>", escape(&text));
+        }
+        put!(html, "</dl>");
+        if run.computed.is_empty() {
+            continue;
+        }
+        put!(
+            html,
+            "<details>\n<summary>Times of {}</summary>",
+            count(run.computed.len(), "computation", "computations")
+        );
+        table_start(html, "Computations and their times, the longest first", &format!("times-{i}"), None);
+        put!(
+            html,
+            "<thead><tr><th scope=\"col\">Computation</th><th scope=\"col\" class=\"number\">Seconds</th></tr></thead>\n<tbody>"
+        );
+        for timed in &run.computed {
+            put!(
+                html,
+                "<tr><th scope=\"row\">{}</th><td class=\"number\">{}</td></tr>",
+                escape(&timed.what),
+                decimal(timed.seconds, 2)
+            );
+        }
+        put!(html, "</tbody>\n</table>\n</div>\n</details>");
+    }
+    put!(html, "</section>");
+}
+
+/// How to cite the software, the article, and these figures.
+fn citing(html: &mut String, report: &Report) {
+    let (a, version) = (&report.article, env!("CARGO_PKG_VERSION"));
+    let year = RELEASE_DATE.split('-').next().unwrap_or_default();
+    put!(
+        html,
+        "<section aria-labelledby=\"citing\">\n<h2 id=\"citing\">How to cite</h2>\n<div class=\"prose\">\n<p>Cite the article for the claims, and this \
+         software for the figures and verdicts; name the version, and the SHA-256 of a picture’s pixels if it matters which one was meant.</p>\n<ul>"
+    );
+    put!(
+        html,
+        "<li>{} ({}). <cite>{}</cite>. {}.</li>",
+        escape(a.author),
+        a.year,
+        escape(a.title),
+        escape(PROCEEDINGS)
+    );
+    put!(
+        html,
+        "<li>The twofold authors ({year}). <cite>twofold: reference software for the breakdown of determinism at a two-fold singularity</cite>, \
+         version {version}.</li>\n</ul>\n</div>"
+    );
+    let bibtex = format!(
+        "@inproceedings{{jeffrey{0},\n  author    = {{{1}}},\n  title     = {{{2}}},\n  booktitle = {{{PROCEEDINGS}}},\n  year      = {{{0}}}\n}}\n\n\
+         @software{{twofold,\n  author  = {{{{The twofold authors}}}},\n  title   = {{twofold: reference software for the breakdown of determinism at a two-fold \
+         singularity}},\n  version = {{{version}}},\n  year    = {{{year}}}\n}}",
+        a.year, a.author, a.title
+    );
+    put!(
+        html,
+        "<pre tabindex=\"0\" role=\"region\" aria-label=\"BibTeX\"><code>{}</code></pre>\n</section>",
+        escape(&bibtex)
+    );
+}
+
 fn foot(html: &mut String, report: &Report, links: Links) {
     put!(
         html,
@@ -732,6 +943,10 @@ fn foot(html: &mut String, report: &Report, links: Links) {
         "<p>To check: <code>make check</code> recomputes everything and compares; <code>twofold check --against FOLDER</code> checks published \
          pictures; <code>twofold inspect FILE</code> reads what a picture says of itself.</p>"
     );
-    put!(html, "<p>This page holds no time and no path: the same figures give the same bytes.</p>\n</footer>");
+    put!(
+        html,
+        "<p>This page holds no path, and no time but those of <code>{}</code>: the same folder gives the same bytes.</p>\n</footer>",
+        names::MAKING
+    );
     put!(html, "<script>{SCRIPT}</script>\n</body>\n</html>");
 }

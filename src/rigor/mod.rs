@@ -9,15 +9,18 @@
 //! - [`flow`]: one validated Taylor step, with a proof that the solution exists and stays in a box (Nedialkov & Jackson 1999).
 //! - [`section`]: rigorous crossings of a coordinate plane, and the derivative of the map from crossing to crossing.
 //! - [`cycle`]: closed orbits by interval Newton (Krawczyk 1969), and whether they attract.
+//! - [`covering`]: covering relations between parallelograms (Zgliczynski & Gidea 2004), from which horseshoes are made.
 //!
 //! The proofs made with it are in the folder `proofs/`, one file a theorem.
 
+pub mod covering;
 pub mod cycle;
 pub mod flow;
 pub mod linear;
 pub mod section;
 pub mod set;
 
+pub use covering::{Covering, HSet, Return, prove_covering};
 pub use cycle::{Cycle, prove_cycle};
 pub use flow::{Flow, Settings};
 pub use section::{Crossing, Plane};
@@ -68,5 +71,17 @@ pub enum Error {
         candidate: Vec<Interval>,
         /// Its image.
         image: Vec<Interval>,
+    },
+    /// A covering relation does not hold, or the enclosures are too wide to show it.
+    #[error(
+        "no covering: seen from set {set}, the image of the part {part:?} lies in {seen:?}: beyond an edge u = -1 or 1, or within v = -1 and 1, is needed"
+    )]
+    NotCovered {
+        /// The part of the covering set, a range of u.
+        part: [f64; 2],
+        /// The set that is to be covered, counted from 0.
+        set: usize,
+        /// The image in that set's coordinates (u, v).
+        seen: [Interval; 2],
     },
 }

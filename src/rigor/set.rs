@@ -59,6 +59,21 @@ impl<S: Enclosure, const N: usize> Set<S, N> {
         Self { on: Some((axis, value)), ..Self::new(states, derivative) }
     }
 
+    /// A parallelepiped { centre + stretch w : w in `weights` } in the plane where a coordinate has a value, at t = 0; that
+    /// coordinate's weight is replaced by zero, the coordinate of `centre` by the value.
+    pub fn parallelepiped(
+        mut centre: SVector<S, N>,
+        stretch: SMatrix<f64, N, N>,
+        mut weights: IVector<N>,
+        (axis, value): (usize, f64),
+    ) -> Self {
+        centre[axis] = S::from_f64(value);
+        weights[axis] = Interval::zero();
+        let rounding = IVector::from_fn(|i, _| centre[i].split().1);
+        let point = Self::on_plane(centre.map(|x| x.split().0), axis, value, false);
+        Self { stretch, initial: weights, errors: rounding, ..point }
+    }
+
     /// The coordinate that all states have exactly.
     pub fn on(&self) -> Option<(usize, f64)> {
         self.on
@@ -90,6 +105,15 @@ impl<S: Enclosure, const N: usize> Set<S, N> {
     pub fn hull(&self) -> IVector<N> {
         let spread = self.spread();
         IVector::from_fn(|i, _| self.centre[i].interval() + spread[i])
+    }
+
+    /// M (x - `origin`) for all states x, as a box: the set in other axes.
+    pub fn seen(&self, origin: &SVector<f64, N>, m: &IMatrix<N>) -> IVector<N> {
+        let middle = IVector::from_fn(|i, _| (self.centre[i] - S::from_f64(origin[i])).interval());
+        let stretch = linear::product(m, &linear::exactly(&self.stretch));
+        let frame = linear::product(m, &linear::exactly(&self.frame));
+        let spread = linear::sum(&linear::apply(&stretch, &self.initial), &linear::apply(&frame, &self.errors));
+        linear::sum(&linear::apply(m, &middle), &spread)
     }
 
     /// Enclosures of the states in the precision of the arithmetic.

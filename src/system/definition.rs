@@ -20,6 +20,16 @@
 //! push = "-x"
 //! ```
 //!
+//! A system may switch at a second surface: `plus` and `minus` above are then the fields where its h is positive, and the table `second` has those
+//! where it is negative.
+//!
+//! ```toml
+//! [second]
+//! h = "w - belt"
+//! plus = ["v", "push - friction", "w", "pull + friction"]     # where the first h > 0
+//! minus = ["v", "push + friction", "w", "pull + friction"]    # where the first h < 0
+//! ```
+//!
 //! Expressions are described in [`expression`](super::expression). Parameters are decimal numbers; digits beyond double precision, given
 //! as a string, are used by extended precision.
 
@@ -32,7 +42,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::diagnostic::{Diagnostic, nearest};
-use super::document::{Canonical, Document, Ordered, ParameterEntry, StateEntry};
+use super::document::{Canonical, Document, Ordered, ParameterEntry, SecondEntry, StateEntry};
 use super::expression::{Expression, ExpressionError, is_name, is_reserved};
 use crate::num::tape::{Recorded, Tape};
 use crate::num::{Arithmetic, Decimal};
@@ -66,6 +76,18 @@ pub struct Definition {
     switching: Expression,
     plus: Vec<Expression>,
     minus: Vec<Expression>,
+    second: Option<Second>,
+}
+
+/// A second switching surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Second {
+    /// Its switching function.
+    pub switching: Expression,
+    /// f+ where that is negative, component by component.
+    pub plus: Vec<Expression>,
+    /// f- where that is negative.
+    pub minus: Vec<Expression>,
 }
 
 /// A state of a system.
@@ -165,6 +187,12 @@ impl Definition {
         for (key, field) in [("plus", &self.plus), ("minus", &self.minus)] {
             text += &format!("{key} = [{}]\n", list(&mut field.iter().map(|e| quoted(&e.to_string()))));
         }
+        if let Some(second) = &self.second {
+            text += &format!("\n[second]\nh = {}\n", quoted(&second.switching.to_string()));
+            for (key, field) in [("plus", &second.plus), ("minus", &second.minus)] {
+                text += &format!("{key} = [{}]\n", list(&mut field.iter().map(|e| quoted(&e.to_string()))));
+            }
+        }
         if !self.parameters.is_empty() {
             text += "\n[parameters]\n";
             for p in &self.parameters {
@@ -246,6 +274,28 @@ impl Definition {
         &self.minus
     }
 
+    /// The second switching surface, if there is one.
+    pub fn second(&self) -> Option<&Second> {
+        self.second.as_ref()
+    }
+
+    /// The system near one of its two surfaces (0 or 1) and off the other: it switches at that one, and the other's function is positive, or `below`
+    /// zero. None for a system with one surface.
+    pub fn face(&self, surface: usize, below: bool) -> Option<Self> {
+        let second = self.second.as_ref()?;
+        let mut face = Self { second: None, ..self.clone() };
+        match (surface, below) {
+            (0, false) => {}
+            (0, true) => (face.plus, face.minus) = (second.plus.clone(), second.minus.clone()),
+            (_, false) => (face.switching, face.minus) = (second.switching.clone(), second.plus.clone()),
+            (_, true) => {
+                (face.switching, face.plus) = (second.switching.clone(), self.minus.clone());
+                face.minus = second.minus.clone();
+            }
+        }
+        Some(face)
+    }
+
     /// What decides the system's numbers, with these values of its parameters (in their order).
     pub(super) fn canonical(&self, values: &[Decimal]) -> Canonical {
         let printed = |e: &[Expression]| e.iter().map(Expression::to_string).collect();
@@ -256,6 +306,7 @@ impl Definition {
             h: self.switching.to_string(),
             plus: printed(&self.plus),
             minus: printed(&self.minus),
+            second: self.second.as_ref().map(Second::entry),
         }
     }
 
@@ -271,6 +322,7 @@ impl Definition {
         self.switching == other.switching
             && self.plus == other.plus
             && self.minus == other.minus
+            && self.second == other.second
             && self.states.iter().map(|s| &s.name).eq(other.states.iter().map(|s| &s.name))
             && sorted(self) == sorted(other)
     }
@@ -283,11 +335,16 @@ impl Definition {
             title: format!("{}, time reversed", self.title()),
             plus: negative(&self.plus),
             minus: negative(&self.minus),
+            second: self.second.as_ref().map(|s| Second {
+                switching: s.switching.clone(),
+                plus: negative(&s.plus),
+                minus: negative(&s.minus),
+            }),
             ..self.clone()
         }
     }
 
-    /// The equations on a tape: h, then f+, then f-. `values` are the parameters', in their order.
+    /// The equations on a tape: h, then f+, then f-; of a system with two surfaces then the same three of the second. `values` are the parameters', in their order.
     pub(super) fn tape(&self, values: &[Decimal]) -> Tape {
         Tape::record(self.dimension(), |x| {
             let mut known: BTreeMap<&str, Recorded> = BTreeMap::new();
@@ -306,7 +363,8 @@ impl Definition {
                 let value = record(term, &known);
                 known.insert(name, value);
             }
-            let all = std::iter::once(&self.switching).chain(&self.plus).chain(&self.minus);
+            let second = self.second.iter().flat_map(|s| std::iter::once(&s.switching).chain(&s.plus).chain(&s.minus));
+            let all = std::iter::once(&self.switching).chain(&self.plus).chain(&self.minus).chain(second);
             all.map(|e| record(e, &known)).collect()
         })
     }
@@ -331,6 +389,27 @@ impl Definition {
         let terms = in_order(terms)?;
         let switching = parse(Place::key("h"), &document.h)?;
         let (plus, minus) = (field("plus", &document.plus)?, field("minus", &document.minus)?);
+        let second = match &document.second {
+            None => None,
+            Some(entry) => {
+                let part = |key: &'static str, texts: &[String]| -> Result<Vec<Expression>, Problem> {
+                    if texts.len() != dimension {
+                        let problem = wrong_count(key, texts.len(), &states);
+                        return Err(Problem {
+                            place: Place::part(key, None),
+                            message: format!("second.{}", problem.message),
+                            ..problem
+                        });
+                    }
+                    texts.iter().enumerate().map(|(i, text)| parse(Place::part(key, Some(i)), text)).collect()
+                };
+                Some(Second {
+                    switching: parse(Place::part("h", None), &entry.h)?,
+                    plus: part("plus", &entry.plus)?,
+                    minus: part("minus", &entry.minus)?,
+                })
+            }
+        };
         let start = match &document.start {
             Some(start) if start.len() != dimension => return Err(wrong_count("start", start.len(), &states)),
             start => start.as_ref().map(|s| s.iter().map(Decimal::value).collect()),
@@ -358,6 +437,7 @@ impl Definition {
             switching,
             plus,
             minus,
+            second,
         };
         for p in &definition.parameters {
             if let Some(rule) = p.bounds.refuse(p.value.value()) {
@@ -375,6 +455,16 @@ impl Definition {
         if !depends(&definition.switching) {
             let help = Some(format!("for example h = \"{}\"", definition.states[0].name));
             return Err(Problem::new(Place::key("h"), "h depends on no state, so that nothing ever switches", help));
+        }
+        if let Some(second) = &definition.second {
+            if !depends(&second.switching) {
+                let message = "the second h depends on no state, so that nothing ever switches at it";
+                return Err(Problem::new(Place::part("h", None), message, None));
+            }
+            if second.switching == definition.switching {
+                let message = "both surfaces are the same: every point of one is a point of both";
+                return Err(Problem::new(Place::part("h", None), message, Some("leave [second] out".into())));
+            }
         }
         Ok(definition)
     }
@@ -398,6 +488,13 @@ impl Definition {
     }
 }
 
+impl Second {
+    fn entry(&self) -> SecondEntry {
+        let printed = |e: &[Expression]| e.iter().map(Expression::to_string).collect();
+        SecondEntry { h: self.switching.to_string(), plus: printed(&self.plus), minus: printed(&self.minus) }
+    }
+}
+
 /// A number as TOML and JSON write it.
 fn number(value: &Decimal) -> String {
     serde_json::to_string(value).unwrap_or_default()
@@ -416,6 +513,7 @@ impl From<Definition> for Document {
             h: d.switching.to_string(),
             plus: d.plus.iter().map(Expression::to_string).collect(),
             minus: d.minus.iter().map(Expression::to_string).collect(),
+            second: d.second.as_ref().map(Second::entry),
             states: d.states.into_iter().map(|State { name, about }| StateEntry { name, about }).collect(),
             parameters: Ordered(
                 d.parameters
@@ -454,6 +552,8 @@ enum Within {
     Whole,
     Item(usize),
     Entry(String),
+    /// An entry of a table of fixed keys, or an item of that entry.
+    Part(&'static str, Option<usize>),
 }
 
 impl Place {
@@ -462,6 +562,9 @@ impl Place {
     }
     fn item(key: &'static str, i: usize) -> Self {
         Self { key, within: Within::Item(i) }
+    }
+    fn part(part: &'static str, item: Option<usize>) -> Self {
+        Self { key: "second", within: Within::Part(part, item) }
     }
     fn entry(key: &'static str, name: &str) -> Self {
         Self { key, within: Within::Entry(name.into()) }
@@ -474,6 +577,8 @@ impl std::fmt::Display for Place {
             Within::Whole => f.write_str(self.key),
             Within::Item(i) => write!(f, "{}[{}]", self.key, i + 1),
             Within::Entry(name) => write!(f, "{}.{name}", self.key),
+            Within::Part(part, None) => write!(f, "{}.{part}", self.key),
+            Within::Part(part, Some(i)) => write!(f, "{}.{part}[{}]", self.key, i + 1),
         }
     }
 }
@@ -504,6 +609,13 @@ fn span_of(text: &str, place: &Place) -> Option<Range<usize>> {
     let span = match &place.within {
         Within::Whole => value.span(),
         Within::Item(i) => value.get_ref().as_array()?.get(*i)?.span(),
+        Within::Part(part, item) => {
+            let entry = value.get_ref().as_table()?.get(*part)?;
+            match item {
+                None => entry.span(),
+                Some(i) => entry.get_ref().as_array()?.get(*i)?.span(),
+            }
+        }
         // The name: for a term's text, the whole line from there.
         Within::Entry(name) => {
             let (key, entry) = value.get_ref().as_table()?.get_key_value(name.as_str())?;
@@ -699,6 +811,50 @@ slip = "v - belt"
         assert_eq!(canonical(&other), canonical(GOOD));
         assert_ne!(canonical(&GOOD.replace("belt = 0.3", "belt = 0.31")), canonical(GOOD));
         assert_ne!(canonical(&GOOD.replace("x - 1", "x - 2")), canonical(GOOD));
+    }
+
+    const TWO: &str = r#"states = ["x", "y"]
+h = "x"
+plus = ["1", "2"]
+minus = ["3", "4"]
+
+[second]
+h = "y"
+plus = ["5", "6"]
+minus = ["7", "8 + a"]
+
+[parameters]
+a = 0
+"#;
+
+    #[test]
+    fn a_second_surface_makes_four_faces() {
+        let d = Definition::from_toml(TWO, "two.toml").unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(Definition::from_toml(&d.to_toml(), "f").unwrap_or_else(|e| panic!("{e}")), d);
+        let json = serde_json::to_string(&d).unwrap();
+        assert_eq!(serde_json::from_str::<Definition>(&json).unwrap(), d);
+        let said = |surface, below| {
+            let face = d.face(surface, below).unwrap();
+            assert!(face.second().is_none());
+            format!("{} {} {}", face.switching(), face.plus()[0], face.minus()[0])
+        };
+        assert_eq!(
+            [said(0, false), said(0, true), said(1, false), said(1, true)],
+            ["x 1 3", "x 5 7", "y 1 5", "y 3 7"]
+        );
+        assert_eq!(d.tape(&[0.0.into()]).outputs().len(), 10);
+        for (from, to, place, message) in [
+            ("8 + a", "8 + b", "9:20", "unknown name `b`"),
+            ("[\"5\", \"6\"]", "[\"5\"]", "8:8", "second.plus has 1 component, but there are 2 states"),
+            ("h = \"y\"", "h = \"a\"", "7:5", "nothing ever switches at it"),
+            ("h = \"y\"", "h = \"x\"", "7:5", "both surfaces are the same"),
+            ("[second]\nh = \"y\"", "[second]", "6:1", "missing field `h`"),
+        ] {
+            let error = Definition::from_toml(&TWO.replacen(from, to, 1), "f").expect_err(to);
+            assert_eq!(format!("{}:{}", error.line, error.column), place, "{error}");
+            assert!(error.message.contains(message), "{error}");
+        }
+        assert!(Definition::from_toml(GOOD, "f").unwrap().face(0, false).is_none());
     }
 
     /// (changed, into, place, message, help)

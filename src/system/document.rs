@@ -200,6 +200,15 @@ impl<'de> Deserialize<'de> for ParameterEntry {
     }
 }
 
+/// A second switching surface: its function, and the fields where that is negative.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SecondEntry {
+    pub h: String,
+    pub plus: Vec<String>,
+    pub minus: Vec<String>,
+}
+
 /// A system's file: TOML or JSON with these fields.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -220,6 +229,8 @@ pub struct Document {
     pub h: String,
     pub plus: Vec<String>,
     pub minus: Vec<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub second: Option<SecondEntry>,
     #[serde(default)]
     pub parameters: Ordered<ParameterEntry>,
     #[serde(default, rename = "let")]
@@ -242,4 +253,7 @@ pub struct Canonical {
     pub plus: Vec<String>,
     /// f-, component by component.
     pub minus: Vec<String>,
+    /// The second switching surface, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second: Option<SecondEntry>,
 }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use nalgebra::SVector;
 
-use super::instance::{DimensionError, run};
+use super::instance::{BindError, run};
 use super::{Relaxation, System, Transition, VectorField};
 use crate::num::tape::{Program, Recorded, Replay, Tape};
 use crate::num::{Arithmetic, Elementary};
@@ -25,13 +25,15 @@ use crate::num::{Arithmetic, Elementary};
 /// // Orbit and two tangent vectors together, in nine dimensions:
 /// let tangent = smoothed.variational(2);
 /// assert_eq!((tangent.dimension(), tangent.names()[3].as_str()), (9, "d1_x"));
-/// # Ok::<(), twofold::system::DimensionError>(())
+/// # Ok::<(), twofold::system::BindError>(())
 /// ```
 #[derive(Clone)]
 pub struct Field {
     names: Vec<String>,
     tape: Arc<Tape>,
     program: Arc<Program>,
+    /// Made from a system with two surfaces, by a transform that knows one: it is not evaluated.
+    of_one_surface: bool,
 }
 
 impl fmt::Debug for Field {
@@ -70,6 +72,10 @@ impl<'a> Parts<'a> {
 
     fn half(&mut self, half: Half) -> Vec<Recorded> {
         let first = 1 + if half == Half::Plus { 0 } else { self.dimension };
+        self.components(first)
+    }
+
+    fn components(&mut self, first: usize) -> Vec<Recorded> {
         (first..first + self.dimension).map(|i| self.replay.output(i)).collect()
     }
 
@@ -77,26 +83,55 @@ impl<'a> Parts<'a> {
     fn blend(&mut self, phi: Recorded) -> Vec<Recorded> {
         let plus = self.half(Half::Plus);
         let minus = self.half(Half::Minus);
-        minus.into_iter().zip(plus).map(|(m, p)| m + (p - m) * phi).collect()
+        blended(minus, plus, phi)
     }
+
+    /// The same where the second switching function is negative.
+    fn blend_below(&mut self, phi: Recorded) -> Vec<Recorded> {
+        let n = self.dimension;
+        let plus = self.components(2 * n + 2);
+        let minus = self.components(3 * n + 2);
+        blended(minus, plus, phi)
+    }
+
+    /// The second switching function.
+    fn second_switching(&mut self) -> Recorded {
+        self.replay.output(2 * self.dimension + 1)
+    }
+}
+
+fn blended(minus: Vec<Recorded>, plus: Vec<Recorded>, phi: Recorded) -> Vec<Recorded> {
+    minus.into_iter().zip(plus).map(|(m, p)| m + (p - m) * phi).collect()
 }
 
 impl Field {
     fn made(names: Vec<String>, tape: Tape) -> Self {
-        Self { names, program: Arc::new(Program::new(&tape)), tape: Arc::new(tape) }
+        Self { names, program: Arc::new(Program::new(&tape)), tape: Arc::new(tape), of_one_surface: false }
+    }
+
+    /// A transform that knows one surface, of this system.
+    fn one_surface(system: &System, names: Vec<String>, tape: Tape) -> Self {
+        Self { of_one_surface: system.definition().second().is_some(), ..Self::made(names, tape) }
     }
 
     fn names_of(system: &System) -> Vec<String> {
         system.coordinates().into_iter().map(Into::into).collect()
     }
 
-    /// The smoothed system, eq. (8): x' = f- + (f+ - f-) phi(h, eps).
+    /// The smoothed system, eq. (8): x' = f- + (f+ - f-) phi(h, eps). Two switches are smoothed one inside the other, each by its own function: the
+    /// weights of the four fields are the products of phi and 1 - phi.
     pub fn smoothed(system: &System, transition: Transition, eps: f64) -> Self {
         let tape = Tape::record(system.dimension(), |x| {
             let mut parts = Parts::new(system, x);
             let eps = Recorded::parameter("eps", &eps.into());
             let phi = transition.record(parts.switching(), eps);
-            parts.blend(phi)
+            let above = parts.blend(phi);
+            if system.definition().second().is_none() {
+                return above;
+            }
+            let below = parts.blend_below(phi);
+            let phi = transition.record(parts.second_switching(), eps);
+            blended(below, above, phi)
         });
         Self::made(Self::names_of(system), tape)
     }
@@ -115,7 +150,7 @@ impl Field {
         });
         let mut names = Self::names_of(system);
         names.push(free_name("phi", &names));
-        Self::made(names, tape)
+        Self::one_surface(system, names, tape)
     }
 
     /// f+, continued smoothly across the surface.
@@ -130,7 +165,7 @@ impl Field {
 
     fn half(system: &System, half: Half) -> Self {
         let tape = Tape::record(system.dimension(), |x| Parts::new(system, x).half(half));
-        Self::made(Self::names_of(system), tape)
+        Self::one_surface(system, Self::names_of(system), tape)
     }
 
     /// The desingularised sliding flow with physical time as last state, (x, t)' = (L-h f+ - L+h f-, L-h - L+h): smooth everywhere,
@@ -166,7 +201,7 @@ impl Field {
         });
         let mut names = Self::names_of(system);
         names.push(free_name("t", &names));
-        Self::made(names, tape)
+        Self::one_surface(system, names, tape)
     }
 
     /// The same equation with time running backwards.
@@ -175,7 +210,7 @@ impl Field {
             let mut field = Replay::new(&self.tape, x);
             (0..self.dimension()).map(|i| -field.output(i)).collect()
         });
-        Self::made(self.names.clone(), tape)
+        Self { of_one_surface: self.of_one_surface, ..Self::made(self.names.clone(), tape) }
     }
 
     /// The equation together with its variational equation, (x, V)' = (f(x), Df(x) V), for `vectors` tangent vectors that stand
@@ -193,7 +228,7 @@ impl Field {
         });
         let tangent = |j: usize| self.names.iter().map(move |name| format!("d{j}_{name}"));
         let names = self.names.iter().cloned().chain((1..=vectors).flat_map(tangent)).collect();
-        Self::made(names, tape)
+        Self { of_one_surface: self.of_one_surface, ..Self::made(names, tape) }
     }
 
     /// Any compiled equation as data.
@@ -227,12 +262,15 @@ impl Field {
     /// The equation as a [`VectorField`] in `N` dimensions.
     ///
     /// # Errors
-    /// If the equation has not `N` states.
-    pub fn bind<const N: usize>(&self) -> Result<BoundField<N>, DimensionError> {
+    /// If the equation has not `N` states, or was made by a transform for one switching surface from a system with two.
+    pub fn bind<const N: usize>(&self) -> Result<BoundField<N>, BindError> {
+        if self.of_one_surface {
+            return Err(BindError::TwoSurfaces);
+        }
         if self.dimension() == N {
             Ok(BoundField { tape: self.tape.clone(), program: self.program.clone() })
         } else {
-            Err(DimensionError { states: self.dimension(), asked: N })
+            Err(BindError::Dimension { states: self.dimension(), asked: N })
         }
     }
 }

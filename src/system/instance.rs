@@ -85,14 +85,22 @@ pub enum ParameterError {
     },
 }
 
-/// A system or equation used in another dimension than its own.
+/// A system or equation used as what it is not.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("this equation has {states} states; it was asked for in dimension {asked}")]
-pub struct DimensionError {
-    /// The equation's number of states.
-    pub states: usize,
-    /// The dimension asked for.
-    pub asked: usize,
+pub enum BindError {
+    /// In another dimension than its own.
+    #[error("this equation has {states} states; it was asked for in dimension {asked}")]
+    Dimension {
+        /// The equation's number of states.
+        states: usize,
+        /// The dimension asked for.
+        asked: usize,
+    },
+    /// As a system with one switching surface.
+    #[error(
+        "this system has two switching surfaces, and what is asked for is computed for one; smooth the switches, or leave the table [second] out"
+    )]
+    TwoSurfaces,
 }
 
 impl System {
@@ -192,7 +200,7 @@ impl System {
         self.definition.parameters().iter().map(|p| p.name.as_str()).zip(&self.values)
     }
 
-    /// The equations as operations: h, then f+, then f-.
+    /// The equations as operations: h, then f+, then f-; of a system with two surfaces then the same three of the second.
     pub fn tape(&self) -> &Tape {
         &self.functions.tape
     }
@@ -210,13 +218,23 @@ impl System {
     /// The system as a [`PiecewiseSmooth`] one in `N` dimensions.
     ///
     /// # Errors
-    /// If the system has not `N` states.
-    pub fn bind<const N: usize>(&self) -> Result<Bound<N>, DimensionError> {
-        if self.dimension() == N {
+    /// If the system has not `N` states, or two switching surfaces.
+    pub fn bind<const N: usize>(&self) -> Result<Bound<N>, BindError> {
+        if self.definition.second().is_some() {
+            Err(BindError::TwoSurfaces)
+        } else if self.dimension() == N {
             Ok(Bound { functions: self.functions.clone() })
         } else {
-            Err(DimensionError { states: self.dimension(), asked: N })
+            Err(BindError::Dimension { states: self.dimension(), asked: N })
         }
+    }
+
+    /// A system with two switching surfaces near one of them: for the first and the second surface, where the other's function is positive
+    /// and where it is negative. None for a system with one surface.
+    pub fn faces(&self) -> Option<[[System; 2]; 2]> {
+        let face =
+            |surface, below| Some(Self::made(Arc::new(self.definition.face(surface, below)?), self.values.clone()));
+        Some([[face(0, false)?, face(0, true)?], [face(1, false)?, face(1, true)?]])
     }
 
     /// The compiled system that does the same operations, if there is one: a fast path, tested to give the same bits.

@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 use super::{Definition, System};
 
 /// Every file of `systems/`.
-const FILES: [(&str, &str); 14] = [
+const FILES: [(&str, &str); 16] = [
     ("caricature", include_str!("../../systems/caricature.toml")),
     ("caricature-as-printed", include_str!("../../systems/caricature-as-printed.toml")),
     ("two-fold", include_str!("../../systems/two-fold.toml")),
@@ -28,6 +28,8 @@ const FILES: [(&str, &str); 14] = [
     ("buck", include_str!("../../systems/buck.toml")),
     ("gene-switch", include_str!("../../systems/gene-switch.toml")),
     ("fused-focus", include_str!("../../systems/fused-focus.toml")),
+    ("relay-square", include_str!("../../systems/relay-square.toml")),
+    ("two-blocks", include_str!("../../systems/two-blocks.toml")),
 ];
 
 /// The names of the built-in systems.

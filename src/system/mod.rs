@@ -42,7 +42,7 @@ pub use document::Canonical;
 pub use expression::Expression;
 pub use field::{BoundField, Field};
 pub use hysteretic::{Hysteretic, Relaxation};
-pub use instance::{Bound, Compiled, DimensionError, ParameterError, System};
+pub use instance::{BindError, Bound, Compiled, ParameterError, System};
 pub use reversed::Reversed;
 pub use smoothed::Smoothed;
 pub use transition::Transition;

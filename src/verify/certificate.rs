@@ -134,13 +134,79 @@ struct Crossings {
     reconstructed: CrossingTable,
 }
 
+/// A parallelogram { centre + u unstable + v stable : u, v in [-1, 1] }.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parallelogram {
+    centre: [f64; 2],
+    unstable: [f64; 2],
+    stable: [f64; 2],
+}
+
+/// The image of a part (a range of u), in the coordinates (u, v) of each set that is to be covered.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ImageOfPart {
+    part: [f64; 2],
+    seen: Vec<[Bounds; 2]>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Passage {
+    crossing: usize,
+    x: Bounds,
+    z: Bounds,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Covering {
+    from: usize,
+    to: Vec<usize>,
+    ends: [ImageOfPart; 2],
+    pieces: Vec<ImageOfPart>,
+    passage: Passage,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Start {
+    x: String,
+    y: String,
+    z: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OrbitFrom {
+    start: Start,
+    crossings: Vec<TableRow>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Contraction {
+    equation: Parameters,
+    orbits: [OrbitFrom; 3],
+    distances: [Bounds; 2],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Horseshoe {
+    equation: Parameters,
+    sets: Vec<Parallelogram>,
+    coverings: Vec<Covering>,
+}
+
 /// Crossings computed outside this project in 113-bit arithmetic.
 const PRINTED: &str = include_str!("../../tests/data/crossings-printed.csv");
 /// See [`PRINTED`].
 const RECONSTRUCTED: &str = include_str!("../../tests/data/crossings-reconstructed.csv");
 
 /// The statements, word for word: a certificate proves these and no others.
-const STATEMENTS: [(&str, &str); 4] = [
+const STATEMENTS: [(&str, &str); 6] = [
     (
         "printed-cycle",
         "For alpha = 1e-3, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed caricature has exactly one closed orbit that crosses y = 0 upwards in the \
@@ -155,6 +221,18 @@ const STATEMENTS: [(&str, &str); 4] = [
         "sensitivity",
         "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the orbits of the smoothed caricature from the two states, which are less than 1e-12 apart \
          at the two-fold singularity, are more than 0.3 apart at their second crossing of y = 0.",
+    ),
+    (
+        "contraction",
+        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the orbits of the smoothed caricature from (0.2, 0, -1), (0.21, 0, -1) and (0.2, 0, -0.99) pass \
+         the two-fold singularity at their third crossing of y = 0, and the fourth crossings of the second and third are less than 0.0005 from that of the first.",
+    ),
+    (
+        "horseshoe",
+        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the return map of the smoothed caricature from a downward crossing of y = 0 to the fourth \
+         next has a horseshoe: two loops of covering relations between parallelograms, of 2 and of 14 sets, that have one set in common and go on from it to disjoint \
+         ones. Each return passes the two-fold singularity, at a crossing with |x| and |z| below 1e-4. So for every sequence of the two loops there is an orbit that \
+         runs through them in this order, for every periodic sequence a periodic one, and the topological entropy of the return map is more than log(1.12).",
     ),
     (
         "crossings",
@@ -180,6 +258,8 @@ pub fn verify(text: &str) -> Result<Verified, Refused> {
         match theorem.as_str() {
             "printed-cycle" => printed_cycle(&serde_json::from_value(data).map_err(unreadable)?),
             "coexistence" => coexistence(&serde_json::from_value(data).map_err(unreadable)?),
+            "contraction" => contraction(&serde_json::from_value(data).map_err(unreadable)?),
+            "horseshoe" => horseshoe(&serde_json::from_value(data).map_err(unreadable)?),
             "sensitivity" => sensitivity(&serde_json::from_value(data).map_err(unreadable)?),
             _ => crossings(&serde_json::from_value(data).map_err(unreadable)?),
         }
@@ -448,4 +528,165 @@ fn crossings(c: &Crossings) -> Check<Vec<String>> {
         said.push(agree(name, &table.crossings, text)?);
     }
     Ok(said)
+}
+
+/// Where a plain orbit must be that passed the singularity, which multiplies the plain integrator's own errors.
+const PLAIN_EXIT: f64 = 1e-4;
+
+fn contraction(c: &Contraction) -> Check<Vec<String>> {
+    let equation = equation(&c.equation, "0.1")?;
+    let mut ends: Vec<[Range; 2]> = Vec::new();
+    let mut worst = 0.0_f64;
+    for (orbit, [x, z]) in c.orbits.iter().zip([["0.2", "-1"], ["0.21", "-1"], ["0.2", "-0.99"]]) {
+        let at = |what: &str| format!("the orbit from ({x}, 0, {z}): {what}");
+        let start = [decimal(&orbit.start.x)?, decimal(&orbit.start.y)?, decimal(&orbit.start.z)?];
+        need(start == [decimal(x)?, Rational::whole(0), decimal(z)?], at("starts there"))?;
+        need(orbit.crossings.len() == 4, at("four crossings"))?;
+        let number = |text: &str| text.parse::<f64>().map_err(|_| at("the start is a number"));
+        let plain = equation.crossings(number(x)?, number(z)?, 4);
+        need(plain.len() == 4, at("a plain orbit comes back four times"))?;
+        let mut before = Rational::whole(0);
+        for (n, (row, plain)) in orbit.crossings.iter().zip(&plain).enumerate() {
+            let time = ball(&row.time)?;
+            need(time.low > before, at("times grow"))?;
+            before = time.high;
+            need(row.upward == (n % 2 == 1), at("directions alternate, the first is downward"))?;
+            for (said, got) in [(&row.time, plain[0]), (&row.x, plain[1]), (&row.z, plain[2])] {
+                let (said, got) = (ball(said)?, exactly(got)?);
+                need(said.width() < Rational::tenth_to(12), at("the enclosures are narrow"))?;
+                worst = worst.max((&said.high - &got).abs().approximately());
+            }
+        }
+        let point = |n: usize| Ok::<_, String>([ball(&orbit.crossings[n].x)?, ball(&orbit.crossings[n].z)?]);
+        for side in point(2)? {
+            need(side.magnitude() < Rational::tenth_to(4), at("passes the singularity within 1e-4"))?;
+        }
+        ends.push(point(3)?);
+    }
+    need(worst < PLAIN_EXIT, format!("plain orbits have the same crossings ({worst:.1e} off)"))?;
+    let mut said = Vec::new();
+    for (distance, end) in c.distances.iter().zip(&ends[1..]) {
+        let squared = &(&end[0] - &ends[0][0]).squared() + &(&end[1] - &ends[0][1]).squared();
+        tight(&range(*distance)?.squared(), &squared, &Rational::whole(1), "the distance")?;
+        need(squared.high < decimal("2.5e-7")?, "the fourth crossings are less than 0.0005 apart")?;
+        said.push(format!("starts 0.01 apart, fourth crossings {} apart", range(*distance)?));
+    }
+    said.push(format!("plain orbits have the same crossings, {worst:.0e} off at most"));
+    Ok(said)
+}
+
+/// Where u lies: before the set (-1), beyond it (1), or neither (0).
+fn side(u: &Range) -> i32 {
+    let one = Rational::whole(1);
+    i32::from(u.low > one) - i32::from(u.high < -&one)
+}
+
+/// One covering relation (Zgliczynski & Gidea 2004, Definition 2): the ends come to either side, no piece meets the other set's edges v = -1, 1.
+fn covers(c: &Covering) -> Check {
+    let at = |what: &str| format!("set {}: {what}", c.from);
+    for (image, u) in c.ends.iter().zip([-1.0, 1.0]) {
+        need(image.part == [u, u], at("the ends are those of the set"))?;
+    }
+    // The pieces leave nothing out.
+    let mut before = -1.0;
+    for piece in &c.pieces {
+        need(piece.part[0] == before && piece.part[1] > before, at("the pieces follow on each other"))?;
+        before = piece.part[1];
+    }
+    need(before == 1.0, at("the pieces make up the set"))?;
+    for image in c.pieces.iter().chain(&c.ends) {
+        need(image.seen.len() == c.to.len(), at("an image is seen from every set that is to be covered"))?;
+    }
+    for (k, to) in c.to.iter().enumerate() {
+        let across = |image: &ImageOfPart| -> Check<i32> { Ok(side(&range(image.seen[k][0])?)) };
+        let (left, right) = (across(&c.ends[0])?, across(&c.ends[1])?);
+        need(left * right == -1, at(&format!("the ends come to either side of set {to}")))?;
+        for piece in &c.pieces {
+            let within = range(piece.seen[k][1])?.magnitude() < Rational::whole(1);
+            need(within || across(piece)? != 0, at(&format!("no piece leaves set {to} sideways")))?;
+        }
+        // Enclosures of the ends lie in those of the pieces that have them: altered alone, they part.
+        for (end, piece) in [(&c.ends[0], c.pieces.first()), (&c.ends[1], c.pieces.last())] {
+            for (e, p) in end.seen[k].iter().zip(piece.map(|p| p.seen[k]).unwrap_or_default()) {
+                need(range(*e)?.meets(&range(p)?), at("an end's image lies in its piece's"))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A parallelogram's extent in x and in z.
+fn extent(p: &Parallelogram) -> Check<[Range; 2]> {
+    let of = |i: usize| {
+        let reach = &exactly(p.unstable[i])?.abs() + &exactly(p.stable[i])?.abs();
+        Ok::<_, String>(Range::point(&exactly(p.centre[i])?).widened(&reach))
+    };
+    Ok([of(0)?, of(1)?])
+}
+
+/// How near a plain orbit comes to where a set's middle is said to go: what the singularity makes of an error of 1e-16 or so, and of the plain integrator's own.
+const PLAIN_PASSAGE: f64 = 5e-7;
+
+fn horseshoe(c: &Horseshoe) -> Check<Vec<String>> {
+    /// Sets of the longer loop.
+    const LONG: usize = 14;
+    let equation = equation(&c.equation, "0.1")?;
+    need(c.sets.len() == LONG + 1 && c.coverings.len() == c.sets.len(), "fifteen sets, each of which covers others")?;
+    for set in &c.sets {
+        let [[a, p], [b, q]] = [0, 1].map(|i| [set.unstable[i], set.stable[i]]);
+        let area = &(&exactly(a)? * &exactly(q)?) - &(&exactly(b)? * &exactly(p)?);
+        need(area != Rational::whole(0), "the parallelograms have an area")?;
+        for side in extent(set)? {
+            need(side.width() < Rational::tenth_to(12), "the parallelograms are smaller than 1e-12")?;
+        }
+    }
+    let mut pieces = 0;
+    let (mut nearest, mut worst) = (Rational::whole(0), 0.0_f64);
+    // 0, 1, 0, ... and 0, 2, 3, ..., 14, 0, ...
+    let follows = |i: usize| match i {
+        0 => vec![1, 2],
+        1 | LONG => vec![0],
+        i => vec![i + 1],
+    };
+    for (i, covering) in c.coverings.iter().enumerate() {
+        need(covering.from == i && covering.to == follows(i), "the sets make two loops through the first")?;
+        covers(covering)?;
+        pieces += covering.pieces.len();
+        need(covering.passage.crossing <= 8, "the singularity is passed on the way")?;
+        for side in [covering.passage.x, covering.passage.z] {
+            let size = range(side)?.magnitude();
+            need(size < Rational::tenth_to(4), "the singularity is passed within 1e-4")?;
+            nearest = nearest.max(size);
+        }
+    }
+    let (one, two) = (extent(&c.sets[1])?, extent(&c.sets[2])?);
+    need(!(one[0].meets(&two[0]) && one[1].meets(&two[1])), "the sets that follow the common one are disjoint")?;
+    for (i, covering) in c.coverings.iter().enumerate() {
+        let [x, z] = c.sets[i].centre;
+        let found = equation.crossings(x, z, 8);
+        need(found.len() == 8, "a plain orbit returns")?;
+        let passage = found[covering.passage.crossing.saturating_sub(1)];
+        let middle = |[low, high]: Bounds| 0.5 * low + 0.5 * high;
+        for (got, said) in [(passage[1], covering.passage.x), (passage[2], covering.passage.z)] {
+            need((got - middle(said)).abs() < 1e-7, format!("set {i}: a plain orbit passes the singularity there"))?;
+        }
+        for to in follows(i) {
+            let target = c.sets[to].centre;
+            worst = worst.max((found[7][1] - target[0]).abs()).max((found[7][2] - target[1]).abs());
+        }
+    }
+    need(worst < PLAIN_PASSAGE, format!("plain orbits from the sets come to the next ones ({worst:.1e} off)"))?;
+    // lambda^-2 + lambda^-14 falls with lambda: it is above 1 at 1.12, so that the growth rate of chains is beyond 1.12.
+    let base = decimal("1.12")?;
+    let power = |n: u32| (0..n).fold(Rational::whole(1), |p, _| &p * &base);
+    need(&power(14) < &(&power(12) + &Rational::whole(1)), "chains of sets grow by more than 1.12 a return")?;
+    Ok(vec![
+        format!(
+            "{} covering relations, {pieces} pieces: loops of 2 and {LONG} sets through the first",
+            c.sets.len() + 1
+        ),
+        "the two sets that can follow the first are disjoint: entropy more than log(1.12) a return".to_owned(),
+        format!("every return passes the singularity, within {:.1e} in x and z", nearest.approximately()),
+        format!("plain orbits from the sets' middles come to the next sets within {worst:.0e}"),
+    ])
 }

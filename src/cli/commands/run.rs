@@ -8,11 +8,11 @@ use serde_json::json;
 use crate::cli::exit::part_of;
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::progress::Progress;
-use crate::cli::speak::{Delivery, deliver, is_standard_output, try_delivery};
+use crate::cli::speak::{Delivery, complain, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::job::parquet::parquet;
-use crate::job::spec::SwitchSpec;
-use crate::job::{self, Desk, JobError, Question, Run, Stop, encode, simulate};
+use crate::job::spec::{Method, SwitchSpec};
+use crate::job::{self, Desk, Horizon, JobError, Question, Run, Stop, encode, simulate};
 use crate::record::files::Growing;
 
 /// Compute one run: its path, or with --section its passages through a plane.
@@ -35,6 +35,10 @@ pub struct Arguments {
     /// Output format [default: csv].
     #[arg(long, value_enum)]
     format: Option<Format>,
+    /// With taylor-extended, compute the orbit with the next precision and with another order, too, and say on standard error until when all three agree to
+    /// nine digits.
+    #[arg(long)]
+    horizon: bool,
     #[command(flatten)]
     delivery: Delivery,
 }
@@ -59,17 +63,49 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         deliver(out, &text)?;
         return Ok(Exit::Fine);
     }
+    if arguments.horizon && spec.method.name != Method::TaylorExtended {
+        let why = "--horizon: other methods' errors are those of their tolerance; leave it out, or use --method taylor-extended";
+        return Err(CliError::Usage(why.into()));
+    }
     let progress = Progress::with_grace(arguments.delivery.quiet);
     let run = Run(spec);
+    let exit = record(arguments, &run, out, &progress)?;
+    if arguments.horizon {
+        say_horizon(&run, &progress)?;
+    }
+    Ok(exit)
+}
+
+/// What counts as agreement of orbits: nine digits.
+const AGREEMENT: f64 = 1e-9;
+
+fn say_horizon(run: &Run, progress: &Progress) -> Result<(), CliError> {
+    let answer = Desk::new(None, progress).ask(&Horizon { run: run.0.clone(), within: AGREEMENT })?;
+    let fact = |name: &str| answer.fact::<f64>(name).map_err(JobError::from);
+    let whole = answer.stop == Stop::Finished && fact("horizon")? >= run.0.t_end;
+    complain(&format!(
+        "{} bits and {}, order {} and {} agree to {AGREEMENT:e} until t = {}{}",
+        fact("precision")?,
+        fact("other_precision")?,
+        fact("order")?,
+        fact("other_order")?,
+        fact("horizon")?,
+        if whole { ", the end" } else { "; from there on the orbit is the arithmetic's" }
+    ));
+    Ok(())
+}
+
+/// Computes the run and delivers it.
+fn record(arguments: &Arguments, run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, CliError> {
     let format = arguments.format.unwrap_or(Format::Csv);
     let funnel = matches!(run.0.switch, SwitchSpec::Filippov { funnel: Some(_), .. });
     if let (Format::Csv, false) = (format, funnel) {
-        return stream(&run, out, &progress);
+        return stream(run, out, progress);
     }
-    let answer = Desk::new(None, &progress).ask(&run)?;
+    let answer = Desk::new(None, progress).ask(run)?;
     let about = json!({ "kind": run.kind(), "question": run.json(), "stop": answer.stop });
     let bytes = match format {
-        Format::Csv => encode::csv_of_run(&run, &answer),
+        Format::Csv => encode::csv_of_run(run, &answer),
         Format::Json => encode::json(&answer, &about),
         Format::Parquet => parquet(&answer.tables[0], &about),
     };

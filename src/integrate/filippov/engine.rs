@@ -53,7 +53,7 @@ where
     for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
 {
     let origin = Origin { t: 0.0, x: x0, departure: Departure::Anywhere };
-    run_from(system, origin, t_end, settings, rule, observer, watch)
+    run_from(system, origin, t_end, settings, &mut Chooser::new(rule), observer, watch)
 }
 
 /// Where and when a run starts.
@@ -75,12 +75,13 @@ pub(super) enum Departure<const N: usize> {
     Repelling,
 }
 
+/// [`run_watched`] from anywhere, with an exit rule that may have been at work before.
 pub(super) fn run_from<P, O, const N: usize, const M: usize>(
     system: &P,
     origin: Origin<N>,
     t_end: f64,
     settings: &Settings,
-    rule: ExitRule,
+    chooser: &mut Chooser,
     observer: &mut O,
     watch: &dyn Watch,
 ) -> Result<FilippovSummary<N>, FilippovError>
@@ -91,7 +92,7 @@ where
 {
     let Origin { t: t0, x: x0, departure } = origin;
     const { assert!(M == N + 1, "the sliding flow carries exactly one extra state") };
-    rule.validate().map_err(FilippovError::Invalid)?;
+    chooser.rule.validate().map_err(FilippovError::Invalid)?;
     let tolerances = [settings.tolerance.rtol, settings.tolerance.atol, settings.max_step];
     if !tolerances.iter().all(|v| *v > 0.0) {
         return Err(FilippovError::Invalid("tolerances and the step cap must be above 0".into()));
@@ -105,7 +106,7 @@ where
     let mut engine = Engine {
         system,
         settings,
-        chooser: Chooser::new(rule),
+        chooser,
         observer,
         watch,
         t: t0,
@@ -358,7 +359,8 @@ struct Lie {
 struct Engine<'a, P, O, const N: usize> {
     system: &'a P,
     settings: &'a Settings,
-    chooser: Chooser,
+    /// The exit rule at work. It goes on from run to run where one run is made of several.
+    chooser: &'a mut Chooser,
     observer: &'a mut O,
     watch: &'a dyn Watch,
     t: f64,

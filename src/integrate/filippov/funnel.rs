@@ -4,6 +4,7 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use super::engine::{Departure, Origin};
+use super::exit::Chooser;
 use super::two_fold::SlidingAtTwoFold;
 use super::{ExitRule, FilippovError, FilippovSummary, Settings, Side, SlidingFlow, Trajectory, engine, flow::project};
 use crate::integrate::{Statistics, StopReason};
@@ -208,11 +209,11 @@ impl<const N: usize> Funnel<N> {
                 if grid.until_two_fold {
                     trajectory = trajectory.until_two_fold();
                 }
-                let rule = ExitRule::AfterTime { time: exit_time, side };
+                let mut chooser = Chooser::new(ExitRule::AfterTime { time: exit_time, side });
                 let origin = Origin { t: self.t, x: self.point, departure: departure.clone() };
                 let until = self.t + grid.horizon;
-                let summary =
-                    engine::run_from(system, origin, until, settings, rule, &mut trajectory, &())?.within_budget()?;
+                let summary = engine::run_from(system, origin, until, settings, &mut chooser, &mut trajectory, &())?
+                    .within_budget()?;
                 points += trajectory.points().count();
                 if points > MOST_POINTS {
                     return Err(FilippovError::TooManyPoints { limit: MOST_POINTS, members: members.len() });

@@ -38,6 +38,8 @@
 //! long as the rule says; [`ExitRule::AtOnce`] to a visible side takes that side's tangent orbit. Where the rule asks for a
 //! future that does not exist the run ends with [`FilippovError::NoSuchExit`].
 //!
+//! **Two switching surfaces** are followed one at a time ([`run_two_surfaces`]); their intersection is refused.
+//!
 //! **Non-transversal cases.** A fold whose second Lie derivative vanishes too (a cusp), and contact with a two-fold that is
 //! not reached along a sliding direction, end with [`FilippovError::NonTransversal`]; crossings that accumulate (invisible
 //! two-folds have such orbits) end with [`FilippovError::Zeno`], which names the moment of accumulation.
@@ -46,6 +48,7 @@ mod engine;
 mod exit;
 mod flow;
 mod funnel;
+mod surfaces;
 mod trajectory;
 pub mod two_fold;
 
@@ -59,6 +62,7 @@ pub use engine::{run, run_watched};
 pub use exit::{ExitRule, Side, SlidingLaw};
 pub use flow::SlidingFlow;
 pub use funnel::{Funnel, FunnelGrid, FunnelMember, connect, funnel, history};
+pub use surfaces::{Faces, INTERSECTION, run_two_surfaces};
 pub use trajectory::{Piece, Trajectory};
 
 /// The kind of motion between two events.
@@ -290,6 +294,16 @@ pub enum FilippovError {
         state: Vec<f64>,
         /// What vanishes.
         what: &'static str,
+    },
+    /// Two switching surfaces are reached at once.
+    #[error(
+        "the run comes to the intersection of the two switching surfaces at t = {t}, state {state:?}. What follows there is not decided by Filippov's convention, and nothing is chosen here: end the run before that time, start elsewhere, change a parameter, or smooth the switches"
+    )]
+    Intersection {
+        /// Time reached.
+        t: f64,
+        /// State reached.
+        state: Vec<f64>,
     },
     /// The exit rule asks for a future that does not exist here.
     #[error("the exit rule cannot be followed at t = {t}, state {state:?}: {why}")]
