@@ -68,7 +68,7 @@ pub struct FigureFlags {
     #[arg(long)]
     quiet: bool,
     /// Print the runs' specs as JSON and compute nothing; a single one can be given to `twofold run --spec`.
-    #[arg(long, conflicts_with_all = ["out", "threads", "json", "store", "fresh", "recompute"])]
+    #[arg(long, conflicts_with_all = ["out", "threads", "json", "store", "fresh", "recompute", "late"])]
     print_spec: bool,
 }
 
