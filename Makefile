@@ -39,22 +39,47 @@ rigor-test: ## millions of interval operations against exact integer arithmetic 
 elementary: ## tanh and exp against double-double arithmetic: 2^24 and 2^30 points each (half an hour)
 	@$(CARGO) test --release --locked --lib num::elementary -- --include-ignored --nocapture
 
-# The sweeps behind figures/census, figures/audit and figures/basin: 300 starts within 1e-9 of the paper's; alpha and beta over three decades each;
-# starts on a plane. What is there already is kept if six of its rows come out the same again.
+# The sweeps behind figures/census, figures/audit and figures/basin: 300 starts within 1e-9 of the paper's; fig. 7(iii) by other methods and
+# tolerances, and to shorter times with small local errors; alpha and beta over three decades each, and one exponent changed; starts on a plane.
+# What is there already is kept if six of its rows come out the same again.
 SWEEP := $(RUN) --bin twofold -- sweep --threads $(or $(THREADS),0) --resume --recheck 6
 STARTS := --over shift.x=-5e-10..5e-10 --over shift.y=-5e-10..5e-10 --over shift.z=-5e-10..5e-10
 READINGS := --over params.alpha=1e-3,0.1
+PRINTED := --over params.alpha=1e-3
+RECONSTRUCTED := --over params.alpha=0.1
+INTERVALS := --over interval=20,40,100
+SIGMAS := --restart 100 --over sigma=0.01,0.1,0.13
+METHODS := --t-end 2e5 --restart 100 --over method=dopri5,radau5
+TOLERANCES := --t-end 2e5 --restart 100 --method dopri5 --over tolerance=1e-6,1e-8,1e-10,1e-12
+TAYLOR := --restart 100 --method taylor --rtol 1e-15 --atol 1e-15
+EXTENDED := --restart 100 --method taylor-extended --rtol 1e-20 --atol 1e-20
 CELLS := --over params.alpha=1e-3..1:log:7 --over params.beta=1e-6..1e-3:log:7
+ALPHA := --over params.alpha=1e-2,1 --over params.beta=1e-5
+BETA := --over params.alpha=1e-3 --over params.beta=1e-6,1e-4,1e-3
+C := figures/census
+A := figures/audit
 census: ## go on with the census, the audit and the basins (hours; Ctrl-C keeps what is finished, and the next call goes on)
 	@$(CARGO) build --release --locked --bin twofold
 	@$(SWEEP) --t-end 1e4 --method dopri5 --over start.x=-60..60:25 --over start.y=0 --over start.z=-60..60:25 --out figures/basin/printed.parquet
 	@$(SWEEP) --t-end 1e4 --method dopri5 --reading reconstructed --over start.x=-3..3:25 --over start.y=0 --over start.z=-3..3:25 --out figures/basin/reconstructed.parquet
-	@$(SWEEP) --t-end 2e5 $(READINGS) --over interval=20,40,100 $(STARTS) --random 300 --out figures/census/fig7.parquet
-	@$(SWEEP) --t-end 2e5 $(READINGS) --restart 100 --over sigma=0.01,0.1,0.13 $(STARTS) --random 300 --out figures/census/fig8.parquet
-	@$(SWEEP) --t-end 2e5 --restart 100 --over params.alpha=0.1 --over method=dopri5,radau5 $(STARTS) --random 100 --out figures/census/methods.parquet
-	@$(SWEEP) --t-end 2e5 --restart 100 --over params.alpha=0.1 --method dopri5 --over tolerance=1e-6,1e-8,1e-10,1e-12 $(STARTS) --random 100 --out figures/census/tolerances.parquet
-	@$(SWEEP) --t-end 2e5 --method dopri5 $(CELLS) --over interval=20,40,100 $(STARTS) --random 12 --out figures/audit/fig7.parquet
-	@$(SWEEP) --t-end 2e5 --method dopri5 --restart 100 $(CELLS) --over sigma=0.01,0.1,0.13 $(STARTS) --random 12 --out figures/audit/fig8.parquet
+	@$(SWEEP) --t-end 2e5 $(READINGS) $(INTERVALS) $(STARTS) --random 300 --out $(C)/fig7.parquet
+	@$(SWEEP) --t-end 2e5 $(READINGS) $(SIGMAS) $(STARTS) --random 300 --out $(C)/fig8.parquet
+	@$(SWEEP) $(METHODS) $(PRINTED) $(STARTS) --random 100 --out $(C)/methods-printed.parquet
+	@$(SWEEP) $(METHODS) $(RECONSTRUCTED) $(STARTS) --random 100 --out $(C)/methods.parquet
+	@$(SWEEP) $(TOLERANCES) $(PRINTED) $(STARTS) --random 100 --out $(C)/tolerances-printed.parquet
+	@$(SWEEP) $(TOLERANCES) $(RECONSTRUCTED) $(STARTS) --random 100 --out $(C)/tolerances.parquet
+	@$(SWEEP) --t-end 5e3 $(PRINTED) --restart 100 $(STARTS) --random 100 --out $(C)/ordinary-printed.parquet
+	@$(SWEEP) --t-end 2e4 $(RECONSTRUCTED) --restart 100 $(STARTS) --random 100 --out $(C)/ordinary-reconstructed.parquet
+	@$(SWEEP) --t-end 5e3 $(PRINTED) $(TAYLOR) $(STARTS) --random 100 --out $(C)/taylor-printed.parquet
+	@$(SWEEP) --t-end 2e4 $(RECONSTRUCTED) $(TAYLOR) $(STARTS) --random 100 --out $(C)/taylor-reconstructed.parquet
+	@$(SWEEP) --t-end 5e3 $(PRINTED) $(EXTENDED) $(STARTS) --random 20 --out $(C)/extended-printed.parquet
+	@$(SWEEP) --t-end 2e4 $(RECONSTRUCTED) $(EXTENDED) $(STARTS) --random 20 --out $(C)/extended-reconstructed.parquet
+	@$(SWEEP) --t-end 2e5 $(ALPHA) $(INTERVALS) $(STARTS) --random 30 --out $(A)/alpha7.parquet
+	@$(SWEEP) --t-end 2e5 $(ALPHA) $(SIGMAS) $(STARTS) --random 30 --out $(A)/alpha8.parquet
+	@$(SWEEP) --t-end 2e5 $(BETA) $(INTERVALS) $(STARTS) --random 30 --out $(A)/beta7.parquet
+	@$(SWEEP) --t-end 2e5 $(BETA) $(SIGMAS) $(STARTS) --random 30 --out $(A)/beta8.parquet
+	@$(SWEEP) --t-end 2e5 --method dopri5 $(CELLS) $(INTERVALS) $(STARTS) --random 12 --out $(A)/fig7.parquet
+	@$(SWEEP) --t-end 2e5 --method dopri5 $(CELLS) $(SIGMAS) $(STARTS) --random 12 --out $(A)/fig8.parquet
 
 proofs: ## prove the theorems anew (proofs/README.md), write their certificates and check those (minutes)
 	@set -e; for p in $(PROOFS); do $(RUN) --package twofold-proofs --bin $$p; done
@@ -71,6 +96,20 @@ report-test: ## the same with axe-core's and html-validate's rules (needs Node w
 	@mkdir -p $(REPORT_TEST) && cp scripts/report-test/package.json scripts/report-test/package-lock.json $(REPORT_TEST)
 	@cd $(REPORT_TEST) && npm ci --ignore-scripts --no-audit --no-fund --silent
 	@node scripts/browser_test.mjs --require --modules $(REPORT_TEST)/node_modules $(BROWSER_TEST)
+
+# Sweeps on clusters that these targets start themselves, on this machine (cluster/, docs/sweeps.md).
+.PHONY: sweep-hq sweep-slurm
+sweep-hq: ## a sweep on HyperQueue; tasks are killed at random, then the whole cluster: the same bytes as one process (needs Python 3.9 or newer and PyPI)
+	@$(PYTHON) -m venv target/hq/venv
+	@target/hq/venv/bin/python -m pip install --quiet --disable-pip-version-check -r cluster/requirements-hq.txt
+	@$(CARGO) build --release --locked --bin twofold
+	@target/hq/venv/bin/python cluster/test_hq.py target/release/twofold target/hq/test
+
+sweep-slurm: ## the same on Slurm by Snakemake's job arrays; a job killed, one cancelled, a node drained (needs slurm-wlm, munge, Python 3.11 or newer and PyPI)
+	@$(PYTHON) -m venv target/slurm/venv
+	@target/slurm/venv/bin/python -m pip install --quiet --disable-pip-version-check -r cluster/requirements-slurm.txt
+	@$(CARGO) build --release --locked --bin twofold
+	@target/slurm/venv/bin/python cluster/test_slurm.py target/release/twofold target/slurm/test
 
 .PHONY: python-test deny
 PYTHON  ?= python3

@@ -3,12 +3,26 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use twofold::job::sweep::{Axis, Rows};
+use twofold::cli::Exit;
+use twofold::cli::progress::Progress;
+use twofold::cli::recompute::recompute;
+use twofold::cli::rows::journal_of;
+use twofold::integrate::Schedule;
+use twofold::job::JobError;
+use twofold::job::spec::*;
+use twofold::job::sweep::{Axis, Rows, Sweep};
 use twofold::paper::claims::claims;
-use twofold::paper::{Reading, census, figures};
+use twofold::paper::{Reading, audit, census, figures};
+use twofold::record::Journal;
+use twofold::system::Caricature;
 
 fn path(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
+}
+
+/// Files of a figure as they stand, so that texts can be compared with data before the library has taken them in.
+fn on_disk(folder: &str) -> impl Fn(&str) -> Result<Vec<u8>, JobError> {
+    move |name| fs::read(path(folder).join(name)).map_err(|e| JobError::Other(format!("{name}: {e}")))
 }
 
 fn rows(name: &str) -> Rows {
@@ -62,10 +76,86 @@ fn committed_rows_come_out_the_same() {
 
 #[test]
 fn readme_says_what_the_census_says() {
-    let found = Reading::ALL.map(|reading| figures::census::found(reading).unwrap());
+    let found = Reading::ALL.map(|reading| figures::census::found_in(reading, &on_disk("figures/census")).unwrap());
     let text = census::text(&found);
     let readme = fs::read_to_string(path("README.md")).unwrap();
     let (_, rest) = readme.split_once(census::BEGIN).expect("README has a place for the census");
     let (said, _) = rest.split_once(census::END).expect("README's text about the census ends");
     assert!(said.trim() == text.trim(), "README does not say what figures/census says:\n{}\n\n{text}\n", census::BEGIN);
+}
+
+#[test]
+fn readme_says_what_the_audit_says() {
+    let [equal, whole] = figures::audit::candidates_in(&on_disk("figures/audit")).unwrap();
+    let text = audit::text(&equal, &whole);
+    let readme = fs::read_to_string(path("README.md")).unwrap();
+    let (_, rest) = readme.split_once(audit::BEGIN).expect("README has a place for the audit");
+    let (said, _) = rest.split_once(audit::END).expect("README's text about the audit ends");
+    assert!(said.trim() == text.trim(), "README does not say what figures/audit says:\n{}\n\n{text}\n", audit::BEGIN);
+}
+
+#[test]
+fn the_book_says_what_other_limits_would_do() {
+    let found = Reading::ALL.map(|reading| figures::census::found_in(reading, &on_disk("figures/census")).unwrap());
+    let text = census::limits_text(&found);
+    let book = fs::read_to_string(path("docs/sweeps.md")).unwrap();
+    let (_, rest) = book.split_once(census::LIMITS_BEGIN).expect("docs/sweeps.md has a place for the limits");
+    let (said, _) = rest.split_once(census::LIMITS_END).expect("its text about the limits ends");
+    assert!(
+        said.trim() == text.trim(),
+        "docs/sweeps.md does not say what figures/census says:\n{}\n\n{text}\n",
+        census::LIMITS_BEGIN
+    );
+}
+
+/// A small sweep, two of whose three rows are there: what is committed need not be whole.
+fn small(t_end: f64) -> Rows {
+    let run = RunSpec {
+        system: Caricature::with_reinjection(1e-1, 1e-5).into(),
+        switch: SwitchSpec::tanh(1e-3),
+        start: vec![0.2, 0.0, -1.0],
+        t_end,
+        method: MethodSpec::ndsolve_defaults(Method::Dopri5),
+        schedule: Schedule::default(),
+        observe: Observation::Section { coordinate: 1, value: 0.0 },
+    };
+    let sweep = Sweep::new(run, vec!["shift.x=1e-9*3".parse().unwrap()], None).unwrap();
+    let mut rows = Rows::of(sweep.clone());
+    for number in 0..2 {
+        rows.insert(sweep.row(number, &()).unwrap()).unwrap();
+    }
+    rows
+}
+
+#[test]
+fn rows_that_come_out_the_same_pass_and_others_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let progress = Progress::new(true);
+    let committed = small(30.0).parquet();
+    recompute(&[("a.parquet", &committed)], folder.path(), 1, &progress).unwrap();
+    assert_eq!(std::fs::read(folder.path().join("a.parquet")).unwrap(), committed);
+    assert!(!journal_of(&folder.path().join("a.parquet")).exists());
+
+    // The same sweep with one row of another.
+    let (mut forged, other) = (Rows::of(small(30.0).sweep().clone()), small(29.0));
+    forged.insert(small(30.0).get(0).unwrap()).unwrap();
+    forged.insert(other.get(1).unwrap()).unwrap();
+    let error = recompute(&[("b.parquet", &forged.parquet())], folder.path(), 1, &progress).unwrap_err();
+    assert_eq!(error.exit(), Exit::CheckFailed);
+    let text = error.to_string();
+    assert!(text.starts_with("1 committed rows") && text.contains("row 1 of b.parquet"), "{text}");
+}
+
+#[test]
+fn a_journal_is_gone_on_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = small(30.0);
+    let (mut journal, _) = Journal::open(&journal_of(&folder.path().join("a.parquet"))).unwrap();
+    // A row that no computation gives: it stays, so it was not computed again.
+    let planted = small(29.0).get(0).unwrap();
+    journal.append(&whole.journal_heading()).unwrap();
+    journal.append(&planted.line()).unwrap();
+    drop(journal);
+    let error = recompute(&[("a.parquet", &whole.parquet())], folder.path(), 1, &Progress::new(true)).unwrap_err();
+    assert!(error.to_string().contains("row 0 of a.parquet"), "{error}");
 }

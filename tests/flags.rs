@@ -150,9 +150,12 @@ const TABLE: &[(&str, &str, &[&str])] = &[
             "--json",
             "--quiet",
             "--print-spec",
+            "--late",
+            "--recompute",
             "--out p",
         ],
     ),
+    ("", "figure fig7 --t-end 30 --fresh --out o", &["--late", "--recompute", "--print-spec --late"]),
     (
         "",
         "figure fig5 --t-end 2 --fresh --out o",
@@ -192,7 +195,7 @@ const TABLE: &[(&str, &str, &[&str])] = &[
         "sweep --t-end 30 --over params.alpha=0.1,0.2 --out s.csv",
         &["--resume"],
     ),
-    ("", "sweep --t-end 30 --runs 2", &["--shift 1e-9", "--resume", "--runs 3"]),
+    ("", "sweep --t-end 30 --runs 2", &["--shift 2e-9", "--resume", "--runs 3"]),
     ("", "check fig1", &["--json", "--quiet", "--threads 2000", "--expected nowhere", "--against nowhere.json"]),
     (
         "figure fig1 --fresh --out made",

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use twofold::paper::{census, figures, readme};
+use twofold::paper::{audit, census, figures, readme};
 use twofold::record::Manifest;
 
 fn text(path: &str) -> String {
@@ -58,9 +58,12 @@ fn findings() -> String {
     let (before, rest) = findings.split_once(readme::BEGIN).unwrap();
     let (_, after) = rest.split_once(readme::END).unwrap();
     let findings = format!("{before}{after}");
-    // tests/census.rs compares what the census says.
+    // tests/census.rs compares what the census and the audit say.
     let (before, rest) = findings.split_once(census::BEGIN).unwrap();
     let (_, after) = rest.split_once(census::END).unwrap();
+    let findings = format!("{before}{after}");
+    let (before, rest) = findings.split_once(audit::BEGIN).unwrap();
+    let (_, after) = rest.split_once(audit::END).unwrap();
     format!("{before}{after}")
 }
 

@@ -7,7 +7,7 @@ use twofold::job::sweep::Rows;
 use twofold::job::table::Table;
 use twofold::job::{AnyQuestion, JobError};
 use twofold::num::elementary::sqrt;
-use twofold::paper::audit::{self, PRIORS};
+use twofold::paper::audit::{self, Candidate, Cell, PRIORS};
 use twofold::paper::claims::claims;
 use twofold::paper::study::Computed;
 use twofold::paper::wording::number;
@@ -16,23 +16,76 @@ use twofold::record::Hash;
 use twofold::render::sheet::*;
 use twofold::render::style;
 
-/// Fig. 7's intervals and fig. 8's sigmas over alpha and beta, Dormand-Prince at NDSolve's tolerance.
-const FIG7: &[u8] = include_bytes!("fig7.parquet");
-const FIG8: &[u8] = include_bytes!("fig8.parquet");
+/// What is made for this figure: fig. 7's intervals and fig. 8's sigmas over alpha and beta, Dormand-Prince at NDSolve's tolerance; and the candidates,
+/// one exponent changed, by LSODA as the figures are.
+pub const DATA: &[(&str, &[u8])] = &[
+    ("fig7.parquet", include_bytes!("fig7.parquet")),
+    ("fig8.parquet", include_bytes!("fig8.parquet")),
+    ("alpha7.parquet", include_bytes!("alpha7.parquet")),
+    ("alpha8.parquet", include_bytes!("alpha8.parquet")),
+    ("beta7.parquet", include_bytes!("beta7.parquet")),
+    ("beta8.parquet", include_bytes!("beta8.parquet")),
+];
+
+/// The printed and the reconstructed numbers are the census'.
+const CENSUS: [(&str, &[u8]); 2] = [
+    ("../census/fig7.parquet", include_bytes!("../census/fig7.parquet")),
+    ("../census/fig8.parquet", include_bytes!("../census/fig8.parquet")),
+];
+
+/// The committed content of a file.
+fn committed(name: &str) -> Result<Vec<u8>, JobError> {
+    let found = DATA.iter().chain(&CENSUS).find(|(n, _)| *n == name).map(|(_, bytes)| bytes.to_vec());
+    found.ok_or_else(|| JobError::Other(format!("the audit has no {name}")))
+}
 
 fn table_of(bytes: &[u8]) -> Result<Table, JobError> {
     Rows::from_parquet(bytes).map(|rows| rows.table()).map_err(|e| JobError::Other(format!("the audit's data: {e}")))
 }
 
+/// The candidates for what was meant, the printed numbers first: with as many runs of each panel for all, because fewer runs leave more room for what did
+/// not happen; and the printed and reconstructed numbers alone, with all their runs.
+///
+/// # Errors
+///
+/// If the committed data are not the files that `make census` writes.
+pub fn candidates() -> Result<[Vec<Candidate>; 2], JobError> {
+    candidates_in(&committed)
+}
+
+/// The candidates by the files that `read` gives for names as in [`DATA`], and for the census' names with `../census/` before them.
+///
+/// # Errors
+///
+/// If they are not such as `make census` writes, or `read` fails.
+pub fn candidates_in(read: &dyn Fn(&str) -> Result<Vec<u8>, JobError>) -> Result<[Vec<Candidate>; 2], JobError> {
+    let tables = |names: [&str; 3]| -> Result<Vec<Table>, JobError> {
+        names.into_iter().map(|name| table_of(&read(name)?)).collect()
+    };
+    let fig7 = tables(["../census/fig7.parquet", "alpha7.parquet", "beta7.parquet"])?;
+    let fig8 = tables(["../census/fig8.parquet", "alpha8.parquet", "beta8.parquet"])?;
+    let rules = &claims().rules;
+    let all = audit::cells(&fig7, &fig8, usize::MAX, rules);
+    let fewest = all.iter().flat_map(|cell| cell.runs).min().unwrap_or(0);
+    let equal = audit::cells(&fig7, &fig8, usize::try_from(fewest).unwrap_or(usize::MAX), rules);
+    let two: Vec<Cell> = all.into_iter().filter(|cell| READINGS.contains(&[cell.alpha, cell.beta])).collect();
+    match (audit::candidates(&equal, rules), audit::candidates(&two, rules)) {
+        (Some(equal), Some(two)) => Ok([equal, two]),
+        _ => Err(JobError::Other("the printed numbers are not among the audit's candidates".into())),
+    }
+}
+
+/// The printed and the reconstructed alpha and beta.
+const READINGS: [[f64; 2]; 2] = [[1e-3, 1e-5], [1e-1, 1e-5]];
+
 fn tables() -> Result<Vec<Table>, JobError> {
-    let cells = audit::cells(&table_of(FIG7)?, &table_of(FIG8)?, &claims().rules);
-    let candidates = audit::candidates(&cells)
-        .ok_or_else(|| JobError::Other("the printed numbers are not on the audit's grid".into()))?;
-    Ok(vec![audit::cell_table(&cells), audit::candidate_table(&candidates)])
+    let [fig7, fig8] = ["fig7.parquet", "fig8.parquet"].map(|name| table_of(&committed(name)?));
+    let cells = audit::cells(&[fig7?], &[fig8?], usize::MAX, &claims().rules);
+    Ok(vec![audit::cell_table(&cells), audit::candidate_table(&candidates()?[0])])
 }
 
 fn questions() -> Vec<AnyQuestion> {
-    let data = [FIG7, FIG8].map(Hash::of);
+    let data: Vec<Hash> = DATA.iter().chain(&CENSUS).map(|(_, bytes)| Hash::of(bytes)).collect();
     vec![Arc::new(Computed {
         kind: "audit",
         question: serde_json::json!({ "data": data, "rules": claims().rules, "priors": PRIORS }),
@@ -97,7 +150,7 @@ fn draw(tables: &[Table]) -> Sheet {
         sheet = sheet.legend(LegendEntry::new(LegendKey::Area(shade(share), 100), format!("10^{{{words:.1}}}")));
     }
     let (ca, cb) = (candidates.numbers("alpha"), candidates.numbers("beta"));
-    let posteriors = ["posterior_prior_0.5", "posterior_prior_0.99"].map(|c| candidates.numbers(c));
+    let posteriors = PRIORS.map(|prior| ["", "_low", "_high"].map(|end| candidates.numbers(&format!("posterior_prior_{prior}{end}"))));
     let n = candidates.len() as f64;
     let mut odds = PlanePanel::new(Axis::linear("", -0.8, n + 0.1), Axis::linear("", -0.3, 1.1));
     odds.axes = false;
@@ -111,8 +164,11 @@ fn draw(tables: &[Table]) -> Sheet {
     }
     for i in 0..candidates.len() {
         for (k, colour) in [style::BLUE, style::ORANGE].into_iter().enumerate() {
-            let (left, height) = (i as f64 + 0.12 + 0.38 * k as f64, posteriors[k][i].max(0.003));
-            odds = odds.solid(vec![[left, 0.0], [left + 0.36, 0.0], [left + 0.36, height], [left, height]], colour);
+            let [height, from, to] = posteriors[k].map(|column| column[i]);
+            let (left, height) = (i as f64 + 0.12 + 0.38 * k as f64, height.max(0.003));
+            odds = odds
+                .solid(vec![[left, 0.0], [left + 0.36, 0.0], [left + 0.36, height], [left, height]], colour)
+                .line(vec![[left + 0.18, from], [left + 0.18, to]], LineStyle::new(style::INK, style::CURVE_PT));
         }
         odds = odds.note([i as f64 + 0.5, -0.03], number(ca[i]), Anchor::Below).note(
             [i as f64 + 0.5, -0.14],
@@ -139,7 +195,10 @@ fn draw(tables: &[Table]) -> Sheet {
             number(alpha[best]),
             number(beta[best])
         ))
-        .footer("(b) The printed numbers and those with one exponent changed; what is not printed shares the rest of the prior evenly.")
+        .footer(format!(
+            "(b) The printed numbers and those with one exponent changed, LSODA, {} runs of each panel, with 95 % intervals; what is not printed shares the rest of the prior evenly.",
+            candidates.integers("fewest_runs").iter().min().copied().unwrap_or(0)
+        ))
 }
 
 /// The figure's specification.

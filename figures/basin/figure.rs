@@ -16,6 +16,9 @@ use twofold::render::style;
 const PRINTED: &[u8] = include_bytes!("printed.parquet");
 const RECONSTRUCTED: &[u8] = include_bytes!("reconstructed.parquet");
 
+/// Both, under the files' names.
+pub const DATA: &[(&str, &[u8])] = &[("printed.parquet", PRINTED), ("reconstructed.parquet", RECONSTRUCTED)];
+
 /// Colours of the kinds, in the order of `Kind::ALL`.
 const COLOURS: [Colour; 6] = [style::BLUE, style::GREEN, style::SKY, style::VERMILLION, style::INK, style::FAINT];
 

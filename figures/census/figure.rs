@@ -6,7 +6,7 @@ use std::sync::Arc;
 use twofold::job::sweep::Rows;
 use twofold::job::table::Table;
 use twofold::job::{AnyQuestion, JobError};
-use twofold::paper::census::{self, Data, Found, Kind};
+use twofold::paper::census::{self, Data, Found, Kind, Shorter};
 use twofold::paper::claims::claims;
 use twofold::paper::study::Computed;
 use twofold::paper::{Figure, Reading, Study};
@@ -14,22 +14,46 @@ use twofold::record::Hash;
 use twofold::render::sheet::*;
 use twofold::render::style;
 
-/// Figs 7 and 8: LSODA at NDSolve's defaults, starts shifted within 1e-9.
-const FIG7: &[u8] = include_bytes!("fig7.parquet");
-const FIG8: &[u8] = include_bytes!("fig8.parquet");
-/// Fig. 7(iii) by other methods, and by Dormand-Prince at other tolerances, reconstructed reading.
-const METHODS: &[u8] = include_bytes!("methods.parquet");
-const TOLERANCES: &[u8] = include_bytes!("tolerances.parquet");
+/// The data: figs 7 and 8 by LSODA at NDSolve's defaults from starts shifted within 1e-9; fig. 7(iii) by other methods and by Dormand-Prince at other
+/// tolerances; fig. 7(iii) to a shorter time by LSODA, and by the layer-resolved Taylor method with local errors of 1e-15, and of 1e-20 in double-double
+/// arithmetic.
+pub const DATA: &[(&str, &[u8])] = &[
+    ("fig7.parquet", include_bytes!("fig7.parquet")),
+    ("fig8.parquet", include_bytes!("fig8.parquet")),
+    ("methods-printed.parquet", include_bytes!("methods-printed.parquet")),
+    ("methods.parquet", include_bytes!("methods.parquet")),
+    ("tolerances-printed.parquet", include_bytes!("tolerances-printed.parquet")),
+    ("tolerances.parquet", include_bytes!("tolerances.parquet")),
+    ("ordinary-printed.parquet", include_bytes!("ordinary-printed.parquet")),
+    ("ordinary-reconstructed.parquet", include_bytes!("ordinary-reconstructed.parquet")),
+    ("taylor-printed.parquet", include_bytes!("taylor-printed.parquet")),
+    ("taylor-reconstructed.parquet", include_bytes!("taylor-reconstructed.parquet")),
+    ("extended-printed.parquet", include_bytes!("extended-printed.parquet")),
+    ("extended-reconstructed.parquet", include_bytes!("extended-reconstructed.parquet")),
+];
+
+/// Files of the shorter runs, and how they were computed: in words, and in a picture.
+const SHORTER: [(&str, &str, &str); 3] = [
+    ("ordinary", "LSODA", "LSODA"),
+    ("taylor", "Taylor 1e-15", "10^{-15}"),
+    ("extended", "Taylor 1e-20, double-double", "10^{-20}"),
+];
 
 /// Colours of the kinds, in the order of `Kind::ALL`.
 const COLOURS: [Colour; 6] = [style::BLUE, style::GREEN, style::SKY, style::VERMILLION, style::INK, style::FAINT];
 
-fn table_of(bytes: &[u8]) -> Result<Table, JobError> {
-    Rows::from_parquet(bytes).map(|rows| rows.table()).map_err(|e| JobError::Other(format!("the census' data: {e}")))
+fn rows_of(bytes: &[u8]) -> Result<Rows, JobError> {
+    Rows::from_parquet(bytes).map_err(|e| JobError::Other(format!("the census' data: {e}")))
+}
+
+/// The committed content of a file.
+fn committed(name: &str) -> Result<Vec<u8>, JobError> {
+    let found = DATA.iter().find(|(n, _)| *n == name).map(|(_, bytes)| bytes.to_vec());
+    found.ok_or_else(|| JobError::Other(format!("the census has no {name}")))
 }
 
 fn question(reading: Reading) -> AnyQuestion {
-    let data = [FIG7, FIG8, METHODS, TOLERANCES].map(Hash::of);
+    let data: Vec<Hash> = DATA.iter().map(|(_, bytes)| Hash::of(bytes)).collect();
     Arc::new(Computed {
         kind: "census",
         question: serde_json::json!({ "reading": reading, "data": data, "rules": claims().rules }),
@@ -47,11 +71,30 @@ fn question(reading: Reading) -> AnyQuestion {
 ///
 /// If they are not the files that `make census` writes.
 pub fn found(reading: Reading) -> Result<Found, JobError> {
+    found_in(reading, &committed)
+}
+
+/// What the files that `read` gives for the names in [`DATA`] say in a reading.
+///
+/// # Errors
+///
+/// If they are not such as `make census` writes, or `read` fails.
+pub fn found_in(reading: Reading, read: &dyn Fn(&str) -> Result<Vec<u8>, JobError>) -> Result<Found, JobError> {
+    let table = |name: &str| rows_of(&read(name)?).map(|rows| rows.table());
+    let tables = |names: [&str; 2]| names.into_iter().map(table).collect::<Result<Vec<_>, _>>();
+    let mut shorter = Vec::new();
+    for (file, name, _) in SHORTER {
+        for reading in Reading::ALL {
+            let rows = rows_of(&read(&format!("{file}-{}.parquet", reading.word()))?)?;
+            shorter.push(Shorter { name, end: rows.sweep().run().t_end, table: rows.table() });
+        }
+    }
     let data = Data {
-        fig7: table_of(FIG7)?,
-        fig8: table_of(FIG8)?,
-        methods: table_of(METHODS)?,
-        tolerances: table_of(TOLERANCES)?,
+        fig7: table("fig7.parquet")?,
+        fig8: table("fig8.parquet")?,
+        methods: tables(["methods-printed.parquet", "methods.parquet"])?,
+        tolerances: tables(["tolerances-printed.parquet", "tolerances.parquet"])?,
+        shorter,
     };
     Ok(Found::of(reading, &data, &claims().rules))
 }
@@ -92,7 +135,7 @@ fn bars(names: &[String], counts: &[Vec<f64>], below: &[Vec<String>]) -> PlanePa
 }
 
 fn draw(tables: &[Table]) -> Sheet {
-    let [shares, found, curves, ways] = tables else { unreachable!("the census has four tables") };
+    let [shares, found, curves, ways, shorter] = tables else { unreachable!("the census has five tables") };
     let count = |table: &Table, row: usize, suffix: &str| -> Vec<f64> {
         Kind::ALL.map(|k| table.integers(&format!("{}{suffix}", k.words().replace(' ', "_")))[row] as f64).to_vec()
     };
@@ -125,6 +168,12 @@ fn draw(tables: &[Table]) -> Sheet {
     let ways_counts: Vec<Vec<f64>> = (0..ways.len()).map(|row| count(ways, row, "")).collect();
     let ways_totals: Vec<Vec<String>> =
         ways_counts.iter().map(|c| vec![format!("{:.0}", c.iter().sum::<f64>()), "runs".to_owned()]).collect();
+    let in_picture = |name: &str| SHORTER.iter().find(|s| s.1 == name).map_or(name, |s| s.2).to_owned();
+    let shorter_names: Vec<String> = shorter.words("group").map(in_picture).collect();
+    let shorter_counts: Vec<Vec<f64>> = (0..shorter.len()).map(|row| count(shorter, row, "")).collect();
+    let shorter_totals: Vec<Vec<String>> =
+        shorter_counts.iter().map(|c| vec![format!("{:.0} runs", c.iter().sum::<f64>())]).collect();
+    let horizon = shorter.numbers("t").first().copied().unwrap_or(f64::NAN);
     let value = |what: &str, column: &str| {
         let row = found.words("what").position(|w| w == what);
         row.map_or(f64::NAN, |r| found.numbers(column)[r])
@@ -140,7 +189,11 @@ fn draw(tables: &[Table]) -> Sheet {
         .panel("(a)", "where runs of each panel end", bars(&names, &at_end, &claimed))
         .panel("(b)", "captured by a closed orbit", capture)
         .panel("(c)", "interval 100, by method and tolerance", bars(&ways_names, &ways_counts, &ways_totals))
-        .panel("", "", Content::Blank);
+        .panel(
+            "(d)",
+            format!("interval 100 to *t* = {horizon}, by local error"),
+            bars(&shorter_names, &shorter_counts, &shorter_totals),
+        );
     for (kind, colour) in Kind::ALL.into_iter().zip(COLOURS) {
         sheet = sheet.legend(LegendEntry::new(LegendKey::Area(colour, 100), kind.words()));
     }
@@ -152,12 +205,14 @@ fn draw(tables: &[Table]) -> Sheet {
             runs.iter().max().copied().unwrap_or(0)
         ))
         .footer(format!(
-            "Tests for the same odds (permutation): intervals 20, 40, 100 {}; *σ* {}; all six panels {}; methods {}; tolerances {}.",
+            "Tests for the same odds (permutation): intervals 20, 40, 100 {}; *σ* {}; all six panels {}; methods {}; tolerances {}, without 10^{{-6}} {}; (d) {}.",
             p("intervals 20, 40, 100"),
             p("sigma 0.01, 0.1, 0.13"),
             p("all six panels"),
             p("methods"),
             p("tolerances"),
+            p("tolerances below 1e-6"),
+            p("ordinary and small local errors"),
         ))
         .footer(format!(
             "Three independent runs: fig. 7 all as claimed {}, not all the same {}; fig. 8 all as claimed {}, not all the same {}.",
@@ -175,7 +230,8 @@ pub fn figure() -> Figure {
         "The odds of each outcome of figs 7 and 8",
         "(a) Where runs of each panel of figs 7 and 8 end, of many starts that differ by less than 1e-9, and the share that bears out what the \
          paper says of the panel. (b) Share of runs that a closed orbit has captured by time t. (c) The same as (a) for fig. 7(iii) by other \
-         methods and tolerances.",
+         methods, and by Dormand-Prince at other tolerances. (d) Runs of fig. 7(iii) that end earlier, by LSODA and by a Taylor method in double-double \
+         arithmetic.",
         [
             Study { questions: || vec![question(Reading::Printed)], draw: |answers| draw(&Study::tables(answers)) },
             Study {

@@ -84,6 +84,9 @@ pub enum CliError {
         #[from]
         source: FileError,
     },
+    /// What was computed anew is not what was there.
+    #[error("{0}")]
+    Differs(String),
     /// Threads could not be started.
     #[error("--threads {threads}: {reason}; give a smaller number, or 0 for one per core")]
     Threads {
@@ -113,6 +116,7 @@ impl CliError {
             CliError::Job(source) | CliError::Pipeline(PipelineError::Job { source, .. }) => of_job(source),
             CliError::Pipeline(PipelineError::Render { .. }) => Exit::Failed,
             CliError::Stopped { exit, .. } => *exit,
+            CliError::Differs(_) => Exit::CheckFailed,
             CliError::Usage(_)
             | CliError::NoEffect { .. }
             | CliError::NoSuchPanel { .. }

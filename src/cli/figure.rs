@@ -7,6 +7,7 @@ use clap::{CommandFactory, FromArgMatches, Parser};
 use rayon::prelude::*;
 
 use super::progress::Progress;
+use super::recompute::recompute;
 use super::speak::{complain, print_json};
 use super::words::{Method, Readings};
 use super::{CliError, Exit, LONG_VERSION, in_pool, interrupt};
@@ -14,7 +15,7 @@ use crate::integrate::filippov::ExitRule;
 use crate::job::spec::{RunSpec, SwitchSpec};
 use crate::job::{Desk, Store};
 use crate::paper::pipeline::{Computed, PictureRecord, compute, questions};
-use crate::paper::{Alterations, Figure, Panel, Picture};
+use crate::paper::{Alterations, Figure, Panel, Picture, View, figures};
 use crate::record::files::{read, still_there, try_folder};
 use crate::record::{FileError, write};
 use crate::report::{Making, Makings, Timed, names};
@@ -51,6 +52,13 @@ pub struct FigureFlags {
     /// Another integration method; the picture is marked.
     #[arg(long, value_enum, value_name = "METHOD")]
     method: Option<Method>,
+    /// The later half of sections alone, as the paper shows them; the picture is marked.
+    #[arg(long)]
+    late: bool,
+    /// Compute the rows that are committed beside the figure anew, and stop if one comes out otherwise (census, audit, basin: hours; what
+    /// is finished is kept in --out, and the same command goes on with it).
+    #[arg(long)]
+    recompute: bool,
     #[command(flatten)]
     store: StoreFlags,
     /// Print what was made, with hashes and statistics, as JSON on standard output.
@@ -60,7 +68,7 @@ pub struct FigureFlags {
     #[arg(long)]
     quiet: bool,
     /// Print the runs' specs as JSON and compute nothing; a single one can be given to `twofold run --spec`.
-    #[arg(long, conflicts_with_all = ["out", "threads", "json", "store", "fresh"])]
+    #[arg(long, conflicts_with_all = ["out", "threads", "json", "store", "fresh", "recompute", "late"])]
     print_spec: bool,
 }
 
@@ -138,6 +146,11 @@ pub fn run(figures: Vec<Figure>, arguments: &FigureFlags) -> Result<(), CliError
         try_folder(&arguments.out.join(figure.id))?;
     }
     let progress = Progress::new(arguments.quiet);
+    if arguments.recompute {
+        for figure in &figures {
+            recompute(figures::data(figure.id), &arguments.out.join(figure.id), arguments.threads, &progress)?;
+        }
+    }
     let desk = Desk::new(arguments.store.store(), &progress);
     let records = in_pool(arguments.threads, || make(&figures, &arguments.out, &desk))??;
     say_how(&figures, arguments, &progress)?;
@@ -243,6 +256,15 @@ fn refuse_idle(figures: &[Figure], arguments: &FigureFlags) -> Result<(), CliErr
     {
         return Err(CliError::no_effect("--only", format!("{names}: there is no other panel; leave it out")));
     }
+    if arguments.recompute && figures.iter().all(|f| figures::data(f.id).is_empty()) {
+        let why = format!(
+            "{names}: no rows are committed beside it, everything is computed anyway (--fresh takes nothing from the store)"
+        );
+        return Err(CliError::no_effect("--recompute", why));
+    }
+    if arguments.late && !pictures().any(|p| matches!(p.view, View::Section { .. })) {
+        return Err(CliError::no_effect("--late", format!("{names}: no section of two halves; leave it out")));
+    }
     if arguments.reading.is_some() && pictures().all(|p| p.reading.is_none()) {
         return Err(CliError::no_effect("--reading", format!("{names}: the same in every reading; leave it out")));
     }
@@ -278,8 +300,12 @@ fn select(mut figure: Figure, arguments: &FigureFlags) -> Result<Figure, CliErro
     }
     let readings = arguments.reading.unwrap_or_default();
     figure.pictures.retain(|p| readings.wants(p.reading));
-    let alterations =
-        Alterations { seed: arguments.seed, t_end: arguments.t_end, method: arguments.method.map(Into::into) };
+    let alterations = Alterations {
+        seed: arguments.seed,
+        t_end: arguments.t_end,
+        method: arguments.method.map(Into::into),
+        late: arguments.late,
+    };
     for picture in &mut figure.pictures {
         picture.alter(&alterations);
         for panel in &picture.panels {

@@ -218,6 +218,10 @@ fn wrong(field: &'static str, value: f64, rule: &'static str) -> Checked {
     Err(SpecError { field, value: format!("{value:?}"), rule })
 }
 
+fn wrong_choice(field: &'static str, value: u16, rule: &'static str) -> Checked {
+    Err(SpecError { field, value: value.to_string(), rule })
+}
+
 fn positive(field: &'static str, value: f64) -> Checked {
     if value.is_finite() && value > 0.0 { Ok(()) } else { wrong(field, value, "give a finite number above zero") }
 }
@@ -413,10 +417,10 @@ impl MethodSpec {
         }
         if let Some(order) = self.order {
             if self.name != Method::TaylorExtended {
-                return wrong("order", f64::from(order), "only taylor-extended has a choice of order; leave it out");
+                return wrong_choice("order", order, "only taylor-extended has a choice of order; leave it out");
             }
             if !(4..=MOST_DEGREES).contains(&order) {
-                return wrong("order", f64::from(order), "series have 4 to 1000 degrees");
+                return wrong_choice("order", order, "series have 4 to 1000 degrees");
             }
         }
         let (finest, rule) = match self.name {

@@ -2,10 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::census::{self, PANELS};
+use super::census::{self, PANELS, Panel, Probability, Run};
 use super::claims::Rules;
 use crate::job::table::{Column, Entry, Table};
 use crate::num::elementary::{exp10, log10};
+use crate::num::random::RandomStream;
 
 /// A pair of parameters, and how likely the paper's six outcomes are there.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,36 +39,58 @@ impl Cell {
         }
     }
 
+    /// A draw of the decimal logarithm of the six outcomes' probability, each panel's share having the posterior that Jeffreys' prior gives.
+    fn draw(&self, random: &mut RandomStream) -> f64 {
+        let share = |(n, k): (&u64, &u64)| {
+            let weights = [*k as f64 + 0.5, (*n - *k) as f64 + 0.5];
+            log10(census::dirichlet(&weights, random)[0].max(f64::MIN_POSITIVE))
+        };
+        self.runs.iter().zip(&self.hits).map(share).sum()
+    }
+
     /// Whether every panel has a run.
     pub fn is_whole(&self) -> bool {
         self.runs.iter().all(|n| *n > 0)
     }
 }
 
-/// The cells of two sweeps over `params.alpha` and `params.beta`, of fig. 7's intervals and of fig. 8's sigmas, in order; those in which every panel has a run.
-pub fn cells(fig7: &Table, fig8: &Table, rules: &Rules) -> Vec<Cell> {
+/// Runs of a table at a pair of parameters. What a table does not vary has the paper's value in it.
+fn runs_at(table: &Table, [alpha, beta]: [f64; 2], panel: &Panel) -> Vec<Run> {
+    let mut chosen = vec![(panel.column, Entry::Number(panel.value))];
+    for (name, wanted, printed) in [("params.alpha", alpha, PRINTED[0]), ("params.beta", beta, PRINTED[1])] {
+        if table.column(name).is_some() {
+            chosen.push((name, Entry::Number(wanted)));
+        } else if wanted != printed {
+            return Vec::new();
+        }
+    }
+    census::runs(table, &chosen)
+}
+
+/// The cells of sweeps of fig. 7's intervals and of fig. 8's sigmas over `params.alpha` and `params.beta`, or over one of them at the paper's
+/// value of the other, in order; those in which every panel has a run. Of each panel at most the first `most` runs count.
+pub fn cells(fig7: &[Table], fig8: &[Table], most: usize, rules: &Rules) -> Vec<Cell> {
     let mut pairs: Vec<[f64; 2]> = Vec::new();
-    for table in [fig7, fig8] {
-        for (alpha, beta) in table.numbers("params.alpha").iter().zip(table.numbers("params.beta")) {
-            if !pairs.contains(&[*alpha, *beta]) {
-                pairs.push([*alpha, *beta]);
+    for table in fig7.iter().chain(fig8) {
+        let values = |name: &str, printed: f64| -> Vec<f64> {
+            table.column(name).map_or(vec![printed; table.len()], |_| table.numbers(name).to_vec())
+        };
+        for (alpha, beta) in values("params.alpha", PRINTED[0]).into_iter().zip(values("params.beta", PRINTED[1])) {
+            if !pairs.contains(&[alpha, beta]) {
+                pairs.push([alpha, beta]);
             }
         }
     }
     pairs.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
-    let cell = |[alpha, beta]: [f64; 2]| {
+    let cell = |at: [f64; 2]| {
         let mut found = [(0, 0, 0); 6];
         for (i, (panel, found)) in PANELS.iter().zip(&mut found).enumerate() {
-            let chosen = [
-                ("params.alpha", Entry::Number(alpha)),
-                ("params.beta", Entry::Number(beta)),
-                (panel.column, Entry::Number(panel.value)),
-            ];
-            let runs = census::runs([fig7, fig8][i / 3], &chosen);
+            let runs = [fig7, fig8][i / 3].iter().flat_map(|table| runs_at(table, at, panel));
+            let runs: Vec<Run> = runs.take(most).collect();
             let far = runs.iter().filter(|r| r.outcome == "far").count() as u64;
             *found = (runs.len() as u64, census::bears_out(panel.said, &runs, rules), far);
         }
-        Cell::of(alpha, beta, found)
+        Cell::of(at[0], at[1], found)
     };
     // A panel without a run says nothing, and its cell would look better than it is.
     pairs.into_iter().map(cell).filter(Cell::is_whole).collect()
@@ -80,9 +103,15 @@ pub struct Candidate {
     pub cell: Cell,
     /// Likelihood over that of the printed numbers.
     pub bayes_factor: f64,
-    /// Probability if the printed numbers are right with probability `PRIORS[0]` before, and the other candidates share the rest evenly ...
-    pub posterior: [f64; 2],
+    /// Central interval of that ratio under the panels' posteriors.
+    pub factor_interval: [f64; 2],
+    /// Probability if the printed numbers are right with probability `PRIORS[0]` before (`PRIORS[1]`), and the other candidates share the rest
+    /// evenly: from the predictive likelihoods, with the central interval under the panels' posteriors.
+    pub posterior: [Probability; 2],
 }
+
+/// Draws from the panels' posteriors.
+const DRAWS: usize = 20_000;
 
 /// Probabilities, before any run, that the printed numbers are right.
 pub const PRIORS: [f64; 2] = [0.5, 0.99];
@@ -91,7 +120,7 @@ pub const PRIORS: [f64; 2] = [0.5, 0.99];
 const PRINTED: [f64; 2] = [1e-3, 1e-5];
 
 /// The candidates among the cells: the printed pair, and those in which one exponent has another digit. `None` without the printed pair.
-pub fn candidates(cells: &[Cell]) -> Option<Vec<Candidate>> {
+pub fn candidates(cells: &[Cell], rules: &Rules) -> Option<Vec<Candidate>> {
     let is_power = |v: f64| {
         let e = log10(v);
         (e - e.round()).abs() < 1e-9 && (-9.5..0.5).contains(&e)
@@ -104,17 +133,37 @@ pub fn candidates(cells: &[Cell]) -> Option<Vec<Candidate>> {
     }));
     let factors: Vec<f64> = chosen.iter().map(|c| exp10(c.log_likelihood - printed.log_likelihood)).collect();
     let others = (chosen.len() - 1).max(1) as f64;
-    let posterior = |prior: f64| -> Vec<f64> {
+    let posterior = |prior: f64, factors: &[f64]| -> Vec<f64> {
         let weight = |i: usize| if i == 0 { prior } else { (1.0 - prior) / others };
         let weights: Vec<f64> = factors.iter().enumerate().map(|(i, f)| f * weight(i)).collect();
         let sum: f64 = weights.iter().sum();
         weights.into_iter().map(|w| w / sum).collect()
     };
-    let posteriors = PRIORS.map(posterior);
+    let means = PRIORS.map(|prior| posterior(prior, &factors));
+    let mut random = RandomStream::new(rules.permutation_seed, 2);
+    let (mut drawn, mut drawn_posteriors) =
+        (vec![Vec::new(); chosen.len()], vec![[Vec::new(), Vec::new()]; chosen.len()]);
+    for _ in 0..DRAWS {
+        let logs: Vec<f64> = chosen.iter().map(|c| c.draw(&mut random)).collect();
+        let factors: Vec<f64> = logs.iter().map(|l| exp10(l - logs[0])).collect();
+        let posteriors = PRIORS.map(|prior| posterior(prior, &factors));
+        for (i, factor) in factors.iter().enumerate() {
+            drawn[i].push(*factor);
+            for (k, all) in posteriors.iter().enumerate() {
+                drawn_posteriors[i][k].push(all[i]);
+            }
+        }
+    }
+    let central = |values: &mut Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        let tail = 0.5 * (1.0 - rules.confidence);
+        [tail, 1.0 - tail].map(|q| values[((values.len() - 1) as f64 * q) as usize])
+    };
     let candidate = |(i, cell): (usize, Cell)| Candidate {
         cell,
         bayes_factor: factors[i],
-        posterior: [posteriors[0][i], posteriors[1][i]],
+        factor_interval: central(&mut drawn[i]),
+        posterior: [0, 1].map(|k| Probability { mean: means[k][i], interval: central(&mut drawn_posteriors[i][k]) }),
     };
     Some(chosen.into_iter().enumerate().map(candidate).collect())
 }
@@ -143,17 +192,74 @@ pub fn cell_table(cells: &[Cell]) -> Table {
 
 /// Candidates as a table.
 pub fn candidate_table(candidates: &[Candidate]) -> Table {
-    let names = ["alpha", "beta", "log10_likelihood", "bayes_factor", "posterior_prior_0.5", "posterior_prior_0.99"];
-    let mut table = Table::new("candidates", names.map(Column::numbers));
+    let mut columns = vec![Column::numbers("alpha"), Column::numbers("beta"), Column::integers("fewest_runs")];
+    let names = ["log10_likelihood", "bayes_factor", "bayes_factor_low", "bayes_factor_high"];
+    columns.extend(names.map(Column::numbers));
+    for prior in PRIORS {
+        columns.extend(["", "_low", "_high"].map(|end| Column::numbers(&format!("posterior_prior_{prior}{end}"))));
+    }
+    let mut table = Table::new("candidates", columns);
     for c in candidates {
-        let row = [c.cell.alpha, c.cell.beta, c.cell.log_likelihood, c.bayes_factor, c.posterior[0], c.posterior[1]];
-        table.push(row.map(Entry::Number));
+        let fewest = c.cell.runs.iter().min().copied().unwrap_or(0);
+        let head: [Entry; 3] = [c.cell.alpha.into(), c.cell.beta.into(), Entry::Integer(fewest as i64)];
+        let numbers = [c.cell.log_likelihood, c.bayes_factor, c.factor_interval[0], c.factor_interval[1]];
+        let posteriors = c.posterior.iter().flat_map(|p| [p.mean, p.interval[0], p.interval[1]]);
+        table.push(head.into_iter().chain(numbers.into_iter().chain(posteriors).map(Entry::Number)));
     }
     table
 }
 
+/// Stands before README's text about the audit.
+pub const BEGIN: &str = "<!-- audit: what figures/audit says; tests/census.rs compares it; do not edit -->";
+/// Stands after it.
+pub const END: &str = "<!-- end of audit -->";
+
+/// README's text about the candidates: `equal` with as many runs of each panel for all of them, `whole` with all runs of the printed and the
+/// reconstructed numbers.
+pub fn text(equal: &[Candidate], whole: &[Candidate]) -> String {
+    use std::fmt::Write as _;
+    let number = |v: f64| match v {
+        _ if (0.095..9.5).contains(&v) => format!("{v:.1}"),
+        _ if (9.5..9999.5).contains(&v) => format!("{v:.0}"),
+        _ => format!("{v:.0e}"),
+    };
+    let ratio = |c: &Candidate| {
+        let [low, high] = c.factor_interval.map(number);
+        format!("{} [{low}, {high}]", number(c.bayes_factor))
+    };
+    let mut text = String::from(
+        "| α | β | runs a panel | ratio to printed | posterior, printed 50 % before | posterior, printed 99 % before |\n|---|---|---|---|---|---|",
+    );
+    for c in equal {
+        let posterior = c.posterior.map(|p| census::percent(p.mean, p.interval));
+        let runs = c.cell.runs.iter().min().copied().unwrap_or(0);
+        // Writing to a String cannot fail.
+        let _ = write!(
+            text,
+            "\n| {:e} | {:e} | {runs} | {} | {} | {} |",
+            c.cell.alpha,
+            c.cell.beta,
+            ratio(c),
+            posterior[0],
+            posterior[1]
+        );
+    }
+    for c in whole.iter().skip(1) {
+        let runs = |f: fn(std::slice::Iter<'_, u64>) -> Option<&u64>| f(c.cell.runs.iter()).copied().unwrap_or(0);
+        let _ = write!(
+            text,
+            "\n\nFrom all {} to {} runs a panel of the printed and the reconstructed numbers their ratio is {}.",
+            runs(|n| n.min()),
+            runs(|n| n.max()),
+            ratio(c)
+        );
+    }
+    text
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::claims::claims;
     use super::*;
 
     fn cell(alpha: f64, beta: f64, hits: u64) -> Cell {
@@ -164,16 +270,41 @@ mod tests {
     fn candidates_differ_from_the_printed_numbers_in_one_exponent() {
         let cells =
             [cell(1e-3, 1e-5, 0), cell(1e-1, 1e-5, 9), cell(1e-3, 1e-4, 0), cell(1e-1, 1e-4, 9), cell(3e-3, 1e-5, 9)];
-        let found = candidates(&cells).unwrap();
+        let rules = &claims().rules;
+        let found = candidates(&cells, rules).unwrap();
         let pairs: Vec<[f64; 2]> = found.iter().map(|c| [c.cell.alpha, c.cell.beta]).collect();
         assert_eq!(pairs, [[1e-3, 1e-5], [1e-1, 1e-5], [1e-3, 1e-4]]);
         // (9.5/10)^6 against (0.5/10)^6.
         assert!((found[1].bayes_factor / 19_f64.powi(6) - 1.0).abs() < 1e-9);
         for k in 0..2 {
-            let sum: f64 = found.iter().map(|c| c.posterior[k]).sum();
+            let sum: f64 = found.iter().map(|c| c.posterior[k].mean).sum();
             assert!((sum - 1.0).abs() < 1e-12);
         }
-        assert!(found[1].posterior[1] > 0.999 && found[1].posterior[0] > found[1].posterior[1]);
-        assert_eq!(candidates(&cells[1..]), None);
+        assert!(found[1].posterior[1].mean > 0.999 && found[1].posterior[0].mean > found[1].posterior[1].mean);
+        assert_eq!(candidates(&cells[1..], rules), None);
+        // The printed numbers' own ratio is 1 in every draw; that of nine hits of nine has an interval around it.
+        assert_eq!(found[0].factor_interval, [1.0, 1.0]);
+        let [low, high] = found[1].factor_interval;
+        assert!(1.0 < low && low < found[1].bayes_factor && found[1].bayes_factor < high, "{low} {high}");
+    }
+
+    #[test]
+    fn a_table_that_varies_one_number_has_the_printed_value_of_the_other() {
+        let sweep = |columns: &[(&str, f64)]| {
+            let names = columns.iter().map(|(name, _)| Column::numbers(name)).chain([Column::words("outcome")]);
+            let mut table =
+                Table::new("sweep", names.chain([Column::integers("period"), Column::numbers("captured_at")]));
+            let head: Vec<Entry> = columns.iter().map(|(_, v)| Entry::Number(*v)).collect();
+            table.push(head.into_iter().chain(["period-1".into(), Entry::Integer(1), Entry::Number(10.0)]));
+            table
+        };
+        let of = |axis: (&str, f64), panel: &Panel| sweep(&[axis, (panel.column, panel.value)]);
+        let all = |axis, range: std::ops::Range<usize>| PANELS[range].iter().map(|p| of(axis, p)).collect::<Vec<_>>();
+        for (axis, expected) in [(("params.alpha", 0.1), [0.1, 1e-5]), (("params.beta", 1e-4), [1e-3, 1e-4])] {
+            let found = cells(&all(axis, 0..3), &all(axis, 3..6), usize::MAX, &claims().rules);
+            assert_eq!(found.len(), 1);
+            assert_eq!(([found[0].alpha, found[0].beta], found[0].runs), (expected, [1; 6]));
+            assert_eq!(found[0].hits, [1, 0, 0, 0, 1, 1]);
+        }
     }
 }

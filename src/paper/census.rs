@@ -10,6 +10,7 @@ use super::claims::Rules;
 use crate::analyse::counts::{Homogeneity, goodman, homogeneity, wilson};
 use crate::job::table::{Column, Entry, Table};
 use crate::num::random::RandomStream;
+use crate::record::Manifest;
 
 /// What a run is at a given time, as a reader of its section would say.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -276,7 +277,7 @@ pub fn together(panels: &[PanelShare], rules: &Rules) -> Together {
 }
 
 /// A draw from a Dirichlet distribution: gamma variates over their sum.
-fn dirichlet<const N: usize>(weights: &[f64; N], random: &mut RandomStream) -> [f64; N] {
+pub(super) fn dirichlet<const N: usize>(weights: &[f64; N], random: &mut RandomStream) -> [f64; N] {
     let variates = weights.map(|w| gamma(w, random));
     let sum: f64 = variates.iter().sum();
     variates.map(|v| v / sum)
@@ -318,6 +319,8 @@ pub fn panel_table(shares: &[PanelShare]) -> Table {
     for at in ["shown", "end"] {
         columns.extend(Kind::ALL.map(|k| Column::integers(&format!("{} at {at}", k.words()).replace(' ', "_"))));
     }
+    let bounds = |k: Kind| ["low", "high"].map(|e| format!("{} at end {e}", k.words()).replace(' ', "_"));
+    columns.extend(Kind::ALL.into_iter().flat_map(bounds).map(|name| Column::numbers(&name)));
     columns.extend(["capture_q1", "capture_median", "capture_q3"].map(Column::numbers));
     let mut table = Table::new("census", columns);
     for s in shares {
@@ -326,6 +329,7 @@ pub fn panel_table(shares: &[PanelShare]) -> Table {
             vec![s.reading.word().into(), s.panel.as_str().into(), s.said.words().into(), whole(s.runs), whole(s.hits)];
         row.extend([s.hits as f64 / s.runs as f64, s.interval[0], s.interval[1]].map(Entry::Number));
         row.extend(s.at_shown.iter().chain(&s.at_end).map(|v| whole(*v)));
+        row.extend(s.intervals_at_end.iter().flatten().map(|v| Entry::Number(*v)));
         row.extend(s.capture_quartiles.map(Entry::Number));
         table.push(row);
     }
@@ -358,10 +362,23 @@ pub struct Data {
     pub fig7: Table,
     /// Fig. 8's sigmas.
     pub fig8: Table,
-    /// Fig. 7(iii) by other methods.
-    pub methods: Table,
-    /// Fig. 7(iii) by one method at other tolerances.
-    pub tolerances: Table,
+    /// Fig. 7(iii) by other methods, in any number of parts.
+    pub methods: Vec<Table>,
+    /// Fig. 7(iii) by one method at other tolerances, in any number of parts.
+    pub tolerances: Vec<Table>,
+    /// Fig. 7(iii) to a shorter time, with small and with ordinary local errors.
+    pub shorter: Vec<Shorter>,
+}
+
+/// Runs of fig. 7(iii) that were not followed to its end.
+#[derive(Clone, Debug)]
+pub struct Shorter {
+    /// How they were computed.
+    pub name: &'static str,
+    /// How far.
+    pub end: f64,
+    /// The rows.
+    pub table: Table,
 }
 
 /// What the census says in a reading.
@@ -379,36 +396,82 @@ pub struct Found {
     pub together: [Together; 2],
     /// Kinds at the end by method and by tolerance, with their names.
     pub ways: Vec<(String, [u64; 6])>,
+    /// Kinds of runs that were not followed to the end: how they were computed, until when, how many.
+    pub shorter: Vec<(String, f64, [u64; 6])>,
+    /// What other limits would make of each panel's claim, in the order of [`LIMITS`].
+    pub influence: Vec<[u64; 5]>,
 }
 
 /// Names of the tests in [`Found::tests`].
-pub const TESTS: [&str; 5] =
-    ["intervals 20, 40, 100", "sigma 0.01, 0.1, 0.13", "all six panels", "methods", "tolerances"];
+pub const TESTS: [&str; 7] = [
+    "intervals 20, 40, 100",
+    "sigma 0.01, 0.1, 0.13",
+    "all six panels",
+    "methods",
+    "tolerances",
+    "tolerances below 1e-6",
+    "ordinary and small local errors",
+];
+
+/// Limits by which a claim may be judged: the rules', and others.
+pub const LIMITS: [&str; 5] =
+    ["as ruled", "periodic from 5e4 on", "periodic from 1.5e5 on", "chaos until 1e5 is enough", "undecided is chaos"];
+
+/// How many of a panel's runs bear its sentence out under each of [`LIMITS`].
+pub fn influence(said: Said, runs: &[Run], rules: &Rules) -> [u64; 5] {
+    let from = |shown_from: f64| bears_out(said, runs, &Rules { shown_from, ..*rules });
+    let undecided = if said == Said::Chaos { tally(runs, rules.end)[5] } else { 0 };
+    [
+        bears_out(said, runs, rules),
+        from(0.5 * rules.shown_from),
+        from(1.5 * rules.shown_from),
+        bears_out(said, runs, &Rules { end: rules.shown_from, ..*rules }),
+        bears_out(said, runs, rules) + undecided,
+    ]
+}
 
 impl Found {
     /// Goes through the data.
     pub fn of(reading: Reading, data: &Data, rules: &Rules) -> Self {
         let alpha = Entry::Number(reading.caricature().alpha);
-        let (mut shares, mut captured, mut groups) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut shares, mut captured, mut groups, mut influences) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (i, panel) in PANELS.iter().enumerate() {
             let chosen = [("params.alpha", alpha.clone()), (panel.column, Entry::Number(panel.value))];
             let runs = runs([&data.fig7, &data.fig8][i / 3], &chosen);
             shares.push(share(panel, reading, &runs, rules));
             captured.push(captures(&runs, |_| true));
+            influences.push(influence(panel.said, &runs, rules));
             groups.push(runs);
         }
         let chosen = [("params.alpha", alpha)];
-        let mut by_method = grouped(&data.methods, "method", &chosen);
+        let in_parts = |parts: &[Table], column: &str| -> Vec<(Entry, Vec<Run>)> {
+            let groups = parts.iter().flat_map(|part| grouped(part, column, &chosen));
+            let mut groups: Vec<_> = groups.filter(|(_, runs)| !runs.is_empty()).collect();
+            if column == "tolerance" {
+                groups.sort_by(|a, b| b.0.value().total_cmp(&a.0.value()));
+            }
+            groups
+        };
+        let mut by_method = in_parts(&data.methods, "method");
         by_method.insert(0, ("lsoda".into(), groups[2].clone()));
-        let by_tolerance = grouped(&data.tolerances, "tolerance", &chosen);
+        let by_tolerance = in_parts(&data.tolerances, "tolerance");
+        let below: Vec<_> = by_tolerance.iter().filter(|(tolerance, _)| tolerance.value() < 1e-6).cloned().collect();
+        let shorter: Vec<(&Shorter, Vec<Run>)> =
+            data.shorter.iter().map(|s| (s, runs(&s.table, &chosen))).filter(|(_, runs)| !runs.is_empty()).collect();
         let only = |g: &[(Entry, Vec<Run>)]| g.iter().map(|(_, runs)| runs.clone()).collect::<Vec<_>>();
-        let between =
-            [groups[..3].to_vec(), groups[3..].to_vec(), groups.clone(), only(&by_method), only(&by_tolerance)];
+        let between = [
+            groups[..3].to_vec(),
+            groups[3..].to_vec(),
+            groups.clone(),
+            only(&by_method),
+            only(&by_tolerance),
+            only(&below),
+            shorter.iter().map(|(_, runs)| runs.clone()).collect(),
+        ];
         let tests = TESTS.into_iter().zip(between).map(|(name, groups)| (name, same_odds(&groups, rules))).collect();
         let ways = by_method
             .iter()
             .chain(&by_tolerance)
-            .filter(|(_, runs)| !runs.is_empty())
             .map(|(value, runs)| {
                 let name = match value {
                     Entry::Word(w) => w.clone(),
@@ -417,11 +480,12 @@ impl Found {
                 (name, tally(runs, rules.end))
             })
             .collect();
+        let shorter = shorter.into_iter().map(|(s, runs)| (s.name.to_owned(), s.end, tally(&runs, s.end))).collect();
         let together = [together(&shares[..3], rules), together(&shares[3..], rules)];
-        Self { reading, shares, captures: captured, tests, together, ways }
+        Self { reading, shares, captures: captured, tests, together, ways, shorter, influence: influences }
     }
 
-    /// As tables: panels, tests and figures together, capture curves, methods and tolerances.
+    /// As tables: panels, tests and figures together, capture curves, methods and tolerances, shorter runs.
     pub fn tables(&self) -> Vec<Table> {
         let mut curves =
             Table::new("captures", [Column::words("panel"), Column::numbers("t"), Column::numbers("share")]);
@@ -434,10 +498,13 @@ impl Found {
         let mut found = Table::new("tests", [Column::words("what")].into_iter().chain(names));
         let blank = f64::NAN;
         for (what, h) in &self.tests {
+            // Without a second group or a second outcome there is nothing to test.
+            let [permuted, asymptotic] =
+                [h.p_permutation, h.p_asymptotic].map(|p| if h.freedom > 0 { p } else { blank });
             found.push(
                 [Entry::from(*what)]
                     .into_iter()
-                    .chain([h.chi_square, blank, blank, h.p_permutation, h.p_asymptotic].map(Entry::Number)),
+                    .chain([h.chi_square, blank, blank, permuted, asymptotic].map(Entry::Number)),
             );
         }
         for (figure, together) in ["7", "8"].iter().zip(&self.together) {
@@ -454,12 +521,18 @@ impl Found {
                 );
             }
         }
-        let kinds = Kind::ALL.map(|k| Column::integers(&k.words().replace(' ', "_")));
-        let mut ways = Table::new("ways", [Column::words("group")].into_iter().chain(kinds));
+        let kinds = || Kind::ALL.map(|k| Column::integers(&k.words().replace(' ', "_")));
+        let mut ways = Table::new("ways", [Column::words("group")].into_iter().chain(kinds()));
         for (name, counts) in &self.ways {
             ways.push([Entry::Word(name.clone())].into_iter().chain(counts.map(|n| Entry::Integer(n as i64))));
         }
-        vec![panel_table(&self.shares), found, curves, ways]
+        let mut shorter =
+            Table::new("shorter", [Column::words("group"), Column::numbers("t")].into_iter().chain(kinds()));
+        for (name, end, counts) in &self.shorter {
+            let head = [Entry::Word(name.clone()), Entry::Number(*end)];
+            shorter.push(head.into_iter().chain(counts.map(|n| Entry::Integer(n as i64))));
+        }
+        vec![panel_table(&self.shares), found, curves, ways, shorter]
     }
 }
 
@@ -468,12 +541,18 @@ pub const BEGIN: &str = "<!-- census: what figures/census says; tests/census.rs 
 /// Stands after it.
 pub const END: &str = "<!-- end of census -->";
 
-/// "p = 0.012", or "p < 0.001".
+/// "p = 0.012", or "p < 0.001"; not-a-number where there was nothing to test.
 pub fn p_in_words(p: f64) -> String {
-    if p < 0.001 { "p < 0.001".to_owned() } else { format!("p = {p:.3}") }
+    if p.is_nan() {
+        "all alike".to_owned()
+    } else if p < 0.001 {
+        "p < 0.001".to_owned()
+    } else {
+        format!("p = {p:.3}")
+    }
 }
 
-fn percent(share: f64, interval: [f64; 2]) -> String {
+pub(super) fn percent(share: f64, interval: [f64; 2]) -> String {
     format!("{:.0} % [{:.0}, {:.0}]", 100.0 * share, 100.0 * interval[0], 100.0 * interval[1])
 }
 
@@ -489,7 +568,13 @@ pub fn text(found: &[Found; 2]) -> String {
             // Not captured, and not shown to be chaotic: whether they count is said, not decided.
             let open = if s.said == Said::Chaos { s.at_end[5] } else { 0 };
             let more = if open > 0 { format!(", {open} more undecided") } else { String::new() };
-            format!("{}, {} of {}{more}", percent(s.hits as f64 / s.runs.max(1) as f64, s.interval), s.hits, s.runs)
+            let single = match single_run(s.panel.as_str(), s.reading) {
+                Some(true) => "; the figure's run agrees",
+                Some(false) => "; the figure's run differs",
+                None => "",
+            };
+            let share = percent(s.hits as f64 / s.runs.max(1) as f64, s.interval);
+            format!("{share}, {} of {}{more}{single}", s.hits, s.runs)
         };
         let _ = writeln!(text, "| {} | {} | {} | {} |", a.panel, a.said.words(), cell(a), cell(b));
     }
@@ -506,13 +591,76 @@ pub fn text(found: &[Found; 2]) -> String {
         let words: Vec<String> = one.shares.iter().map(|s| format!("{}: {}", s.panel, in_words(&s.at_end))).collect();
         let _ = writeln!(text, "Where runs end, {} reading: {}.", one.reading.word(), words.join("; "));
     }
-    let tests: Vec<String> = reconstructed
-        .tests
-        .iter()
-        .filter(|(_, h)| h.freedom > 0)
-        .map(|(name, h)| format!("{name} {}", p_in_words(h.p_permutation)))
-        .collect();
-    let _ = write!(text, "\nThe same odds (permutation tests, reconstructed reading): {}.", tests.join("; "));
+    let listed = |ways: &[(String, [u64; 6])]| -> String {
+        ways.iter().map(|(name, n)| format!("{name}: {}", in_words(n))).collect::<Vec<_>>().join("; ")
+    };
+    for one in found {
+        let _ = writeln!(
+            text,
+            "Interval 100 by method, and by Dormand-Prince at other tolerances, {} reading: {}.",
+            one.reading.word(),
+            listed(&one.ways)
+        );
+    }
+    for one in found {
+        for (name, end, n) in &one.shorter {
+            let of = n.iter().sum();
+            let captured = of - n[3] - n[5];
+            let share = percent(captured as f64 / of as f64, wilson(captured, of, 0.95));
+            let reading = one.reading.word();
+            let _ = writeln!(text, "Captured by t = {end}, {name}, {reading} reading: {share} ({}).", in_words(n));
+        }
+    }
+    for one in found {
+        let tests: Vec<String> = one
+            .tests
+            .iter()
+            .filter(|(_, h)| h.freedom > 0)
+            .map(|(name, h)| format!("{name} {}", p_in_words(h.p_permutation)))
+            .collect();
+        let _ = write!(
+            text,
+            "\nThe same odds (permutation tests), {} reading: {}.",
+            one.reading.word(),
+            if tests.is_empty() { "one outcome only".to_owned() } else { tests.join("; ") }
+        );
+    }
+    text
+}
+
+/// Whether the one run that a panel shows bears the paper out, by the committed reference of its figure.
+fn single_run(panel: &str, reading: Reading) -> Option<bool> {
+    let (figure, label) = panel.trim_end_matches(')').split_once('(')?;
+    let id = format!("fig{figure}");
+    let manifest = Manifest::parse(super::figures::reference(&id)?, &id).ok()?;
+    let picture = manifest.picture(&format!("{id}-{}", reading.word()))?;
+    Some(picture.panels.iter().find(|p| p.label == label)?.verdict.as_ref()?.agrees)
+}
+
+/// Stands before the text about other limits in docs/sweeps.md.
+pub const LIMITS_BEGIN: &str = "<!-- limits: what figures/census says; tests/census.rs compares it; do not edit -->";
+/// Stands after it.
+pub const LIMITS_END: &str = "<!-- end of limits -->";
+
+/// What other limits would make of the claims, as a table.
+pub fn limits_text(found: &[Found; 2]) -> String {
+    use std::fmt::Write as _;
+    let mut text = format!("| panel | reading | runs | {} |\n|---|---|---|{}", LIMITS.join(" | "), "---|".repeat(5));
+    for one in found {
+        for (share, counts) in one.shares.iter().zip(&one.influence) {
+            let counts: Vec<String> = counts.iter().map(u64::to_string).collect();
+            // Writing to a String cannot fail.
+            let _ = write!(
+                text,
+                "\n| {} {} | {} | {} | {} |",
+                share.panel,
+                share.said.words(),
+                one.reading.word(),
+                share.runs,
+                counts.join(" | ")
+            );
+        }
+    }
     text
 }
 

@@ -24,7 +24,12 @@ pub fn sheet(picture: &Picture, recordings: &[Recording], spec: &Hash, data: &Ha
         sheet = sheet.footer(line);
     }
     match picture.view {
-        View::Section { horizontal, vertical } => section_panels(sheet, picture, recordings, [horizontal, vertical]),
+        View::Section { horizontal, vertical } => {
+            section_panels(sheet, picture, recordings, [horizontal, vertical], Shown::Whole)
+        }
+        View::LateSection { horizontal, vertical } => {
+            section_panels(sheet, picture, recordings, [horizontal, vertical], Shown::Late)
+        }
         View::Space { camera } => space_panels(sheet, picture, recordings, &camera),
         View::Study(_) => sheet,
     }
@@ -75,9 +80,25 @@ fn label(picture: &Picture, panel: &Panel) -> String {
     if picture.panels.len() > 1 { format!("({})", panel.label) } else { String::new() }
 }
 
+/// How much of a section is drawn.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Shown {
+    /// Both halves of the time.
+    Whole,
+    /// The later half.
+    Late,
+}
+
 /// Sections: the same axes in every panel, so that sizes can be compared.
-fn section_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording], axes: [usize; 2]) -> Sheet {
-    let all = || recordings.iter().flat_map(|r| crossings(&r.data));
+fn section_panels(
+    mut sheet: Sheet,
+    picture: &Picture,
+    recordings: &[Recording],
+    axes: [usize; 2],
+    shown: Shown,
+) -> Sheet {
+    let half = 0.5 * picture.panels[0].run.t_end;
+    let all = || recordings.iter().flat_map(|r| crossings(&r.data)).filter(|c| shown == Shown::Whole || c.t > half);
     let names = picture.panels[0].run.system.coordinates();
     let axis = |i: usize| Axis::covering(format!("*{}*", greek(names[axes[i]])), all().map(|c| c.x[axes[i]]));
     for (panel, recording) in picture.panels.iter().zip(recordings) {
@@ -85,15 +106,17 @@ fn section_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording],
         let points = |late: bool| {
             crossings(&recording.data).iter().filter(|c| (c.t > half) == late).map(|c| axes.map(|i| c.x[i])).collect()
         };
-        let chart = PlanePanel::new(axis(0), axis(1))
-            .dots(points(false), DotStyle::early())
-            .dots(points(true), DotStyle::late());
-        sheet = sheet.panel(label(picture, panel), panel.title.as_str(), chart);
+        let mut chart = PlanePanel::new(axis(0), axis(1));
+        if shown == Shown::Whole {
+            chart = chart.dots(points(false), DotStyle::early());
+        }
+        sheet = sheet.panel(label(picture, panel), panel.title.as_str(), chart.dots(points(true), DotStyle::late()));
     }
-    let half = wording::number(0.5 * picture.panels[0].run.t_end);
-    sheet
-        .legend(LegendEntry::new(LegendKey::Dots(DotStyle::early()), format!("*t* ≤ {half}")))
-        .legend(LegendEntry::new(LegendKey::Dots(DotStyle::late()), format!("*t* > {half}")))
+    let half = wording::number(half);
+    if shown == Shown::Whole {
+        sheet = sheet.legend(LegendEntry::new(LegendKey::Dots(DotStyle::early()), format!("*t* ≤ {half}")));
+    }
+    sheet.legend(LegendEntry::new(LegendKey::Dots(DotStyle::late()), format!("*t* > {half}")))
 }
 
 /// Paths in space: the same box in every panel.
@@ -125,10 +148,18 @@ fn space_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording], c
         if !exits.is_empty() {
             chart = chart.markers(exits, EXIT);
         }
-        if let Some(point) = surface::singularity(&panel.run.system, &ranges) {
+        let singularity = surface::singularity(&panel.run.system, &ranges);
+        if let Some(point) = singularity {
             chart = chart.markers(vec![turn(point)], SINGULARITY);
         }
         sheet = sheet.panel(label(picture, panel), panel.title.as_str(), chart);
+        // At the size of the whole the exits lie under the two-fold's dot.
+        if let (Some(point), [_]) = (singularity, picture.panels.as_slice())
+            && let Some(chart) = passage(panel, recording, curves, point, [order[0], order[1]], &ranges)
+        {
+            sheet.columns = 2;
+            sheet = sheet.panel("", "the passage, nearer, seen along the normal of the surface", chart);
+        }
     }
     let sheet = region_legend(sheet);
     match recordings.first().map(|r| &r.data) {
@@ -137,12 +168,59 @@ fn space_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording], c
             .legend(LegendEntry::new(LegendKey::Marker(EXIT), "exit")),
         Some(Data::Funnel { futures, .. }) => sheet
             .footer(returns(futures))
+            .legend(LegendEntry::new(LegendKey::Marker(EXIT), "exit"))
             .legend(LegendEntry::new(LegendKey::Line(APPROACH), "the one way in"))
             .legend(LegendEntry::new(LegendKey::Line(TO_PLUS), "ways out to *h* > 0"))
             .legend(LegendEntry::new(LegendKey::Line(TO_MINUS), "ways out to *h* < 0")),
         _ => sheet,
     }
 }
+
+/// The switching surface around the two-fold at `centre`, over the coordinates `axes`: what slides there, where it leaves, and the flights over
+/// it. So wide that half of the exits lie well inside; nothing if there is no exit.
+fn passage(
+    panel: &Panel,
+    recording: &Recording,
+    curves: &[Curve],
+    centre: [f64; 3],
+    axes: [usize; 2],
+    ranges: &[(f64, f64); 3],
+) -> Option<PlanePanel> {
+    let exits: Vec<[f64; 2]> = exits(&recording.data).into_iter().map(|x| axes.map(|i| x[i])).collect();
+    let centre = axes.map(|i| centre[i]);
+    let distance = |p: &[f64; 2]| (p[0] - centre[0]).abs().max((p[1] - centre[1]).abs());
+    let mut distances: Vec<f64> = exits.iter().map(distance).collect();
+    distances.sort_by(f64::total_cmp);
+    let reach = 2.0 * distances.get(distances.len() / 2)?;
+    if reach.is_nan() || reach <= 0.0 {
+        return None;
+    }
+    let mut window = *ranges;
+    for (k, i) in axes.into_iter().enumerate() {
+        window[i] = (centre[k] - reach, centre[k] + reach);
+    }
+    let names = panel.run.system.coordinates();
+    let axis = |k: usize| {
+        let (low, high) = window[axes[k]];
+        Axis::linear(format!("*{}*", greek(names[axes[k]])), low, high)
+    };
+    let mut chart = PlanePanel::new(axis(0), axis(1)).equal();
+    for patch in surface::patches(&panel.run.system, &window, PASSAGE_CELLS) {
+        chart = chart.area(patch.corners.iter().map(|x| axes.map(|i| x[i])).collect(), patch.colour);
+    }
+    for curve in curves {
+        let seen: Vec<[f64; 2]> = curve.points.iter().map(|x| axes.map(|i| x[i])).collect();
+        // Only what lies in the window: long orbits would weigh down the file.
+        for part in seen.split(|p| distance(p) > reach).filter(|part| part.len() > 1) {
+            chart = chart.line(part.to_vec(), curve.style);
+        }
+    }
+    let inside: Vec<[f64; 2]> = exits.into_iter().filter(|p| distance(p) <= reach).collect();
+    Some(chart.markers(inside, EXIT).markers(vec![centre], SINGULARITY))
+}
+
+/// Cells of the switching surface along each side of the nearer view.
+const PASSAGE_CELLS: usize = 12;
 
 /// How many futures came back to the two-fold.
 fn returns(futures: &[Future]) -> String {
@@ -187,13 +265,14 @@ fn curves(data: &Data) -> Vec<Curve> {
 
 /// Where a motion leaves repelling sliding.
 fn exits(data: &Data) -> Vec<[f64; 3]> {
+    let of = |motion: &Motion| -> Vec<[f64; 3]> {
+        let leaves = |kind: &EventKind| matches!(kind, EventKind::Exit { .. } | EventKind::ExitAtBoundary { .. });
+        motion.events.iter().filter(|e| leaves(&e.kind)).map(|e| e.state.into()).collect()
+    };
     match data {
-        Data::Motion(motion) => motion
-            .events
-            .iter()
-            .filter(|e| matches!(e.kind, EventKind::Exit { .. } | EventKind::ExitAtBoundary { .. }))
-            .map(|e| e.state.into())
-            .collect(),
+        Data::Motion(motion) => of(motion),
+        // Of a future the first one: later ones are other visits.
+        Data::Funnel { futures, .. } => futures.iter().filter_map(|f| of(&f.motion).into_iter().next()).collect(),
         _ => Vec::new(),
     }
 }

@@ -48,3 +48,13 @@ figures! {
     audit: "../../figures/audit/figure.rs", "../../figures/audit/expected.json";
     basin: "../../figures/basin/figure.rs", "../../figures/basin/expected.json";
 }
+
+/// The sweeps whose rows are committed beside a figure: name and content of each Parquet file. Empty for figures that compute all they show.
+pub fn data(id: &str) -> &'static [(&'static str, &'static [u8])] {
+    match id {
+        "census" => census::DATA,
+        "audit" => audit::DATA,
+        "basin" => basin::DATA,
+        _ => &[],
+    }
+}

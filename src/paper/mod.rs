@@ -90,6 +90,13 @@ pub enum View {
         /// Index of the vertical coordinate.
         vertical: usize,
     },
+    /// The later half of such a section alone, as the paper shows it.
+    LateSection {
+        /// Index of the horizontal coordinate.
+        horizontal: usize,
+        /// Index of the vertical coordinate.
+        vertical: usize,
+    },
     /// A path in space with the switching surface.
     Space {
         /// Camera and axes.
@@ -205,6 +212,8 @@ pub struct Alterations {
     pub t_end: Option<f64>,
     /// Another method.
     pub method: Option<Method>,
+    /// The later half of sections alone.
+    pub late: bool,
 }
 
 impl Picture {
@@ -246,6 +255,11 @@ impl Picture {
             let word = if t_end < original { "shortened" } else { "lengthened" };
             suffix += &format!("-{word}");
             self.alterations.push(format!("{word}: t = {t_end} instead of {original}"));
+        }
+        if let (true, View::Section { horizontal, vertical }) = (alterations.late, self.view) {
+            self.view = View::LateSection { horizontal, vertical };
+            suffix += "-late";
+            self.alterations.push("the later half alone".to_owned());
         }
         self.name += &suffix;
     }

@@ -1,16 +1,14 @@
 //! `twofold sweep`: one run with some of its numbers varied, and where each ends. The sweep itself is [`job::sweep`](crate::job::sweep).
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
 
-use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use crate::cli::flags::{RunFlags, Use};
-use crate::cli::progress::{Progress, Tally};
+use crate::cli::progress::Progress;
+use crate::cli::rows::{compute, journal_of};
 use crate::cli::speak::{complain, deliver, is_standard_output, try_delivery};
-use crate::cli::{CliError, Exit, in_pool};
+use crate::cli::{CliError, Exit};
 use crate::job::question;
 use crate::job::sweep::{Axis, Coordinate, Draws, Row, Rows, Shard, Sweep, Values};
 use crate::job::table::Entry;
@@ -159,13 +157,6 @@ fn sweep(arguments: &Arguments) -> Result<Sweep, CliError> {
     })
 }
 
-/// The name of the journal of a file.
-fn journal_of(file: &Path) -> PathBuf {
-    let mut name = file.as_os_str().to_owned();
-    name.push(".journal");
-    name.into()
-}
-
 fn computed(arguments: &Arguments) -> Result<Exit, CliError> {
     let sweep = sweep(arguments)?;
     let out = arguments.out.as_deref().filter(|f| !is_standard_output(f));
@@ -188,39 +179,7 @@ fn computed(arguments: &Arguments) -> Result<Exit, CliError> {
     if arguments.resume {
         progress.line(&format!("{} rows are there, {} to compute", rows.len(), pending.len()));
     }
-    let shared = Mutex::new((rows, &mut journal, None::<CliError>));
-    let tally = Tally::new(&progress, pending.len() as u64);
-    let next = AtomicUsize::new(0);
-    in_pool(arguments.threads, || {
-        (0..rayon::current_num_threads()).into_par_iter().with_max_len(1).for_each(|_| {
-            // Rows are taken in order, so that what is finished at any moment is a fair part of the whole.
-            while let Some(number) = pending.get(next.fetch_add(1, Ordering::Relaxed)) {
-                if progress.asked_to_stop().is_some() {
-                    break;
-                }
-                let Ok(row) = sweep.row(*number, &tally) else { break };
-                let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
-                let (rows, journal, trouble) = &mut *shared;
-                if trouble.is_some() {
-                    break;
-                }
-                if let Some(journal) = journal.as_mut()
-                    && let Err(error) = journal.append(&row.line())
-                {
-                    *trouble = Some(error.into());
-                    break;
-                }
-                tally.done(row.reason().is_some());
-                // A row of this number is not there: it was missing.
-                let _ = rows.insert(row);
-            }
-        });
-    })?;
-    tally.finish();
-    let (rows, _, trouble) = shared.into_inner().unwrap_or_else(PoisonError::into_inner);
-    if let Some(trouble) = trouble {
-        return Err(trouble);
-    }
+    let rows = compute(rows, &pending, journal.as_mut(), arguments.threads, &progress)?;
     let wanted = arguments.shard.rows(&sweep).count();
     let left = rows.missing(arguments.shard).len();
     if left > 0
