@@ -141,6 +141,11 @@ torture: ## kill the program at random moments and look for losses: make torture
 	@$(CARGO) build --release --locked --bin twofold
 	@scripts/torture.sh $(or $(KILLS),100)
 
+.PHONY: trap
+trap: ## check figures with every rounding function of the platform's mathematics replaced by an abort (Linux, needs a C compiler)
+	@$(CARGO) build --release --locked --bin twofold
+	@sh scripts/trap.sh target/release/twofold $(FIGURES)
+
 bench-peers: ## W1 and W2 of benches/README.md by the peers and by us, in turn: table, ratios, picture (needs g++, Boost, SUNDIALS, python3)
 	@sh benches/peers/run.sh
 
