@@ -97,7 +97,8 @@ fn the_package_holds_what_it_embeds() {
     let packed: Vec<&str> = list.lines().collect();
     // A file that is named by a macro and stands outside src.
     let mut embedded = 0;
-    for source in packed.iter().filter(|f| f.starts_with("src/") && f.ends_with(".rs")) {
+    let sources = |f: &&&str| (f.starts_with("src/") || f.starts_with("figures/")) && f.ends_with(".rs");
+    for source in packed.iter().filter(sources) {
         for quoted in text(source).split('"').skip(1).step_by(2).filter(|q| q.starts_with("../../") && !q.contains(' '))
         {
             let path = Path::new(source).parent().unwrap().join(quoted);
