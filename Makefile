@@ -127,7 +127,7 @@ wheel: ## the Python package as a wheel for this machine, into target/wheels (ne
 	@$(VENV)/bin/maturin build --release --locked --quiet --manifest-path python/Cargo.toml --out target/wheels
 
 package: ## the crate, packed, unpacked and built as the registry would have it; nothing is published
-	@$(CARGO) publish --dry-run --locked --registry crates-io
+	@$(CARGO) publish --dry-run --locked
 
 deny: ## licences, duplicates, sources and known defects of every dependency (needs cargo-deny: cargo install --locked cargo-deny)
 	@$(CARGO) deny --workspace check

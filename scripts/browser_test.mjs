@@ -363,6 +363,8 @@ async function test(browser, { page, forced }) {
   check('without script the tables and pictures are there, and no dead buttons', plain.buttons === 0 && plain.spaces === 0 && plain.rows > 0 && plain.images === pictures.length, JSON.stringify(plain));
   await browser.send('Emulation.setScriptExecutionDisabled', { value: false });
 
+  await browser.load(url);
+  await browser.scheme('dark');
   await print(browser);
   check('no errors in the console', complaints.length === 0, complaints.join(' | '));
   const foreign = requests.filter((u) => !u.startsWith('data:') && u !== url);
@@ -455,6 +457,12 @@ async function rules(browser, page) {
 // On paper no page ends with a heading. Looked at with pdftotext (Debian: poppler-utils), if it is there.
 async function print(browser) {
   const headings = await browser.run(() => [...document.querySelectorAll('h1,h2,h3,h4,summary,caption')].map((h) => h.innerText.replace(/\s+/g, ' ').trim()));
+  // Whoever reads in dark mode prints dark on white, too.
+  const ink = await browser.run(() => getComputedStyle(document.body).color.match(/\d+/g).slice(0, 3).reduce((sum, v) => sum + Number(v), 0), null);
+  await browser.send('Emulation.setEmulatedMedia', { media: 'print', features: [{ name: 'prefers-color-scheme', value: 'dark' }] });
+  const printed = await browser.run(() => getComputedStyle(document.body).color.match(/\d+/g).slice(0, 3).reduce((sum, v) => sum + Number(v), 0), null);
+  check('print is dark on white, also of a page read in dark mode', ink > 600 && printed < 150, `${ink} ${printed}`);
+  await browser.send('Emulation.setEmulatedMedia', { media: '', features: [{ name: 'prefers-color-scheme', value: 'dark' }] });
   const { data } = await browser.send('Page.printToPDF', { preferCSSPageSize: true, paperWidth: 8.27, paperHeight: 11.69 });
   const pdf = Buffer.from(data, 'base64');
   check('the page prints', pdf.length > 100000);
