@@ -127,7 +127,7 @@ wheel: ## the Python package as a wheel for this machine, into target/wheels (ne
 	@$(VENV)/bin/maturin build --release --locked --quiet --manifest-path python/Cargo.toml --out target/wheels
 
 package: ## the crate, packed, unpacked and built as the registry would have it; nothing is published
-	@$(CARGO) publish --dry-run --locked --registry crates-io
+	@$(CARGO) publish --dry-run --locked
 
 deny: ## licences, duplicates, sources and known defects of every dependency (needs cargo-deny: cargo install --locked cargo-deny)
 	@$(CARGO) deny --workspace check
@@ -140,6 +140,11 @@ lint: ## formatting, clippy and documentation, warnings denied
 torture: ## kill the program at random moments and look for losses: make torture KILLS=100
 	@$(CARGO) build --release --locked --bin twofold
 	@scripts/torture.sh $(or $(KILLS),100)
+
+.PHONY: trap
+trap: ## check figures with every rounding function of the platform's mathematics replaced by an abort (Linux, needs a C compiler)
+	@$(CARGO) build --release --locked --bin twofold
+	@sh scripts/trap.sh target/release/twofold $(FIGURES)
 
 bench-peers: ## W1 and W2 of benches/README.md by the peers and by us, in turn: table, ratios, picture (needs g++, Boost, SUNDIALS, python3)
 	@sh benches/peers/run.sh

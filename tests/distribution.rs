@@ -84,6 +84,22 @@ fn versions_agree() {
     assert!(text(".github/workflows/ci.yml").contains(&format!("rust-version: {channel}\n")));
 }
 
+/// Cargo reads every member of a workspace, also of those that it does not build: an image is built from sources that are whole.
+#[test]
+fn the_image_is_built_from_a_whole_workspace() {
+    if workflows().is_empty() {
+        return;
+    }
+    let manifest = text("Cargo.toml");
+    let members = manifest.lines().find_map(|l| l.strip_prefix("members = [")?.strip_suffix(']')).unwrap();
+    let ignored = text(".containerignore");
+    for member in members.split(", ").map(|m| m.trim_matches('"')) {
+        let room = member.split('/').next().unwrap();
+        assert!(ignored.lines().all(|l| l != member && l != room), ".containerignore leaves out {member}");
+        assert!(root().join(member).join("Cargo.toml").is_file(), "{member}");
+    }
+}
+
 /// A crate that is published must build: every file that sources embed is in its archive.
 #[test]
 fn the_package_holds_what_it_embeds() {
@@ -97,7 +113,8 @@ fn the_package_holds_what_it_embeds() {
     let packed: Vec<&str> = list.lines().collect();
     // A file that is named by a macro and stands outside src.
     let mut embedded = 0;
-    for source in packed.iter().filter(|f| f.starts_with("src/") && f.ends_with(".rs")) {
+    let sources = |f: &&&str| (f.starts_with("src/") || f.starts_with("figures/")) && f.ends_with(".rs");
+    for source in packed.iter().filter(sources) {
         for quoted in text(source).split('"').skip(1).step_by(2).filter(|q| q.starts_with("../../") && !q.contains(' '))
         {
             let path = Path::new(source).parent().unwrap().join(quoted);

@@ -55,6 +55,7 @@ const TABLE: &[(&str, &str, &[&str])] = &[
         "run --system stick-slip --t-end 3",
         &["--print-spec", "--format json", "--format parquet", "--out run.csv", "--quiet", "--spec nowhere.json"],
     ),
+    ("", "run --system stick-slip --t-end 1", &["--horizon", "--horizon --method taylor-extended"]),
     (
         "run --system stick-slip --t-end 3 --out run.csv",
         "plot --system stick-slip --t-end 3 --out p.png",

@@ -743,7 +743,7 @@ mod tests {
 
     /// Every flag with a value that no default has and that every run allows on which the flag has an effect; several, if
     /// none differs from every default.
-    const SAMPLES: [(&str, &[&str]); 35] = [
+    const SAMPLES: [(&str, &[&str]); 37] = [
         ("--system", &["wheel", "two-fold"]),
         ("--set", &["alpha=0.3", "omega0=1.1"]),
         ("--switch", &["smoothed", "hysteretic", "filippov"]),
@@ -764,6 +764,8 @@ mod tests {
         ("--atol", &["2e-9"]),
         ("--max-step", &["0.1"]),
         ("--max-steps", &["1000"]),
+        ("--precision", &["256"]),
+        ("--order", &["40"]),
         ("--restart", &["2"]),
         ("--kick-every", &["0.7"]),
         ("--kick-size", &["0.004"]),

@@ -308,7 +308,7 @@ fn claims(html: &mut String, report: &Report) {
         }
         put!(html, "</tr>");
     }
-    put!(html, "</tbody>\n</table>\n</div>");
+    put!(html, "</tbody>\n</table>\n</section>");
 }
 
 /// The finding in a few words: its kind, or the whole line where there is no kind.
@@ -321,7 +321,7 @@ fn table_start(html: &mut String, caption: &str, id: &str, announce: Option<&str
     let class = if id == "claims-table" { "scroll claims" } else { "scroll" };
     put!(
         html,
-        "<div class=\"{class}\" role=\"region\" tabindex=\"0\" aria-labelledby=\"{id}-caption\">\n<table id=\"{id}\"{}>\n\
+        "<section class=\"{class}\" tabindex=\"0\" aria-labelledby=\"{id}-caption\">\n<table id=\"{id}\"{}>\n\
          <caption id=\"{id}-caption\">{}</caption>",
         announce.map_or(String::new(), |a| format!(" data-sortable=\"{a}\"")),
         escape(caption)
@@ -382,7 +382,7 @@ fn picture(html: &mut String, picture: &PictureReport, links: Links) {
     }
     put!(html, "<figcaption>{}</figcaption>\n</figure>", rich(&picture.caption));
     spaces(html, picture, &id);
-    put!(html, "<ul class=\"links\" aria-label=\"Files of {}\">", escape(&picture.name));
+    put!(html, "<ul class=\"links\">");
     for file in picture.files.iter().filter(|f| f.integrity != Integrity::Missing) {
         let text = match (file.role, &file.panel) {
             (Role::Data, Some(panel)) if file.path.ends_with("-events.csv") => format!("CSV ({panel}), events"),
@@ -568,7 +568,7 @@ fn verdicts(html: &mut String, picture: &PictureReport, id: &str) {
             reason(v)
         );
     }
-    put!(html, "</tbody>\n</table>\n</div>");
+    put!(html, "</tbody>\n</table>\n</section>");
 }
 
 /// What was found, and why that agrees or not; one of them where it says the other too.
@@ -657,7 +657,7 @@ fn runs(html: &mut String, picture: &PictureReport, id: &str) {
         };
         put!(html, "<td>{limit}</td></tr>");
     }
-    put!(html, "</tbody>\n</table>\n</div>\n</details>");
+    put!(html, "</tbody>\n</table>\n</section>\n</details>");
 }
 
 fn hashes(html: &mut String, picture: &PictureReport, id: &str) {
@@ -694,7 +694,7 @@ fn hashes(html: &mut String, picture: &PictureReport, id: &str) {
             hash.as_str()
         );
     }
-    put!(html, "</tbody>\n</table>\n</div>");
+    put!(html, "</tbody>\n</table>\n</section>");
     table_start(html, &format!("Files, {}", picture.name), &format!("{id}-files"), None);
     put!(
         html,
@@ -716,7 +716,7 @@ fn hashes(html: &mut String, picture: &PictureReport, id: &str) {
             tag(class, if f.role == Role::Record { "the record itself" } else { f.integrity.words() })
         );
     }
-    put!(html, "</tbody>\n</table>\n</div>\n</details>");
+    put!(html, "</tbody>\n</table>\n</section>\n</details>");
 }
 
 fn all_verdicts(html: &mut String, report: &Report) {
@@ -756,7 +756,7 @@ fn all_verdicts(html: &mut String, report: &Report) {
             }
         }
     }
-    put!(html, "</tbody>\n</table>\n</div>\n</section>");
+    put!(html, "</tbody>\n</table>\n</section>\n</section>");
 }
 
 /// What was found, in sentences.
@@ -820,7 +820,7 @@ fn rules(html: &mut String, report: &Report) {
             escape(meaning)
         );
     }
-    put!(html, "</tbody>\n</table>\n</div>\n</section>");
+    put!(html, "</tbody>\n</table>\n</section>\n</section>");
 }
 
 /// Programs, machines and times.
@@ -889,7 +889,7 @@ fn making(html: &mut String, report: &Report) {
                 decimal(timed.seconds, 2)
             );
         }
-        put!(html, "</tbody>\n</table>\n</div>\n</details>");
+        put!(html, "</tbody>\n</table>\n</section>\n</details>");
     }
     put!(html, "</section>");
 }
@@ -924,7 +924,7 @@ fn citing(html: &mut String, report: &Report) {
     );
     put!(
         html,
-        "<pre tabindex=\"0\" role=\"region\" aria-label=\"BibTeX\"><code>{}</code></pre>\n</section>",
+        "<section class=\"scroll\" tabindex=\"0\" aria-label=\"BibTeX\"><pre><code>{}</code></pre></section>\n</section>",
         escape(&bibtex)
     );
 }

@@ -84,6 +84,13 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         None => None,
         Some(path) => {
             let manifest = read_manifest(path)?;
+            if let Some(other) = arguments.figures.iter().find(|name| **name != manifest.figure) {
+                return Err(CliError::Usage(format!(
+                    "{} is about \"{}\" and says nothing of {other}; leave {other} out, or name another manifest",
+                    path.display(),
+                    manifest.figure
+                )));
+            }
             figures.retain(|f| f.id == manifest.figure);
             if figures.is_empty() {
                 return Err(CliError::Usage(format!(
