@@ -603,7 +603,7 @@ fn advanced<S: Simd, const N: usize, const K: usize, const M: usize>(
     for (k, a) in terms {
         let ha = h * Registers::from_f64(a);
         for i in 0..N {
-            sum[i] = sum[i] + k[i] * ha;
+            sum[i] += k[i] * ha;
         }
     }
     sum

@@ -251,7 +251,7 @@ impl<S: Simd, const K: usize> Arithmetic for Registers<S, K> {
 impl<S: Simd, const K: usize> Elementary for Registers<S, K> {
     #[inline(always)]
     fn tanh(self) -> Self {
-        let Some(set) = self.set else { return Self { constant: self.constant.tanh(), ..self } };
+        let Some(set) = self.set else { return Self { constant: Elementary::tanh(self.constant), ..self } };
         // The kernel gives +-1 there as well; this only saves its work where every lane is outside its layer.
         let inside = self.size().less(Self::splat(set, TANH_IS_ONE), set);
         let nan = self.map(|v| if v.is_nan() { 0.0 } else { 1.0 }).less(Self::splat(set, 0.5), set);
@@ -259,7 +259,7 @@ impl<S: Simd, const K: usize> Elementary for Registers<S, K> {
     }
     #[inline(always)]
     fn exp(self) -> Self {
-        if self.set.is_none() { Self { constant: self.constant.exp(), ..self } } else { kernels::exp(self) }
+        if self.set.is_none() { Self { constant: Elementary::exp(self.constant), ..self } } else { kernels::exp(self) }
     }
     #[inline(always)]
     fn sin(self) -> Self {
