@@ -153,7 +153,7 @@ def test_two_surfaces():
         minus=["-1", "-1"],
         second={"h": "y", "plus": ["1", "1"], "minus": ["1", "-1"]},
     )
-    run = twofold.solve(square, [0.5, 0.25], 3, switch="filippov")
+    run = twofold.solve(square, [0.5, 0.25], 3, switch="filippov", exit="at-once:plus")
     # Around |x| + |y| = 0.75 once.
     assert np.allclose(run.y[:, -1], [0.5, 0.25], atol=1e-10)
     assert list(run.events["signs"]) == ["0+", "-0", "0-", "+0"]
