@@ -15,7 +15,7 @@
 
 use nalgebra::SVector;
 use serde_json::{Value, json};
-use twofold::num::{Arithmetic, Ball, Enclosure, Interval};
+use twofold::num::{Arithmetic, Ball, Enclosure, Interval, elementary};
 use twofold::rigor::covering::Image;
 use twofold::rigor::{Covering, Flow, HSet, Return, Set, Settings, prove_covering};
 use twofold_proofs::{SECTION, bounds, equation, parameters, refuse, write};
@@ -104,7 +104,7 @@ fn main() {
     let saddle = places(&mut flow, hub, 2);
     let orbit = places(&mut flow, beside, RETURNS);
     // Sets: the hub, the saddle orbit's other one, then those of the homoclinic orbit from its first return on.
-    let mut sizes = vec![HUB_SIZE; RETURNS + 1];
+    let mut sizes = [HUB_SIZE; RETURNS + 1];
     for i in (1..RETURNS).rev() {
         sizes[i] = (MARGIN * sizes[i + 1] / orbit[i].stretch).max(SHORTEST);
     }
@@ -116,7 +116,6 @@ fn main() {
         i => vec![i + 1],
     };
 
-    // At which crossing of each return the orbits pass the singularity, and how near.
     let mut coverings: Vec<Value> = Vec::new();
     for (i, set) in sets.iter().enumerate() {
         let next = follows(i);
@@ -132,10 +131,11 @@ fn main() {
         println!(
             "  set {i:>2} at x = {:+.9}, half {:.1e} long, covers {} ({} pieces)",
             set.centre[0],
-            set.unstable[0].hypot(set.unstable[1]),
+            elementary::sqrt(set.unstable[0] * set.unstable[0] + set.unstable[1] * set.unstable[1]),
             ends.join(" and "),
             pieces.len()
         );
+        // At which crossing of each return the orbits pass the singularity, and how near.
         let mut all = pieces.iter().chain(&edges);
         let first = all.next().unwrap_or_else(|| refuse("no pieces"));
         let size = |c: &[Interval; 2]| c[0].magnitude().max(c[1].magnitude());

@@ -83,10 +83,10 @@ pub fn with_extended<U: WithStepper<N>, const N: usize>(
         }
     }
     match bits {
-        ..=106 => user.with(of_order(Taylor::extended(tolerance), order)),
-        ..=192 => user.with(of_order(Taylor::<N, MultiFloat<3>>::multi(tolerance), order)),
-        ..=256 => user.with(of_order(Taylor::<N, MultiFloat<4>>::multi(tolerance), order)),
-        ..=384 => user.with(of_order(Taylor::<N, MultiFloat<6>>::multi(tolerance), order)),
+        0..=106 => user.with(of_order(Taylor::extended(tolerance), order)),
+        107..=192 => user.with(of_order(Taylor::<N, MultiFloat<3>>::multi(tolerance), order)),
+        193..=256 => user.with(of_order(Taylor::<N, MultiFloat<4>>::multi(tolerance), order)),
+        257..=384 => user.with(of_order(Taylor::<N, MultiFloat<6>>::multi(tolerance), order)),
         _ => user.with(of_order(Taylor::<N, MultiFloat<8>>::multi(tolerance), order)),
     }
 }

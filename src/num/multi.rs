@@ -272,7 +272,7 @@ impl<const L: usize> MultiFloat<L> {
     fn sin_cos(self) -> (Self, Self) {
         let quotient = self.to_f64() / std::f64::consts::FRAC_PI_2;
         // What of pi/2 is missing beyond its last digit grows with the quadrant's number.
-        if !(quotient.abs() < 1e15) {
+        if quotient.is_nan() || quotient.abs() >= 1e15 {
             return (Self::NAN, Self::NAN);
         }
         let quadrant = quotient.round();

@@ -679,7 +679,7 @@ fn horseshoe(c: &Horseshoe) -> Check<Vec<String>> {
     // lambda^-2 + lambda^-14 falls with lambda: it is above 1 at 1.12, so that the growth rate of chains is beyond 1.12.
     let base = decimal("1.12")?;
     let power = |n: u32| (0..n).fold(Rational::whole(1), |p, _| &p * &base);
-    need(&power(14) < &(&power(12) + &Rational::whole(1)), "chains of sets grow by more than 1.12 a return")?;
+    need(power(14) < &power(12) + &Rational::whole(1), "chains of sets grow by more than 1.12 a return")?;
     Ok(vec![
         format!(
             "{} covering relations, {pieces} pieces: loops of 2 and {LONG} sets through the first",
