@@ -2,6 +2,7 @@
 //! reciprocals for divisions, no subnormals flushed, no intermediate results of more digits than f64 has (the x87 unit's habit). The idea of such a
 //! test: REBOUND (Rein & Tamayo 2017).
 #![allow(clippy::disallowed_methods)] // the fused product is called to show that it differs
+#![allow(clippy::needless_range_loop)] // a loop by index is one of the shapes that compilers like to turn into lanes
 
 use std::hint::black_box;
 

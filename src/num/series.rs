@@ -325,6 +325,9 @@ impl<S: Elementary> Compiler<S> {
 #[inline]
 fn convolution<S: Arithmetic>(a: &[S], b: &[S], first: usize, k: usize) -> S {
     let mut sum = S::zero();
+    if k < first {
+        return sum;
+    }
     // As slices of one length, so that nothing is checked term by term.
     for (a, b) in a[first..=k].iter().zip(b[..=k - first].iter().rev()) {
         sum += *a * *b;
