@@ -3,9 +3,9 @@
 //! A smoothed system x' = f(x, tanh u), u = h(x)/eps, is two equations in one. Where |u| exceeds an *edge*, tanh is +-1 to far below the
 //! tolerance, and if f is a polynomial in x there ([`Flow`]), its solutions have cheap Taylor series of any order: long steps,
 //! as in [`Taylor`](super::Taylor) (Jorba & Zou 2005), and where such a step meets the edge is a zero of a polynomial, found with certainty
-//! ([`Contact`]). Inside, an orbit that crosses the layer does so in a time of order eps, in which x hardly moves while tanh runs from one end to the
+//! (`Contact`). Inside, an orbit that crosses the layer does so in a time of order eps, in which x hardly moves while tanh runs from one end to the
 //! other: as a function of u, dx/du = f/u' is smooth, small, and has tanh at places that are known beforehand. Eight-stage Gauss collocation in u
-//! ([`Gauss`], order 16) on a few fixed parts of the layer, solved by a few fixed-point iterations, does it. (Taking a component of the state as
+//! (`Gauss`, order 16) on a few fixed parts of the layer, solved by a few fixed-point iterations, does it. (Taking a component of the state as
 //! clock to land on a surface: Henon 1982.)
 //!
 //! An orbit that does not cross - it slides along the layer, or touches it and turns back - is followed through it by
