@@ -61,6 +61,7 @@ const TABLE: &[(&str, &str, &[&str])] = &[
         "plot --system stick-slip --t-end 3 --out p.png",
         &[
             "--kind series",
+            "--searchable",
             "--kind space",
             "--axes v,x",
             "--axes x,y,z",
@@ -83,6 +84,7 @@ const TABLE: &[(&str, &str, &[&str])] = &[
             "--axes x,y",
             "--t-end 4",
             "--eps 0.1",
+            "--searchable",
             "--quiet",
             "--format pdf",
         ],

@@ -11,7 +11,7 @@ use plotters_backend::{
 
 use super::font::{CAP_HEIGHT, FontFace};
 use super::rich_text::{self, RichTextError, Turn};
-use super::scene::{Paint, Scene, UNITS_PER_POINT, units};
+use super::scene::{Paint, Scene, UNITS_PER_POINT, Words, units};
 use super::sheet::Colour;
 use super::style::{HALO_PT, WHITE};
 
@@ -127,11 +127,15 @@ impl DrawingBackend for SceneBackend<'_> {
             FontTransform::Rotate270 => ((pos.0 + below, pos.1 - along), Turn::Upwards),
             _ => ((pos.0 + along, pos.1 + below), Turn::Level),
         };
+        let to = match turn {
+            Turn::Level => (origin.0 + width, origin.1),
+            Turn::Upwards => (origin.0, origin.1 - width),
+        };
         let path = line.outlines(size, origin, turn);
         if style.family().as_str() == HALO_FAMILY {
             self.scene.halo(&path, units(2.0 * HALO_PT));
         }
-        self.scene.text(paint(style.color()), path, line.plain);
+        self.scene.text(paint(style.color()), path, Words { text: line.plain, from: origin, to, size: units(size) });
         Ok(())
     }
 

@@ -145,7 +145,7 @@ pub fn render(sheet: &Sheet) -> Result<Rendered, RenderError> {
     let sealed = Sealed::new(&sheet.provenance);
     Ok(Rendered {
         png: provenance::seal(png_file::write(&pixels, &title, &sheet.description, &sealed)?)?,
-        svg: provenance::seal(svg::write(&scene, &title, &sheet.description, &sealed))?,
+        svg: provenance::seal(svg::write(&scene, &title, &sheet.description, &sealed, sheet.searchable_svg))?,
         pdf: provenance::seal(pdf::write(&scene, &title, &sheet.description, &sealed))?,
         pixels,
         left_out: left_out(sheet),

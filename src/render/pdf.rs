@@ -1,6 +1,12 @@
 //! A [`Scene`] as a one-page PDF, with no clock and no random identifier in it.
+//!
+//! Text is outlines, so that no font decides how it looks. Its words are there a second time, unseen, in a font whose glyphs are all empty, so that a reader can
+//! search and copy them (ISO 32000-1, 9.3.6: text rendering mode 3; 9.10.3: the map to Unicode).
+
+use std::collections::BTreeMap;
 
 use miniz_oxide::deflate::compress_to_vec_zlib;
+use pdf_writer::types::{SystemInfo, UnicodeCmap};
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect, Ref, Str, TextStr};
 
 use super::scene::{Item, Paint, Position, Scene, Segment, UNITS_PER_POINT};
@@ -12,9 +18,15 @@ pub const INFO_KEY: &str = "TwofoldProvenance";
 /// Effort of compression; higher levels take several times as long for a quarter less.
 const LEVEL: u8 = 1;
 
+/// Name of the font of the unseen words.
+const FONT: Name = Name(b"F");
+
+/// Width of each of its empty glyphs, in thousandths of the font size.
+const GLYPH_WIDTH: i64 = 500;
+
 /// Writes a scene.
 pub fn write(scene: &Scene, title: &str, description: &str, sealed: &Sealed) -> Vec<u8> {
-    let [catalog, pages, page, contents, info] = [1, 2, 3, 4, 5].map(Ref::new);
+    let [catalog, pages, page, contents, info, font, glyph, unicode] = [1, 2, 3, 4, 5, 6, 7, 8].map(Ref::new);
     let (w, h) = (scene.width() as f32 / UNITS_PER_POINT as f32, scene.height() as f32 / UNITS_PER_POINT as f32);
     let mut pdf = Pdf::new();
     let mut root = pdf.catalog(catalog);
@@ -36,9 +48,18 @@ pub fn write(scene: &Scene, title: &str, description: &str, sealed: &Sealed) -> 
             .stroking_alpha(share);
     }
     states.finish();
+    let codes = codes(scene);
+    if !codes.is_empty() {
+        resources.fonts().pair(FONT, font);
+    }
     resources.finish();
     leaf.finish();
-    let stream = compress_to_vec_zlib(&drawing(scene), LEVEL);
+    if !codes.is_empty() {
+        invisible_font(&mut pdf, [font, glyph, unicode], &codes);
+    }
+    let mut operators = drawing(scene);
+    words(&mut operators, scene, &codes);
+    let stream = compress_to_vec_zlib(&operators, LEVEL);
     pdf.stream(contents, &stream).filter(Filter::FlateDecode);
     let mut details = pdf.document_info(info);
     details.title(TextStr(title)).subject(TextStr(description));
@@ -49,6 +70,68 @@ pub fn write(scene: &Scene, title: &str, description: &str, sealed: &Sealed) -> 
     details.insert(Name(INFO_KEY.as_bytes())).primitive(Str(to_ascii_json(&sealed.entries).as_bytes()));
     details.finish();
     pdf.finish()
+}
+
+/// A one-byte code for each character that is set, in the characters' order. The embedded fonts have fewer characters than there are codes.
+fn codes(scene: &Scene) -> BTreeMap<char, u8> {
+    let mut characters: Vec<char> = scene.texts().flat_map(|w| w.text.chars()).collect();
+    characters.sort_unstable();
+    characters.dedup();
+    characters.into_iter().zip(1..=u8::MAX).collect()
+}
+
+/// A font of type 3 in which every code is an empty glyph and stands for a character of Unicode.
+fn invisible_font(pdf: &mut Pdf, [font, glyph, unicode]: [Ref; 3], codes: &BTreeMap<char, u8>) {
+    let name = |code: u8| format!("g{code}");
+    let last = codes.len() as u8;
+    let mut description = pdf.type3_font(font);
+    description.bbox(Rect::new(0.0, -200.0, GLYPH_WIDTH as f32, 800.0)).matrix([0.001, 0.0, 0.0, 0.001, 0.0, 0.0]);
+    let mut procedures = description.char_procs();
+    for code in 1..=last {
+        procedures.pair(Name(name(code).as_bytes()), glyph);
+    }
+    procedures.finish();
+    let names: Vec<String> = (1..=last).map(name).collect();
+    description.encoding_custom().differences().consecutive(1, names.iter().map(|n| Name(n.as_bytes())));
+    description.first_char(1).last_char(last).widths((1..=last).map(|_| GLYPH_WIDTH as f32));
+    description.resources();
+    description.to_unicode(unicode);
+    description.finish();
+    pdf.stream(glyph, format!("{GLYPH_WIDTH} 0 d0").as_bytes());
+    let mut map = UnicodeCmap::<u8>::new(
+        Name(b"Words"),
+        SystemInfo { registry: Str(b"Adobe"), ordering: Str(b"UCS"), supplement: 0 },
+    );
+    for (character, code) in codes {
+        map.pair(*code, *character);
+    }
+    pdf.cmap(unicode, map.finish().as_slice());
+}
+
+/// The operators of the unseen words, each stretched to the length of the outlines that it stands for.
+fn words(out: &mut Vec<u8>, scene: &Scene, codes: &BTreeMap<char, u8>) {
+    if codes.is_empty() {
+        return;
+    }
+    out.extend_from_slice(b"BT\n3 Tr\n");
+    for words in scene.texts() {
+        let text: String =
+            words.text.chars().filter_map(|c| codes.get(&c)).map(|code| format!("{code:02x}")).collect();
+        let (x, y) = words.from;
+        // The page's matrix has y downwards; the text's turns it up again.
+        let matrix = if words.upwards() { "0 -1 -1 0" } else { "1 0 0 -1" };
+        let natural = (text.len() as i64 / 2 * GLYPH_WIDTH * i64::from(words.size)).max(1);
+        // Per cent, with two decimals.
+        let stretch = (i64::from(words.length()) * 10_000_000 + natural / 2) / natural;
+        let line = format!(
+            "/F {} Tf {}.{:02} Tz {matrix} {x} {y} Tm <{text}> Tj\n",
+            words.size,
+            stretch / 100,
+            stretch % 100
+        );
+        out.extend_from_slice(line.as_bytes());
+    }
+    out.extend_from_slice(b"ET\n");
 }
 
 fn paint_of(item: &Item) -> Paint {

@@ -43,6 +43,31 @@ pub struct Paint {
     pub opacity: u8,
 }
 
+/// What a set text says and where it stands, for programs that search or read pictures.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Words {
+    /// The text without markup.
+    pub text: String,
+    /// Where the baseline begins.
+    pub from: Position,
+    /// Where it ends: to the right of its beginning, or above it.
+    pub to: Position,
+    /// Font size in units.
+    pub size: i32,
+}
+
+impl Words {
+    /// Length of the baseline.
+    pub fn length(&self) -> i32 {
+        (self.to.0 - self.from.0).abs().max((self.to.1 - self.from.1).abs())
+    }
+
+    /// Whether the text runs from bottom to top.
+    pub fn upwards(&self) -> bool {
+        self.to.1 < self.from.1
+    }
+}
+
 /// Something drawn. An item is painted as a whole: where its parts overlap, opacity does not add up.
 #[derive(Clone, Debug)]
 pub enum Item {
@@ -53,7 +78,7 @@ pub enum Item {
         /// Outlines.
         path: Vec<Segment>,
         /// The text that the outlines are, if they are text.
-        text: Option<String>,
+        text: Option<Words>,
     },
     /// Polylines with round caps and joins.
     Stroke {
@@ -190,8 +215,16 @@ impl Scene {
         }
     }
 
+    /// The texts, in the order in which they are drawn.
+    pub fn texts(&self) -> impl Iterator<Item = &Words> {
+        self.items.iter().filter_map(|item| match item {
+            Item::Fill { text, .. } => text.as_ref(),
+            Item::Stroke { .. } | Item::Dots { .. } => None,
+        })
+    }
+
     /// Adds text that has been turned into outlines.
-    pub fn text(&mut self, paint: Paint, path: Vec<Segment>, text: String) {
+    pub fn text(&mut self, paint: Paint, path: Vec<Segment>, text: Words) {
         if !path.is_empty() {
             self.items.push(Item::Fill { paint, path, text: Some(text) });
         }

@@ -40,6 +40,9 @@ pub struct Sheet {
     pub description: String,
     /// Where the picture comes from, as ordered (key, value) pairs; written into each file, not drawn.
     pub provenance: Vec<(String, String)>,
+    /// Whether the SVG file says its words a second time as invisible text, which programs can search and copy. Outlines alone need no font anywhere
+    /// and are the default; the PDF file always has its words.
+    pub searchable_svg: bool,
 }
 
 impl Sheet {
@@ -57,6 +60,7 @@ impl Sheet {
             banner: None,
             description: description.into(),
             provenance: Vec::new(),
+            searchable_svg: false,
         }
     }
 

@@ -1,4 +1,5 @@
-//! A [`Scene`] as SVG: whole-number relative paths in units, no text elements, no font needed.
+//! A [`Scene`] as SVG: whole-number relative paths in units, no font needed. Text is outlines; on request its words are there a second
+//! time, unseen, for programs that search.
 
 use std::fmt::Write as _;
 
@@ -28,8 +29,8 @@ pub fn escape(text: &str) -> String {
     out
 }
 
-/// Writes a scene.
-pub fn write(scene: &Scene, title: &str, description: &str, provenance: &Sealed) -> Vec<u8> {
+/// Writes a scene, with its words as invisible text if it is to be searchable.
+pub fn write(scene: &Scene, title: &str, description: &str, provenance: &Sealed, searchable: bool) -> Vec<u8> {
     let mut out = String::with_capacity(1 << 16);
     let (w, h) = (scene.width(), scene.height());
     let points = |units: i32| decimal(i64::from(units) * 100 / i64::from(UNITS_PER_POINT));
@@ -74,8 +75,27 @@ pub fn write(scene: &Scene, title: &str, description: &str, provenance: &Sealed)
         }
         out.push_str("\"/>\n");
     }
-    out.push_str("</g>\n</svg>\n");
+    out.push_str("</g>\n");
+    if searchable {
+        words(&mut out, scene);
+    }
+    out.push_str("</svg>\n");
     out.into_bytes()
+}
+
+/// The words, each stretched to the length of the outlines that it stands for, whatever font the reader's program takes.
+fn words(out: &mut String, scene: &Scene) {
+    out.push_str("<g fill-opacity=\"0\" font-family=\"sans-serif\">\n");
+    for words in scene.texts() {
+        let ((x, y), size, length) = (words.from, words.size, words.length());
+        let turned = if words.upwards() { format!(" transform=\"rotate(-90 {x} {y})\"") } else { String::new() };
+        let _ = writeln!(
+            out,
+            "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" textLength=\"{length}\" lengthAdjust=\"spacingAndGlyphs\"{turned}>{}</text>",
+            escape(&words.text)
+        );
+    }
+    out.push_str("</g>\n");
 }
 
 /// Hundredths as a decimal number without trailing zeros.

@@ -231,6 +231,66 @@ fn the_pdf_has_no_clock_and_no_identifier() {
     assert!(text.contains("/Title (Title)"));
 }
 
+/// The page's operators, decompressed.
+fn operators(pdf: &[u8]) -> String {
+    let find = |from: usize, what: &[u8]| from + pdf[from..].windows(what.len()).position(|w| w == what).unwrap();
+    let start = find(find(0, b"/FlateDecode"), b"stream\n") + b"stream\n".len();
+    let end = find(start, b"endstream");
+    let found = miniz_oxide::inflate::decompress_to_vec_zlib(pdf[start..end].trim_ascii_end()).expect("deflated");
+    String::from_utf8(found).expect("operators are ASCII")
+}
+
+#[test]
+fn words_of_the_pdf_can_be_found_and_stand_where_their_outlines_do() {
+    let sheet = full_sheet();
+    let scene = layout::draw(&sheet).unwrap();
+    let operators = operators(&render(&sheet).unwrap().pdf);
+    let unseen = &operators[operators.find("BT\n3 Tr\n").expect("a text object in mode 3")..];
+    // Codes count the characters in their order; reading them back needs no more.
+    let mut characters: Vec<char> = scene.texts().flat_map(|w| w.text.chars()).collect();
+    characters.sort_unstable();
+    characters.dedup();
+    assert!(characters.len() < 256);
+    let shown: Vec<(String, f64, f64)> = unseen
+        .lines()
+        .filter(|l| l.ends_with(" Tj"))
+        .map(|line| {
+            let hex = &line[line.find('<').unwrap() + 1..line.find('>').unwrap()];
+            let code = |i: usize| usize::from_str_radix(&hex[2 * i..2 * i + 2], 16).unwrap();
+            let text: String = (0..hex.len() / 2).map(|i| characters[code(i) - 1]).collect();
+            let numbers: Vec<f64> = line.split(' ').filter_map(|w| w.parse().ok()).collect();
+            // Size, stretch in per cent, four entries of the matrix, then x and y; every glyph is half a size wide.
+            let length = numbers[0] * 0.5 * text.chars().count() as f64 * numbers[1] / 100.0;
+            (text, numbers[6], length)
+        })
+        .collect();
+    let wanted: Vec<_> = scene.texts().collect();
+    assert!(wanted.len() > 10, "{}", wanted.len());
+    assert_eq!(shown.len(), wanted.len());
+    for ((text, x, length), words) in shown.iter().zip(&wanted) {
+        assert_eq!(*text, words.text);
+        assert_eq!(*x, f64::from(words.from.0), "{text}");
+        assert!((length - f64::from(words.length())).abs() < 1.0, "{text}: {length}");
+    }
+    assert!(wanted.iter().any(|w| w.upwards()) && wanted.iter().any(|w| !w.upwards()));
+}
+
+#[test]
+fn an_svg_has_its_words_as_text_only_if_asked() {
+    let mut sheet = dot_sheet(vec![[0.5, 12.0]]);
+    let plain = render(&sheet).unwrap();
+    sheet.searchable_svg = true;
+    let searchable = render(&sheet).unwrap();
+    let read = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+    assert!(!read(&plain.svg).contains("<text"));
+    let svg = read(&searchable.svg);
+    assert!(svg.contains(">One x^2 &amp; &lt;two&gt;</text>"), "{svg}");
+    assert!(svg.contains("rotate(-90 "));
+    assert!(svg.contains("fill-opacity=\"0\""));
+    assert!(read_provenance(&searchable.svg).is_ok_and(|p| p.intact));
+    assert!(plain.png == searchable.png && plain.pdf == searchable.pdf);
+}
+
 #[test]
 fn two_distinct_late_points_are_seen_among_a_faint_transient() {
     let early: Vec<[f64; 2]> = (0..900).map(|i| [f64::from(i % 30) / 30.0, f64::from(i / 30) / 30.0]).collect();

@@ -58,6 +58,9 @@ pub struct Arguments {
     /// Format, for standard output.
     #[arg(long, value_enum)]
     format: Option<Format>,
+    /// Say the words of an SVG picture a second time as invisible text, so that they can be searched and copied (a PDF picture always does).
+    #[arg(long)]
+    searchable: bool,
     /// No progress on standard error.
     #[arg(long)]
     quiet: bool,
@@ -146,6 +149,12 @@ pub(super) fn write(sheet: &crate::render::Sheet, out: &Path, format: Format) ->
 
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let format = Format::of(&arguments.out, arguments.format)?;
+    if arguments.searchable && format != Format::Svg {
+        return Err(CliError::no_effect(
+            "--searchable",
+            "only an SVG picture has a choice: PDF always carries its words, PNG cannot; leave it out",
+        ));
+    }
     let recorded = match &arguments.from {
         Some(file) => {
             if let Some(flag) = arguments.flags.first_given() {
@@ -176,7 +185,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     if answer.stop == Stop::Interrupted {
         small_print.push("an interrupted run: this is what was computed until then".into());
     }
-    let sheet = plot::sheet(&spec, &answer, &look, small_print)
+    let mut sheet = plot::sheet(&spec, &answer, &look, small_print)
         .map_err(unsuitable)?
         .provenance("Software", concat!("twofold ", env!("CARGO_PKG_VERSION")))
         .provenance("Picture", format!("plot-{}", look.kind.word()))
@@ -184,6 +193,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         .provenance("Method", spec.method.name.name())
         .provenance("Spec-SHA256", question_hash(&Run(spec.clone())).as_str())
         .provenance("Data-SHA256", record::Hash::of(&encode::bits(&answer.tables)).as_str());
+    sheet.searchable_svg = arguments.searchable;
     write(&sheet, &arguments.out, format)?;
     Ok(Exit::Fine)
 }
