@@ -48,13 +48,16 @@ READINGS := --over params.alpha=1e-3,0.1
 PRINTED := --over params.alpha=1e-3
 RECONSTRUCTED := --over params.alpha=0.1
 INTERVALS := --over interval=20,40,100
+HYSTERETIC := --restart 100 --switch hysteretic
 SIGMAS := --restart 100 --over sigma=0.01,0.1,0.13
-METHODS := --t-end 2e5 --restart 100 --over method=dopri5,radau5
-TOLERANCES := --t-end 2e5 --restart 100 --method dopri5 --over tolerance=1e-6,1e-8,1e-10,1e-12
+METHODS := --over method=dopri5,radau5 --t-end 2e5 --restart 100
+TOLERANCES := --over tolerance=1e-6,1e-8,1e-10,1e-12 --t-end 2e5 --restart 100 --method dopri5
+TIGHT := --t-end 2e5 --restart 100 --method dopri5 --over tolerance=1e-13
 TAYLOR := --restart 100 --method taylor --rtol 1e-15 --atol 1e-15
 EXTENDED := --restart 100 --method taylor-extended --rtol 1e-20 --atol 1e-20
 CELLS := --over params.alpha=1e-3..1:log:7 --over params.beta=1e-6..1e-3:log:7
 ALPHA := --over params.alpha=1e-2,1 --over params.beta=1e-5
+ALPHAS := --over params.alpha=1e-3,1e-2,0.1,1 --over params.beta=1e-5
 BETA := --over params.alpha=1e-3 --over params.beta=1e-6,1e-4,1e-3
 C := figures/census
 A := figures/audit
@@ -64,10 +67,12 @@ census: ## go on with the census, the audit and the basins (hours; Ctrl-C keeps 
 	@$(SWEEP) --t-end 1e4 --method dopri5 --reading reconstructed --over start.x=-3..3:25 --over start.y=0 --over start.z=-3..3:25 --out figures/basin/reconstructed.parquet
 	@$(SWEEP) --t-end 2e5 $(READINGS) $(INTERVALS) $(STARTS) --random 300 --out $(C)/fig7.parquet
 	@$(SWEEP) --t-end 2e5 $(READINGS) $(SIGMAS) $(STARTS) --random 300 --out $(C)/fig8.parquet
-	@$(SWEEP) $(METHODS) $(PRINTED) $(STARTS) --random 100 --out $(C)/methods-printed.parquet
-	@$(SWEEP) $(METHODS) $(RECONSTRUCTED) $(STARTS) --random 100 --out $(C)/methods.parquet
-	@$(SWEEP) $(TOLERANCES) $(PRINTED) $(STARTS) --random 100 --out $(C)/tolerances-printed.parquet
-	@$(SWEEP) $(TOLERANCES) $(RECONSTRUCTED) $(STARTS) --random 100 --out $(C)/tolerances.parquet
+	@$(SWEEP) $(PRINTED) $(METHODS) $(STARTS) --random 100 --out $(C)/methods-printed.parquet
+	@$(SWEEP) $(RECONSTRUCTED) $(METHODS) $(STARTS) --random 100 --out $(C)/methods.parquet
+	@$(SWEEP) $(PRINTED) $(TOLERANCES) $(STARTS) --random 100 --out $(C)/tolerances-printed.parquet
+	@$(SWEEP) $(RECONSTRUCTED) $(TOLERANCES) $(STARTS) --random 100 --out $(C)/tolerances.parquet
+	@$(SWEEP) $(TIGHT) $(PRINTED) $(STARTS) --random 100 --out $(C)/tight-printed.parquet
+	@$(SWEEP) $(TIGHT) $(RECONSTRUCTED) $(STARTS) --random 100 --out $(C)/tight.parquet
 	@$(SWEEP) --t-end 5e3 $(PRINTED) --restart 100 $(STARTS) --random 100 --out $(C)/ordinary-printed.parquet
 	@$(SWEEP) --t-end 2e4 $(RECONSTRUCTED) --restart 100 $(STARTS) --random 100 --out $(C)/ordinary-reconstructed.parquet
 	@$(SWEEP) --t-end 5e3 $(PRINTED) $(TAYLOR) $(STARTS) --random 100 --out $(C)/taylor-printed.parquet
@@ -78,8 +83,11 @@ census: ## go on with the census, the audit and the basins (hours; Ctrl-C keeps 
 	@$(SWEEP) --t-end 2e5 $(ALPHA) $(SIGMAS) $(STARTS) --random 30 --out $(A)/alpha8.parquet
 	@$(SWEEP) --t-end 2e5 $(BETA) $(INTERVALS) $(STARTS) --random 30 --out $(A)/beta7.parquet
 	@$(SWEEP) --t-end 2e5 $(BETA) $(SIGMAS) $(STARTS) --random 30 --out $(A)/beta8.parquet
+	@$(SWEEP) --t-end 2e5 $(ALPHAS) $(HYSTERETIC) $(STARTS) --random 30 --out $(A)/alpha9.parquet
+	@$(SWEEP) --t-end 2e5 $(BETA) $(HYSTERETIC) $(STARTS) --random 30 --out $(A)/beta9.parquet
 	@$(SWEEP) --t-end 2e5 --method dopri5 $(CELLS) $(INTERVALS) $(STARTS) --random 12 --out $(A)/fig7.parquet
 	@$(SWEEP) --t-end 2e5 --method dopri5 $(CELLS) $(SIGMAS) $(STARTS) --random 12 --out $(A)/fig8.parquet
+	@$(SWEEP) --t-end 2e5 --method dopri5 $(HYSTERETIC) $(CELLS) $(STARTS) --random 12 --out $(A)/fig9.parquet
 
 proofs: ## prove the theorems anew (proofs/README.md), write their certificates and check those (minutes)
 	@set -e; for p in $(PROOFS); do $(RUN) --package twofold-proofs --bin $$p; done

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use twofold::cli::Exit;
 use twofold::cli::progress::Progress;
@@ -55,6 +56,55 @@ fn the_sweeps_are_those_of_the_figures() {
         seen.sort_unstable();
         assert_eq!(seen, [0, 1, 2, 3, 4, 5]);
     }
+}
+
+/// `make census` asks for the sweeps that are committed: a part without rows of each is a file that says which sweep it is of. All committed files are
+/// among them.
+#[test]
+fn make_census_goes_on_with_what_is_committed() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let make = Command::new("make").current_dir(root).args(["-n", "census"]).output().expect("make is there");
+    assert!(make.status.success(), "{}", String::from_utf8_lossy(&make.stderr));
+    let folder = tempfile::tempdir().unwrap();
+    let mut found = Vec::new();
+    for line in String::from_utf8(make.stdout).unwrap().lines() {
+        let Some((_, flags)) = line.split_once(" sweep ") else { continue };
+        let mut words = flags.split_whitespace();
+        let (mut kept, mut name) = (Vec::new(), None);
+        while let Some(word) = words.next() {
+            match word {
+                "--resume" => {}
+                "--threads" | "--recheck" => {
+                    words.next();
+                }
+                "--out" => name = words.next(),
+                other => kept.push(other),
+            }
+        }
+        let name = name.unwrap_or_else(|| panic!("{line} names no file"));
+        let part = folder.path().join("part.parquet");
+        let run = Command::new(env!("CARGO_BIN_EXE_twofold"))
+            .arg("sweep")
+            .args(kept)
+            .args(["--quiet", "--shard", "999999999/999999999", "--out"])
+            .arg(&part)
+            .output()
+            .unwrap();
+        assert!(run.status.success(), "{name}: {}", String::from_utf8_lossy(&run.stderr));
+        let asked = Rows::from_parquet(&fs::read(&part).unwrap()).unwrap();
+        assert_eq!(asked.len(), 0);
+        assert!(asked.sweep() == rows(name).sweep(), "make census asks for another sweep than {name} holds");
+        found.push(name.to_owned());
+    }
+    found.sort();
+    let mut committed: Vec<String> = ["census", "audit", "basin"]
+        .iter()
+        .flat_map(|figure| fs::read_dir(root.join("figures").join(figure)).unwrap())
+        .map(|entry| entry.unwrap().path().strip_prefix(root).unwrap().display().to_string())
+        .filter(|name| name.ends_with(".parquet"))
+        .collect();
+    committed.sort();
+    assert_eq!(found, committed);
 }
 
 /// Rows of the printed reading and of the basins, which are quick, computed anew: the same to the last bit.

@@ -1,4 +1,4 @@
-//! The audit: at which alpha and beta the paper's outcomes of figs 7 and 8 are likely. Not a figure of the paper. Its data are committed beside it and
+//! The audit: at which alpha and beta the paper's outcomes of figs 7, 8 and 9(i) are likely. Not a figure of the paper. Its data are committed beside it and
 //! made by `make census`.
 
 use std::sync::Arc;
@@ -16,18 +16,21 @@ use twofold::record::Hash;
 use twofold::render::sheet::*;
 use twofold::render::style;
 
-/// What is made for this figure: fig. 7's intervals and fig. 8's sigmas over alpha and beta, Dormand-Prince at NDSolve's tolerance; and the candidates,
-/// one exponent changed, by LSODA as the figures are.
+/// What is made for this figure: fig. 7's intervals, fig. 8's sigmas and fig. 9's hysteretic switch over alpha and beta, Dormand-Prince at NDSolve's
+/// tolerance; and the candidates, one exponent changed, by LSODA as the figures are.
 pub const DATA: &[(&str, &[u8])] = &[
     ("fig7.parquet", include_bytes!("fig7.parquet")),
     ("fig8.parquet", include_bytes!("fig8.parquet")),
+    ("fig9.parquet", include_bytes!("fig9.parquet")),
     ("alpha7.parquet", include_bytes!("alpha7.parquet")),
     ("alpha8.parquet", include_bytes!("alpha8.parquet")),
     ("beta7.parquet", include_bytes!("beta7.parquet")),
     ("beta8.parquet", include_bytes!("beta8.parquet")),
+    ("alpha9.parquet", include_bytes!("alpha9.parquet")),
+    ("beta9.parquet", include_bytes!("beta9.parquet")),
 ];
 
-/// The printed and the reconstructed numbers are the census'.
+/// The printed and the reconstructed numbers of figs 7 and 8 are the census'.
 const CENSUS: [(&str, &[u8]); 2] = [
     ("../census/fig7.parquet", include_bytes!("../census/fig7.parquet")),
     ("../census/fig8.parquet", include_bytes!("../census/fig8.parquet")),
@@ -59,15 +62,18 @@ pub fn candidates() -> Result<[Vec<Candidate>; 2], JobError> {
 ///
 /// If they are not such as `make census` writes, or `read` fails.
 pub fn candidates_in(read: &dyn Fn(&str) -> Result<Vec<u8>, JobError>) -> Result<[Vec<Candidate>; 2], JobError> {
-    let tables = |names: [&str; 3]| -> Result<Vec<Table>, JobError> {
-        names.into_iter().map(|name| table_of(&read(name)?)).collect()
+    let tables = |names: &[&str]| -> Result<Vec<Table>, JobError> {
+        names.iter().map(|name| table_of(&read(name)?)).collect()
     };
-    let fig7 = tables(["../census/fig7.parquet", "alpha7.parquet", "beta7.parquet"])?;
-    let fig8 = tables(["../census/fig8.parquet", "alpha8.parquet", "beta8.parquet"])?;
+    let sweeps = [
+        tables(&["../census/fig7.parquet", "alpha7.parquet", "beta7.parquet"])?,
+        tables(&["../census/fig8.parquet", "alpha8.parquet", "beta8.parquet"])?,
+        tables(&["alpha9.parquet", "beta9.parquet"])?,
+    ];
     let rules = &claims().rules;
-    let all = audit::cells(&fig7, &fig8, usize::MAX, rules);
+    let all = audit::cells(&sweeps, usize::MAX, rules);
     let fewest = all.iter().flat_map(|cell| cell.runs).min().unwrap_or(0);
-    let equal = audit::cells(&fig7, &fig8, usize::try_from(fewest).unwrap_or(usize::MAX), rules);
+    let equal = audit::cells(&sweeps, usize::try_from(fewest).unwrap_or(usize::MAX), rules);
     let two: Vec<Cell> = all.into_iter().filter(|cell| READINGS.contains(&[cell.alpha, cell.beta])).collect();
     match (audit::candidates(&equal, rules), audit::candidates(&two, rules)) {
         (Some(equal), Some(two)) => Ok([equal, two]),
@@ -79,8 +85,8 @@ pub fn candidates_in(read: &dyn Fn(&str) -> Result<Vec<u8>, JobError>) -> Result
 const READINGS: [[f64; 2]; 2] = [[1e-3, 1e-5], [1e-1, 1e-5]];
 
 fn tables() -> Result<Vec<Table>, JobError> {
-    let [fig7, fig8] = ["fig7.parquet", "fig8.parquet"].map(|name| table_of(&committed(name)?));
-    let cells = audit::cells(&[fig7?], &[fig8?], usize::MAX, &claims().rules);
+    let [fig7, fig8, fig9] = ["fig7.parquet", "fig8.parquet", "fig9.parquet"].map(|name| table_of(&committed(name)?));
+    let cells = audit::cells(&[vec![fig7?], vec![fig8?], vec![fig9?]], usize::MAX, &claims().rules);
     Ok(vec![audit::cell_table(&cells), audit::candidate_table(&candidates()?[0])])
 }
 
@@ -185,12 +191,12 @@ fn draw(tables: &[Table]) -> Sheet {
         .collect();
     let (fewest, most) = (runs.iter().min().copied().unwrap_or(0), runs.iter().max().copied().unwrap_or(0));
     sheet
-        .panel("(a)", "likelihood of the six outcomes", map)
+        .panel("(a)", "likelihood of the seven outcomes", map)
         .panel("(b)", "posterior of *α* (above) and *β*", odds)
         .legend(LegendEntry::new(LegendKey::Area(style::BLUE, 100), format!("prior of printed {}", PRIORS[0])))
         .legend(LegendEntry::new(LegendKey::Area(style::ORANGE, 100), format!("prior of printed {}", PRIORS[1])))
         .footer(format!(
-            "(a) Probability that one new run of each panel of figs 7 and 8 comes out as the paper says, from {fewest} to {most} runs of each panel in each cell \
+            "(a) Probability that one new run of each panel of figs 7 and 8 and of 9(i) comes out as the paper says, from {fewest} to {most} runs of each panel in each cell \
              (Dormand-Prince at NDSolve's tolerance, *t* = 200000). Most likely: *α* = {}, *β* = {}.",
             number(alpha[best]),
             number(beta[best])
@@ -210,7 +216,7 @@ pub fn figure() -> Figure {
             name: "audit".into(),
             reading: None,
             title: "At which parameters the paper's outcomes are likely",
-            caption: "(a) How likely the six outcomes that the paper reports in figs 7 and 8 are at each α and β, with the printed, the reconstructed and \
+            caption: "(a) How likely the seven outcomes that the paper reports in figs 7, 8 and 9(i) are at each α and β, with the printed, the reconstructed and \
                       the most likely pair. (b) How probable it is that one digit of an exponent was misprinted, under two priors."
                 .into(),
             view: View::Study(Study { questions, draw: |answers| draw(&Study::tables(answers)) }),

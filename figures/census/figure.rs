@@ -24,6 +24,8 @@ pub const DATA: &[(&str, &[u8])] = &[
     ("methods.parquet", include_bytes!("methods.parquet")),
     ("tolerances-printed.parquet", include_bytes!("tolerances-printed.parquet")),
     ("tolerances.parquet", include_bytes!("tolerances.parquet")),
+    ("tight-printed.parquet", include_bytes!("tight-printed.parquet")),
+    ("tight.parquet", include_bytes!("tight.parquet")),
     ("ordinary-printed.parquet", include_bytes!("ordinary-printed.parquet")),
     ("ordinary-reconstructed.parquet", include_bytes!("ordinary-reconstructed.parquet")),
     ("taylor-printed.parquet", include_bytes!("taylor-printed.parquet")),
@@ -81,7 +83,7 @@ pub fn found(reading: Reading) -> Result<Found, JobError> {
 /// If they are not such as `make census` writes, or `read` fails.
 pub fn found_in(reading: Reading, read: &dyn Fn(&str) -> Result<Vec<u8>, JobError>) -> Result<Found, JobError> {
     let table = |name: &str| rows_of(&read(name)?).map(|rows| rows.table());
-    let tables = |names: [&str; 2]| names.into_iter().map(table).collect::<Result<Vec<_>, _>>();
+    let tables = |names: &[&str]| names.iter().map(|name| table(name)).collect::<Result<Vec<_>, _>>();
     let mut shorter = Vec::new();
     for (file, name, _) in SHORTER {
         for reading in Reading::ALL {
@@ -92,8 +94,8 @@ pub fn found_in(reading: Reading, read: &dyn Fn(&str) -> Result<Vec<u8>, JobErro
     let data = Data {
         fig7: table("fig7.parquet")?,
         fig8: table("fig8.parquet")?,
-        methods: tables(["methods-printed.parquet", "methods.parquet"])?,
-        tolerances: tables(["tolerances-printed.parquet", "tolerances.parquet"])?,
+        methods: tables(&["methods-printed.parquet", "methods.parquet"])?,
+        tolerances: tables(&["tolerances-printed.parquet", "tolerances.parquet", "tight-printed.parquet", "tight.parquet"])?,
         shorter,
     };
     Ok(Found::of(reading, &data, &claims().rules))

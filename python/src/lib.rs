@@ -21,8 +21,9 @@ mod _native {
     use super::system::{Definition, builtin_names};
 
     use pyo3::prelude::*;
+    use pyo3::types::PyDict;
     use twofold::job::question::NUMERICS;
-    use twofold::job::spec::{DEFAULT_MAX_STEPS, Method, MethodSpec};
+    use twofold::job::spec::{DEFAULT_MAX_STEPS, Method, MethodSpec, PRECISIONS, finest_extended};
 
     #[pymodule_init]
     fn constants(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -30,7 +31,10 @@ mod _native {
         // The digest of the sources that numbers depend on.
         module.add("NUMERICS", NUMERICS)?;
         module.add("DEFAULT_TOLERANCE", MethodSpec::defaults(Method::Dopri5).tolerance.rtol)?;
-        module.add("DEFAULT_TOLERANCE_EXTENDED", MethodSpec::defaults(Method::TaylorExtended).tolerance.rtol)?;
+        // By the bits of taylor-extended's numbers.
+        let finest = PyDict::new(module.py());
+        PRECISIONS.iter().try_for_each(|bits| finest.set_item(bits, finest_extended(*bits)))?;
+        module.add("DEFAULT_TOLERANCES_EXTENDED", finest)?;
         module.add("DEFAULT_MAX_STEPS", DEFAULT_MAX_STEPS)
     }
 }

@@ -30,6 +30,10 @@ RUNS = {
     "arctan": (["--t-end", "30", "--method", "dopri5", "--transition", "arctan"], dict(transition="arctan")),
     "times": (["--t-end", "30", "--method", "dopri5", "--every", "0.5"], dict(every=0.5)),
     "extended": (["--t-end", "1", "--method", "taylor-extended"], dict(method="taylor-extended")),
+    "precise": (
+        ["--t-end", "0.3", "--method", "taylor-extended", "--precision", "192", "--order", "40"],
+        dict(method="taylor-extended", precision=192, order=40),
+    ),
     "filippov": (
         ["--t-end", "30", "--switch", "filippov", "--exit", "random:exponential:0.5", "--plus-probability", "0.4"],
         dict(switch="filippov", exit="random:exponential:0.5", plus_probability=0.4),

@@ -18,14 +18,14 @@ __all__ = [
     "VERSION",
     "NUMERICS",
     "DEFAULT_TOLERANCE",
-    "DEFAULT_TOLERANCE_EXTENDED",
+    "DEFAULT_TOLERANCES_EXTENDED",
     "DEFAULT_MAX_STEPS",
 ]
 
 VERSION: Final[str]
 NUMERICS: Final[str]
 DEFAULT_TOLERANCE: Final[float]
-DEFAULT_TOLERANCE_EXTENDED: Final[float]
+DEFAULT_TOLERANCES_EXTENDED: Final[Dict[int, float]]
 DEFAULT_MAX_STEPS: Final[int]
 
 _Show = Optional[Callable[[float, str], object]]

@@ -115,6 +115,8 @@ def _spec(
     atol: Optional[float] = None,
     max_step: Optional[float] = None,
     max_steps: Optional[int] = None,
+    precision: Optional[int] = None,
+    order: Optional[int] = None,
     restart: Optional[float] = None,
     kick_every: Optional[float] = None,
     kick_size: Optional[float] = None,
@@ -190,7 +192,14 @@ def _spec(
                 "seed": 2013 if seed is None else _count("seed", seed),
                 "stream": 0 if stream is None else _count("stream", stream),
             }
-    tolerance = _native.DEFAULT_TOLERANCE_EXTENDED if method == "taylor-extended" else _native.DEFAULT_TOLERANCE
+    of_extended = {"precision": precision, "order": order}
+    tolerance = _native.DEFAULT_TOLERANCE
+    if method == "taylor-extended":
+        finest = _native.DEFAULT_TOLERANCES_EXTENDED
+        # What has no such entry is refused with the spec, which knows the reason.
+        tolerance = finest.get(min(finest) if precision is None else _count("precision", precision), min(finest.values()))
+    else:
+        _refuse(of_extended, 'it belongs to method="taylor-extended"')
     return system, {
         "system": json.loads(system.to_json()),
         "switch": model,
@@ -204,6 +213,7 @@ def _spec(
             },
             "step_cap": {"fraction-of-segment": 0.1} if max_step is None else {"absolute": _finite("max_step", max_step)},
             "max_steps": _native.DEFAULT_MAX_STEPS if max_steps is None else _count("max_steps", max_steps),
+            **{name: _count(name, value) for name, value in of_extended.items() if value is not None},
         },
         "schedule": {"restart_every": None if restart is None else _finite("restart", restart), "kick": kick},
         "observe": observe,
@@ -571,6 +581,8 @@ def solve(
     atol: Optional[float] = None,
     max_step: Optional[float] = None,
     max_steps: Optional[int] = None,
+    precision: Optional[int] = None,
+    order: Optional[int] = None,
     restart: Optional[float] = None,
     kick_every: Optional[float] = None,
     kick_size: Optional[float] = None,
@@ -612,11 +624,15 @@ def solve(
     method : {"dopri5", "lsoda", "radau5", "taylor", "taylor-extended", "layered"}
         Integration method. Filippov motion is integrated by dopri5.
     rtol, atol : float
-        Tolerances of a step's local error [default 10^-7.97727, NDSolve's; 1e-32 for taylor-extended].
+        Tolerances of a step's local error [default 10^-7.97727, NDSolve's; 1e-32 for taylor-extended, or what ``precision`` allows].
     max_step : float
         Longest step, in units of time [default a tenth of the time between restarts or kicks].
     max_steps : int
         Most steps before the run is given up [default 4e8].
+    precision : {106, 192, 256, 384, 512}
+        Bits of taylor-extended's numbers [default 106, double-double].
+    order : int
+        Degree of taylor-extended's series, 4 to 1000 [default: what the tolerance asks for].
     restart : float
         Start the method afresh after each such interval of time.
     kick_every, kick_size, kick_law : float, float, {"sphere", "cube", "normal"}

@@ -1,14 +1,23 @@
-//! The audit: at which alpha and beta would the paper's outcomes of figs 7 and 8 be likely, and which printed digit is then most likely wrong.
+//! The audit: at which alpha and beta would the paper's outcomes of figs 7, 8 and 9(i) be likely, and which printed digit is then most likely wrong.
 
 use serde::{Deserialize, Serialize};
 
-use super::census::{self, PANELS, Panel, Probability, Run};
+use super::census::{self, Panel, Probability, Run, Said};
 use super::claims::Rules;
 use crate::job::table::{Column, Entry, Table};
 use crate::num::elementary::{exp10, log10};
 use crate::num::random::RandomStream;
 
-/// A pair of parameters, and how likely the paper's six outcomes are there.
+/// The panels whose outcomes are judged: the census' six, and 9(i), fig. 7(iii) with hysteresis.
+pub const PANELS: [Panel; 7] = {
+    let [a, b, c, d, e, f] = census::PANELS;
+    [a, b, c, d, e, f, Panel { name: "9(i)", said: Said::Chaos, column: None }]
+};
+
+/// Sweeps of the three figures, in their order: of fig. 7's intervals, of fig. 8's sigmas, and of fig. 9's first panel.
+pub type Sweeps = [Vec<Table>; 3];
+
+/// A pair of parameters, and how likely the paper's seven outcomes are there.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
     /// Strength of the drift.
@@ -16,9 +25,9 @@ pub struct Cell {
     /// Strength of the attraction.
     pub beta: f64,
     /// Runs of each panel.
-    pub runs: [u64; 6],
+    pub runs: [u64; 7],
     /// Runs that bear the paper out.
-    pub hits: [u64; 6],
+    pub hits: [u64; 7],
     /// Runs that go to the far state, all panels together.
     pub far: u64,
     /// Decimal logarithm of the probability that one new run of each panel comes out as the paper says: the product over panels of
@@ -27,7 +36,7 @@ pub struct Cell {
 }
 
 impl Cell {
-    fn of(alpha: f64, beta: f64, found: [(u64, u64, u64); 6]) -> Self {
+    fn of(alpha: f64, beta: f64, found: [(u64, u64, u64); 7]) -> Self {
         let log_likelihood = found.iter().map(|(n, k, _)| log10((*k as f64 + 0.5) / (*n as f64 + 1.0))).sum();
         Self {
             alpha,
@@ -39,7 +48,7 @@ impl Cell {
         }
     }
 
-    /// A draw of the decimal logarithm of the six outcomes' probability, each panel's share having the posterior that Jeffreys' prior gives.
+    /// A draw of the decimal logarithm of the seven outcomes' probability, each panel's share having the posterior that Jeffreys' prior gives.
     fn draw(&self, random: &mut RandomStream) -> f64 {
         let share = |(n, k): (&u64, &u64)| {
             let weights = [*k as f64 + 0.5, (*n - *k) as f64 + 0.5];
@@ -56,7 +65,7 @@ impl Cell {
 
 /// Runs of a table at a pair of parameters. What a table does not vary has the paper's value in it.
 fn runs_at(table: &Table, [alpha, beta]: [f64; 2], panel: &Panel) -> Vec<Run> {
-    let mut chosen = vec![(panel.column, Entry::Number(panel.value))];
+    let mut chosen = Vec::new();
     for (name, wanted, printed) in [("params.alpha", alpha, PRINTED[0]), ("params.beta", beta, PRINTED[1])] {
         if table.column(name).is_some() {
             chosen.push((name, Entry::Number(wanted)));
@@ -64,14 +73,14 @@ fn runs_at(table: &Table, [alpha, beta]: [f64; 2], panel: &Panel) -> Vec<Run> {
             return Vec::new();
         }
     }
-    census::runs(table, &chosen)
+    panel.runs(table, chosen)
 }
 
-/// The cells of sweeps of fig. 7's intervals and of fig. 8's sigmas over `params.alpha` and `params.beta`, or over one of them at the paper's
-/// value of the other, in order; those in which every panel has a run. Of each panel at most the first `most` runs count.
-pub fn cells(fig7: &[Table], fig8: &[Table], most: usize, rules: &Rules) -> Vec<Cell> {
+/// The cells of sweeps over `params.alpha` and `params.beta`, or over one of them at the paper's value of the other, in order; those in which
+/// every panel has a run. Of each panel at most the first `most` runs count.
+pub fn cells(sweeps: &Sweeps, most: usize, rules: &Rules) -> Vec<Cell> {
     let mut pairs: Vec<[f64; 2]> = Vec::new();
-    for table in fig7.iter().chain(fig8) {
+    for table in sweeps.iter().flatten() {
         let values = |name: &str, printed: f64| -> Vec<f64> {
             table.column(name).map_or(vec![printed; table.len()], |_| table.numbers(name).to_vec())
         };
@@ -83,9 +92,9 @@ pub fn cells(fig7: &[Table], fig8: &[Table], most: usize, rules: &Rules) -> Vec<
     }
     pairs.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     let cell = |at: [f64; 2]| {
-        let mut found = [(0, 0, 0); 6];
+        let mut found = [(0, 0, 0); 7];
         for (i, (panel, found)) in PANELS.iter().zip(&mut found).enumerate() {
-            let runs = [fig7, fig8][i / 3].iter().flat_map(|table| runs_at(table, at, panel));
+            let runs = sweeps[i / 3].iter().flat_map(|table| runs_at(table, at, panel));
             let runs: Vec<Run> = runs.take(most).collect();
             let far = runs.iter().filter(|r| r.outcome == "far").count() as u64;
             *found = (runs.len() as u64, census::bears_out(panel.said, &runs, rules), far);
@@ -263,7 +272,7 @@ mod tests {
     use super::*;
 
     fn cell(alpha: f64, beta: f64, hits: u64) -> Cell {
-        Cell::of(alpha, beta, [(9, hits, 0); 6])
+        Cell::of(alpha, beta, [(9, hits, 0); 7])
     }
 
     #[test]
@@ -274,8 +283,8 @@ mod tests {
         let found = candidates(&cells, rules).unwrap();
         let pairs: Vec<[f64; 2]> = found.iter().map(|c| [c.cell.alpha, c.cell.beta]).collect();
         assert_eq!(pairs, [[1e-3, 1e-5], [1e-1, 1e-5], [1e-3, 1e-4]]);
-        // (9.5/10)^6 against (0.5/10)^6.
-        assert!((found[1].bayes_factor / 19_f64.powi(6) - 1.0).abs() < 1e-9);
+        // (9.5/10)^7 against (0.5/10)^7.
+        assert!((found[1].bayes_factor / 19_f64.powi(7) - 1.0).abs() < 1e-9);
         for k in 0..2 {
             let sum: f64 = found.iter().map(|c| c.posterior[k].mean).sum();
             assert!((sum - 1.0).abs() < 1e-12);
@@ -298,13 +307,14 @@ mod tests {
             table.push(head.into_iter().chain(["period-1".into(), Entry::Integer(1), Entry::Number(10.0)]));
             table
         };
-        let of = |axis: (&str, f64), panel: &Panel| sweep(&[axis, (panel.column, panel.value)]);
+        let of = |axis: (&str, f64), panel: &Panel| sweep(&[axis].into_iter().chain(panel.column).collect::<Vec<_>>());
         let all = |axis, range: std::ops::Range<usize>| PANELS[range].iter().map(|p| of(axis, p)).collect::<Vec<_>>();
         for (axis, expected) in [(("params.alpha", 0.1), [0.1, 1e-5]), (("params.beta", 1e-4), [1e-3, 1e-4])] {
-            let found = cells(&all(axis, 0..3), &all(axis, 3..6), usize::MAX, &claims().rules);
+            let sweeps = [all(axis, 0..3), all(axis, 3..6), all(axis, 6..7)];
+            let found = cells(&sweeps, usize::MAX, &claims().rules);
             assert_eq!(found.len(), 1);
-            assert_eq!(([found[0].alpha, found[0].beta], found[0].runs), (expected, [1; 6]));
-            assert_eq!(found[0].hits, [1, 0, 0, 0, 1, 1]);
+            assert_eq!(([found[0].alpha, found[0].beta], found[0].runs), (expected, [1; 7]));
+            assert_eq!(found[0].hits, [1, 0, 0, 0, 1, 1, 0]);
         }
     }
 }

@@ -78,20 +78,26 @@ pub struct Panel {
     pub name: &'static str,
     /// The sentence.
     pub said: Said,
-    /// The column that sets it apart.
-    pub column: &'static str,
-    /// Its value there.
-    pub value: f64,
+    /// The column that sets it apart from the other panels of its sweep, and its value there; `None` if the sweep is of this panel alone.
+    pub column: Option<(&'static str, f64)>,
+}
+
+impl Panel {
+    /// The runs of the panel in a sweep's table, among those in which every column of `chosen` has its value.
+    pub fn runs(&self, table: &Table, mut chosen: Vec<(&str, Entry)>) -> Vec<Run> {
+        chosen.extend(self.column.map(|(name, value)| (name, Entry::Number(value))));
+        runs(table, &chosen)
+    }
 }
 
 /// Figs 7 and 8.
 pub const PANELS: [Panel; 6] = [
-    Panel { name: "7(i)", said: Said::Periodic, column: "interval", value: 20.0 },
-    Panel { name: "7(ii)", said: Said::PeriodThree, column: "interval", value: 40.0 },
-    Panel { name: "7(iii)", said: Said::Chaos, column: "interval", value: 100.0 },
-    Panel { name: "8(i)", said: Said::Chaos, column: "sigma", value: 0.01 },
-    Panel { name: "8(ii)", said: Said::Periodic, column: "sigma", value: 0.1 },
-    Panel { name: "8(iii)", said: Said::Periodic, column: "sigma", value: 0.13 },
+    Panel { name: "7(i)", said: Said::Periodic, column: Some(("interval", 20.0)) },
+    Panel { name: "7(ii)", said: Said::PeriodThree, column: Some(("interval", 40.0)) },
+    Panel { name: "7(iii)", said: Said::Chaos, column: Some(("interval", 100.0)) },
+    Panel { name: "8(i)", said: Said::Chaos, column: Some(("sigma", 0.01)) },
+    Panel { name: "8(ii)", said: Said::Periodic, column: Some(("sigma", 0.1)) },
+    Panel { name: "8(iii)", said: Said::Periodic, column: Some(("sigma", 0.13)) },
 ];
 
 /// One finished run of a panel.
@@ -436,8 +442,7 @@ impl Found {
         let alpha = Entry::Number(reading.caricature().alpha);
         let (mut shares, mut captured, mut groups, mut influences) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (i, panel) in PANELS.iter().enumerate() {
-            let chosen = [("params.alpha", alpha.clone()), (panel.column, Entry::Number(panel.value))];
-            let runs = runs([&data.fig7, &data.fig8][i / 3], &chosen);
+            let runs = panel.runs([&data.fig7, &data.fig8][i / 3], vec![("params.alpha", alpha.clone())]);
             shares.push(share(panel, reading, &runs, rules));
             captured.push(captures(&runs, |_| true));
             influences.push(influence(panel.said, &runs, rules));
