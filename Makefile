@@ -89,6 +89,10 @@ census: ## go on with the census, the audit and the basins (hours; Ctrl-C keeps 
 	@$(SWEEP) --t-end 2e5 --method dopri5 $(CELLS) $(SIGMAS) $(STARTS) --random 12 --out $(A)/fig8.parquet
 	@$(SWEEP) --t-end 2e5 --method dopri5 $(HYSTERETIC) $(CELLS) $(STARTS) --random 12 --out $(A)/fig9.parquet
 
+.PHONY: returns
+returns: ## how many orbits that leave the repelling sliding region come back to the two-fold (minutes)
+	@$(CARGO) run --release --locked --quiet --example returns
+
 proofs: ## prove the theorems anew (proofs/README.md), write their certificates and check those (minutes)
 	@set -e; for p in $(PROOFS); do $(RUN) --package twofold-proofs --bin $$p; done
 	@$(RUN) --bin twofold -- verify proofs/certificates/*.json

@@ -1,7 +1,7 @@
 //! How many orbits that leave the repelling sliding region of the paper's caricature come back to its two-fold: starts drawn evenly from a box of that
 //! region, left at once to either side in turn, followed for 300 units of time or until they are back. (The paper says that all come back.)
 //!
-//! `cargo run --release --example returns`
+//! `make returns`, or `cargo run --release --example returns`
 
 use nalgebra::{SVector, vector};
 use twofold::analyse::counts::wilson;
@@ -40,8 +40,7 @@ pub fn back(system: &Caricature, box_size: f64, starts: u64) -> Result<u64, Fili
     let mut count = 0;
     for k in 0..starts {
         let mut random = RandomStream::new(2013, k);
-        let start: SVector<f64, 3> =
-            vector![0.0, random.uniform_in(-box_size, 0.0), random.uniform_in(-box_size, 0.0)];
+        let start: SVector<f64, 3> = vector![0.0, random.uniform_in(-box_size, 0.0), random.uniform_in(-box_size, 0.0)];
         let side = if k % 2 == 0 { Side::Plus } else { Side::Minus };
         let mut seen = Back::default();
         let _ = run(system, start, WITHIN, &settings, ExitRule::AtOnce { side }, &mut seen)?;

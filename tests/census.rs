@@ -158,6 +158,41 @@ fn the_book_says_what_other_limits_would_do() {
     );
 }
 
+/// More draws go on with the rows of fewer: the file is that of a sweep made at once. Fewer draws are another sweep.
+#[test]
+fn a_sweep_is_gone_on_with_for_more_draws() {
+    let folder = tempfile::tempdir().unwrap();
+    let sweep = |draws: &str, name: &str, more: &[&str]| {
+        let run = Command::new(env!("CARGO_BIN_EXE_twofold"))
+            .args([
+                "sweep",
+                "--t-end",
+                "30",
+                "--over",
+                "params.alpha=0.1,0.2",
+                "--over",
+                "shift.x=-1e-9..1e-9",
+                "--random",
+                draws,
+            ])
+            .args(more)
+            .args(["--out", name])
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        (run.status.code(), String::from_utf8(run.stderr).unwrap())
+    };
+    assert_eq!(sweep("2", "grown.parquet", &[]).0, Some(0));
+    assert_eq!(sweep("5", "whole.parquet", &[]).0, Some(0));
+    let (code, said) = sweep("5", "grown.parquet", &["--resume"]);
+    assert!(code == Some(0) && said.contains("4 rows are there, 6 to compute"), "{said}");
+    let bytes = |name: &str| fs::read(folder.path().join(name)).unwrap();
+    assert!(bytes("grown.parquet") == bytes("whole.parquet"));
+    let (code, said) = sweep("3", "whole.parquet", &["--resume"]);
+    assert!(code == Some(2) && said.contains("different sweeps"), "{said}");
+    assert!(bytes("grown.parquet") == bytes("whole.parquet"));
+}
+
 /// A small sweep, two of whose three rows are there: what is committed need not be whole.
 fn small(t_end: f64) -> Rows {
     let run = RunSpec {

@@ -9,6 +9,9 @@ mod own_method;
 #[allow(dead_code)]
 #[path = "../examples/own_system.rs"]
 mod own_system;
+#[allow(dead_code)]
+#[path = "../examples/returns.rs"]
+mod returns;
 
 use twofold::integrate::filippov::EventKind;
 use twofold::job::Desk;
@@ -38,4 +41,13 @@ fn own_figure_is_written_whole() {
     for file in ["own.png", "own.svg", "own.pdf", "own.json", "own-a.csv", "own-b.csv"] {
         assert!(folder.path().join("own").join(file).metadata().unwrap().len() > 500, "{file}");
     }
+}
+
+#[test]
+fn few_orbits_come_back_from_far_away_in_the_reconstructed_reading() {
+    let back =
+        |box_size| returns::back(&twofold::system::Caricature::with_reinjection(1e-1, 1e-5), box_size, 12).unwrap();
+    // The shares of 400 are 0.995 and 0.17: twelve starts have these by chance only once in 10^5 and 10^4.
+    assert!(back(0.3) >= 10, "{}", back(0.3));
+    assert!(back(3.0) <= 7, "{}", back(3.0));
 }

@@ -115,20 +115,15 @@ fn words(out: &mut Vec<u8>, scene: &Scene, codes: &BTreeMap<char, u8>) {
     }
     out.extend_from_slice(b"BT\n3 Tr\n");
     for words in scene.texts() {
-        let text: String =
-            words.text.chars().filter_map(|c| codes.get(&c)).map(|code| format!("{code:02x}")).collect();
+        let text: String = words.text.chars().filter_map(|c| codes.get(&c)).map(|code| format!("{code:02x}")).collect();
         let (x, y) = words.from;
         // The page's matrix has y downwards; the text's turns it up again.
         let matrix = if words.upwards() { "0 -1 -1 0" } else { "1 0 0 -1" };
         let natural = (text.len() as i64 / 2 * GLYPH_WIDTH * i64::from(words.size)).max(1);
         // Per cent, with two decimals.
         let stretch = (i64::from(words.length()) * 10_000_000 + natural / 2) / natural;
-        let line = format!(
-            "/F {} Tf {}.{:02} Tz {matrix} {x} {y} Tm <{text}> Tj\n",
-            words.size,
-            stretch / 100,
-            stretch % 100
-        );
+        let line =
+            format!("/F {} Tf {}.{:02} Tz {matrix} {x} {y} Tm <{text}> Tj\n", words.size, stretch / 100, stretch % 100);
         out.extend_from_slice(line.as_bytes());
     }
     out.extend_from_slice(b"ET\n");

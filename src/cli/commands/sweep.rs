@@ -65,7 +65,7 @@ pub struct Arguments {
     /// Compute only every Nth row, from the Kth on.
     #[arg(long, value_name = "K/N", default_value = "1/1")]
     shard: Shard,
-    /// Go on with the rows that FILE and FILE.journal hold.
+    /// Go on with the rows that FILE and FILE.journal hold; FILE may be of the same sweep with fewer draws.
     #[arg(long)]
     resume: bool,
     /// With --resume: rows of another version of the program are kept if this many of them, spread evenly, come out the same again.
@@ -233,6 +233,12 @@ fn open(arguments: &Arguments, out: &Path, rows: &mut Rows) -> Result<Journal, C
 /// Takes rows in that were computed before, if they may be mixed with today's.
 fn take(arguments: &Arguments, rows: &mut Rows, old: Rows, file: &Path) -> Result<(), CliError> {
     let refuse = |why: String| CliError::Usage(format!("{}: {why}", file.display()));
+    // A file of fewer draws holds the first rows of this sweep.
+    let more = rows.sweep().draws().filter(|now| old.sweep().draws().is_some_and(|then| then.count < now.count));
+    let old = match more.and_then(|now| old.with_draws(now.count)) {
+        Some(more) if more.sweep() == rows.sweep() => more,
+        _ => old,
+    };
     let foreign: Vec<String> = old.numerics().filter(|n| *n != question::NUMERICS).map(str::to_owned).collect();
     if !foreign.is_empty() && old.sweep().hash() == rows.sweep().hash() && !old.is_empty() {
         let Some(wanted) = arguments.recheck else {

@@ -195,6 +195,18 @@ impl Sweep {
         &self.over
     }
 
+    /// How often random axes are drawn, if there are any.
+    pub fn draws(&self) -> Option<Draws> {
+        self.random
+    }
+
+    /// The same with another number of draws. They run slowest: the rows of the smaller sweep are the first rows of the larger one, with the same
+    /// numbers and contents. `None` without random axes.
+    pub fn with_draws(&self, count: u64) -> Option<Self> {
+        let random = Some(Draws { count, ..self.random? });
+        Some(Self { random, ..self.clone() })
+    }
+
     /// Number of rows.
     pub fn rows(&self) -> u64 {
         self.cells() * self.random.map_or(1, |r| r.count)

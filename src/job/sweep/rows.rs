@@ -275,6 +275,13 @@ impl Rows {
         Ok(())
     }
 
+    /// The rows that belong to the same sweep with another number of draws ([`Sweep::with_draws`]); `None` without random axes.
+    pub fn with_draws(&self, count: u64) -> Option<Self> {
+        let sweep = self.sweep.with_draws(count)?;
+        let lines = self.lines.range(..sweep.rows()).map(|(number, line)| (*number, line.clone())).collect();
+        Some(Self { sweep, numerics: self.numerics.clone(), lines })
+    }
+
     /// How often each outcome occurred.
     pub fn counts(&self) -> BTreeMap<String, u64> {
         let mut counts = BTreeMap::new();
