@@ -78,7 +78,8 @@ function prepare(folder) {
   else execFileSync(binary('twofold'), ['figure', 'fig2', 'fig6', '--fresh', '--out', figures, '--quiet']);
   const { version } = JSON.parse(readFileSync(join(root, 'figures', 'fig6', 'expected.json'), 'utf8'));
   let forced = null;
-  for (const id of readdirSync(figures)) {
+  // Beside the figures' folders there is making.json.
+  for (const id of readdirSync(figures, { withFileTypes: true }).filter((entry) => entry.isDirectory()).map((entry) => entry.name)) {
     mkdirSync(join(expected, id), { recursive: true });
     const pictures = [];
     for (const file of readdirSync(join(figures, id)).filter((f) => f.endsWith('.json'))) {
