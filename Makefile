@@ -3,7 +3,7 @@
 CARGO   ?= cargo
 # Flags of `twofold figure`; --fresh takes nothing from the store and keeps nothing.
 FIGURE_FLAGS ?=
-PROOFS  := printed-cycle coexistence sensitivity contraction crossings horseshoe
+PROOFS  := printed-cycle coexistence saddles inner-law sensitivity contraction crossings horseshoe
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help
@@ -97,6 +97,17 @@ proofs: ## prove the theorems anew (proofs/README.md), write their certificates 
 	@set -e; for p in $(PROOFS); do $(RUN) --package twofold-proofs --bin $$p; done
 	@$(RUN) --bin twofold -- verify proofs/certificates/*.json
 
+.PHONY: second-opinion proofs-quick
+second-opinion: ## the first theorem proved by CAPD, another group's library: make second-opinion CAPD=/path/to/its/clone (needs a C++ compiler, cmake)
+	@CAPD="$(CAPD)" sh proofs/capd/run.sh
+
+# The theorems that take seconds each; the others are checked by their certificates alone.
+QUICK := printed-cycle inner-law saddles
+proofs-quick: ## prove the quick theorems anew, byte for byte as committed, and verify every certificate (a minute)
+	@set -e; for p in $(QUICK); do cp proofs/certificates/$$p.json target/$$p.json; $(RUN) --package twofold-proofs --bin $$p; \
+	cmp target/$$p.json proofs/certificates/$$p.json; done
+	@$(RUN) --bin twofold -- verify proofs/certificates/*.json
+
 browser-test: ## the report in a headless Chromium, if there is one (needs Node)
 	@$(CARGO) build --release --locked --bins
 	@if command -v node >/dev/null; then node scripts/browser_test.mjs $(BROWSER_TEST); else echo "browser test SKIPPED: no Node found"; fi
@@ -177,6 +188,7 @@ bench-keep: ## benchmarks, kept as what `make bench` compares with
 ci: lint test ## what CI runs; nothing in it rests on a store
 	@$(MAKE) --no-print-directory figures FIGURE_FLAGS=--fresh
 	@$(MAKE) --no-print-directory check
+	@$(MAKE) --no-print-directory proofs-quick
 
 clean: ## remove everything that was built or computed
 	@$(CARGO) clean

@@ -55,6 +55,14 @@ impl Cycle {
             && (one + self.determinant - self.trace).is_positive()
             && (one + self.determinant + self.trace).is_positive()
     }
+
+    /// Whether one multiplier is proved to lie outside the closed unit disc and the other inside the open one, the orbit being a saddle: their
+    /// characteristic polynomial l^2 - trace l + det has different signs at 1 and at -1, so that exactly one of its zeros, both real, lies between.
+    pub fn is_saddle(&self) -> bool {
+        let one = Interval::one();
+        let (above, below) = (one + self.determinant - self.trace, one + self.determinant + self.trace);
+        above.is_positive() && below.is_negative() || above.is_negative() && below.is_positive()
+    }
 }
 
 /// Newton's method gets to the arithmetic's end in this many steps from three digits.

@@ -3,14 +3,15 @@
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::inner::inner_law;
 use super::plain::Equation;
 use super::rational::{Range, Rational};
 use super::{Refused, Verified};
 
 /// A failed check: what should hold.
-type Check<T = ()> = Result<T, String>;
+pub(super) type Check<T = ()> = Result<T, String>;
 
-fn need(holds: bool, what: impl Into<String>) -> Check {
+pub(super) fn need(holds: bool, what: impl Into<String>) -> Check {
     if holds { Ok(()) } else { Err(what.into()) }
 }
 
@@ -34,7 +35,7 @@ struct Parameters {
     v_minus: String,
 }
 
-type Bounds = [f64; 2];
+pub(super) type Bounds = [f64; 2];
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -68,6 +69,19 @@ struct Coexistence {
     one: Cycle,
     #[serde(rename = "period three")]
     three: Cycle,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Saddles {
+    #[serde(rename = "period three")]
+    three: Cycle,
+    #[serde(rename = "period four, inverting")]
+    inverting: Cycle,
+    #[serde(rename = "period four")]
+    four: Cycle,
+    #[serde(rename = "period five")]
+    five: Cycle,
 }
 
 #[derive(Deserialize)]
@@ -206,7 +220,7 @@ const PRINTED: &str = include_str!("../../tests/data/crossings-printed.csv");
 const RECONSTRUCTED: &str = include_str!("../../tests/data/crossings-reconstructed.csv");
 
 /// The statements, word for word: a certificate proves these and no others.
-const STATEMENTS: [(&str, &str); 6] = [
+const STATEMENTS: [(&str, &str); 8] = [
     (
         "printed-cycle",
         "For alpha = 1e-3, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed caricature has exactly one closed orbit that crosses y = 0 upwards in the \
@@ -216,6 +230,11 @@ const STATEMENTS: [(&str, &str); 6] = [
         "coexistence",
         "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed caricature has two different closed orbits that both attract: one crosses \
          y = 0 upwards once a turn, the other three times.",
+    ),
+    (
+        "saddles",
+        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed caricature has four different closed orbits of saddle type, one multiplier of \
+         each inside the unit circle and one outside: they cross y = 0 upwards three, four, four and five times a turn.",
     ),
     (
         "sensitivity",
@@ -233,6 +252,13 @@ const STATEMENTS: [(&str, &str); 6] = [
          next has a horseshoe: two loops of covering relations between parallelograms, of 2 and of 14 sets, that have one set in common and go on from it to disjoint \
          ones. Each return passes the two-fold singularity, at a crossing with |x| and |z| below 1e-4. So for every sequence of the two loops there is an orbit that \
          runs through them in this order, for every periodic sequence a periodic one, and the topological entropy of the return map is more than log(1.12).",
+    ),
+    (
+        "inner-law",
+        "In the inner problem of the two-fold with v+ = -1.2, v- = -1.4 and the tanh transition, every orbit that comes in along the sliding surface at s = Y + Z = S, \
+         beyond a bound S0 and with 0 < |p| <= 0.05, leaves |p| < 0.05 exactly once, at s = -x: f x^2/2 - ln(x)/mu = (1/mu - 1) ln S - ln|p| + C, and the derivatives \
+         of x by the state at s = 0, across and along the layer, are exp(K) S^(1/mu - 1)/(|p| x) in absolute value, with C and both K in given intervals that do not \
+         depend on the orbit or on S.",
     ),
     (
         "crossings",
@@ -258,6 +284,8 @@ pub fn verify(text: &str) -> Result<Verified, Refused> {
         match theorem.as_str() {
             "printed-cycle" => printed_cycle(&serde_json::from_value(data).map_err(unreadable)?),
             "coexistence" => coexistence(&serde_json::from_value(data).map_err(unreadable)?),
+            "inner-law" => inner_law(&serde_json::from_value(data).map_err(unreadable)?),
+            "saddles" => saddles(&serde_json::from_value(data).map_err(unreadable)?),
             "contraction" => contraction(&serde_json::from_value(data).map_err(unreadable)?),
             "horseshoe" => horseshoe(&serde_json::from_value(data).map_err(unreadable)?),
             "sensitivity" => sensitivity(&serde_json::from_value(data).map_err(unreadable)?),
@@ -270,15 +298,15 @@ pub fn verify(text: &str) -> Result<Verified, Refused> {
     }
 }
 
-fn exactly(x: f64) -> Check<Rational> {
+pub(super) fn exactly(x: f64) -> Check<Rational> {
     Rational::exactly(x).ok_or_else(|| format!("{x} is a number"))
 }
 
-fn decimal(text: &str) -> Check<Rational> {
+pub(super) fn decimal(text: &str) -> Check<Rational> {
     Rational::decimal(text).ok_or_else(|| format!("{text:?} is a decimal number"))
 }
 
-fn range([low, high]: Bounds) -> Check<Range> {
+pub(super) fn range([low, high]: Bounds) -> Check<Range> {
     let range = Range { low: exactly(low)?, high: exactly(high)? };
     need(range.low <= range.high, format!("the bounds {low:e}, {high:e} are in order"))?;
     Ok(range)
@@ -314,17 +342,31 @@ fn equation(p: &Parameters, alpha: &str) -> Check<Equation> {
 }
 
 /// Whether `claimed` holds `exact`, and is wider by rounding alone: some units in the last place of the numbers that it was made of.
-fn tight(claimed: &Range, exact: &Range, scale: &Rational, what: &str) -> Check {
+pub(super) fn tight(claimed: &Range, exact: &Range, scale: &Rational, what: &str) -> Check {
     need(exact.within(claimed), format!("{what} holds what its parts give"))?;
     let room = &(scale + &exact.magnitude()) * &Rational::tenth_to(14);
     need(claimed.within(&exact.widened(&room)), format!("{what} is no wider than its parts give"))
 }
 
-/// Where a plain integrator must find the crossings, in time and in both coordinates.
-const PLAIN: f64 = 1e-9;
+/// What is claimed of a closed orbit.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Attracts,
+    Saddle,
+}
+
+impl Kind {
+    /// Where a plain integrator must find the crossings, in time and in both coordinates. A saddle multiplies what it does wrong by up to 67 a turn.
+    fn plain(self) -> f64 {
+        match self {
+            Self::Attracts => 1e-9,
+            Self::Saddle => 1e-7,
+        }
+    }
+}
 
 /// Krawczyk's inclusion and stability.
-fn cycle(c: &Cycle, alpha: &str, crossings: usize, name: &str) -> Check<Vec<String>> {
+fn cycle(c: &Cycle, alpha: &str, crossings: usize, kind: Kind, name: &str) -> Check<Vec<String>> {
     let named = |what: &str| format!("{name}: {what}");
     let equation = equation(&c.equation, alpha)?;
     let (one, zero) = (Range::point(&Rational::whole(1)), Range::point(&Rational::whole(0)));
@@ -357,12 +399,16 @@ fn cycle(c: &Cycle, alpha: &str, crossings: usize, name: &str) -> Check<Vec<Stri
         tight(&image[i], &k, &Rational::whole(0), &named("the image"))?;
         need(point[i].within(&image[i]) && image[i].inside(&candidate[i]), named("the boxes are nested"))?;
     }
-    // The preconditioner is near the inverse of D - 1: that is what makes the inclusion sharp.
+    // The preconditioner is near the inverse of D - 1: that is what makes the inclusion sharp. (A saddle's derivative is known less well.)
+    let near = match kind {
+        Kind::Attracts => Rational::tenth_to(2),
+        Kind::Saddle => decimal("0.05")?,
+    };
     for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         let df = |k: usize| &slope[k][j] - unit(k, j);
         let product = &(&y[i][0] * &df(0)) + &(&y[i][1] * &df(1));
         let off = (&product - unit(i, j)).magnitude();
-        need(off < Rational::tenth_to(2), named("the preconditioner is nearly the inverse"))?;
+        need(off < near, named("the preconditioner is nearly the inverse"))?;
     }
     let d = [ranges(c.derivative_at_point[0])?, ranges(c.derivative_at_point[1])?];
     for i in 0..2 {
@@ -371,16 +417,36 @@ fn cycle(c: &Cycle, alpha: &str, crossings: usize, name: &str) -> Check<Vec<Stri
         }
     }
     let (trace, determinant) = (&d[0][0] + &d[1][1], &(&d[0][0] * &d[1][1]) - &(&d[0][1] * &d[1][0]));
-    let scale = Rational::whole(4);
+    // What was rounded were these products.
+    let products = &(&d[0][0] * &d[1][1]).magnitude() + &(&d[0][1] * &d[1][0]).magnitude();
+    let scale = &Rational::whole(4) + &products;
     tight(&range(c.trace)?, &trace, &scale, &named("the trace"))?;
     tight(&range(c.determinant)?, &determinant, &scale, &named("the determinant"))?;
-    let one = Rational::whole(1);
-    need(determinant.high < one, named("the determinant is below 1"))?;
-    let sum = &one + &determinant.low;
-    need(
-        &sum + &trace.low > Rational::whole(0) && &sum - &trace.high > Rational::whole(0),
-        named("the trace is below 1 plus the determinant in absolute value"),
-    )?;
+    let one = Range::point(&Rational::whole(1));
+    // The characteristic polynomial l^2 - trace l + determinant at 1 and -1.
+    let (above, below) = (&(&one + &determinant) - &trace, &(&one + &determinant) + &trace);
+    let zero = Rational::whole(0);
+    let stability = match kind {
+        Kind::Attracts => {
+            need(determinant.high < one.low, named("the determinant is below 1"))?;
+            need(
+                above.low > zero && below.low > zero,
+                named("the trace is below 1 plus the determinant in absolute value"),
+            )?;
+            format!(
+                "it attracts (1 - det >= {:.3e}, 1 + det - |trace| >= {:.3e})",
+                (&one.low - &determinant.high).approximately(),
+                above.low.clone().min(below.low.clone()).approximately()
+            )
+        }
+        Kind::Saddle => {
+            need(
+                above.low > zero && below.high < zero || above.high < zero && below.low > zero,
+                named("the characteristic polynomial has different signs at 1 and -1"),
+            )?;
+            format!("it is a saddle (1 + det - trace in {above}, 1 + det + trace in {below})")
+        }
+    };
 
     need(c.crossings.len() == crossings, named(&format!("{crossings} crossings of y = 0 a turn")))?;
     let mut before = Rational::whole(0);
@@ -402,19 +468,15 @@ fn cycle(c: &Cycle, alpha: &str, crossings: usize, name: &str) -> Check<Vec<Stri
     let mut worst = 0.0_f64;
     for (got, want) in found.iter().zip(&c.crossings) {
         for (g, w) in got.iter().zip([want.time, want.point[0], want.point[1]]) {
-            let narrow = w[1] - w[0] < PLAIN;
+            let narrow = w[1] - w[0] < kind.plain();
             worst = worst.max((g - middle(w)).abs());
             need(narrow, named("the crossings are narrow"))?;
         }
     }
-    need(worst < PLAIN, named(&format!("a plain orbit has the same crossings ({worst:.1e} off)")))?;
+    need(worst < kind.plain(), named(&format!("a plain orbit has the same crossings ({worst:.1e} off)")))?;
     Ok(vec![
         format!("{name}: Krawczyk's inclusion; exactly one fixed point, in x {}, z {}", point[0], point[1]),
-        format!(
-            "{name}: it attracts (1 - det >= {:.3e}, 1 + det - |trace| >= {:.3e})",
-            (&one - &determinant.high).approximately(),
-            (&sum - &trace.magnitude()).approximately()
-        ),
+        format!("{name}: {stability}"),
         format!("{name}: a plain integrator finds the same {crossings} crossings, {worst:.0e} off at most"),
     ])
 }
@@ -424,28 +486,44 @@ fn printed_cycle(c: &Cycle) -> Check<Vec<String>> {
         need(b.width() < Rational::tenth_to(8), "the candidate is narrower than 1e-8")?;
     }
     need(range(c.period)?.width() < Rational::tenth_to(9), "the period is known to ten digits")?;
-    cycle(c, "1e-3", 2, "the cycle")
+    cycle(c, "1e-3", 2, Kind::Attracts, "the cycle")
 }
 
 fn coexistence(c: &Coexistence) -> Check<Vec<String>> {
-    let mut said = cycle(&c.one, "0.1", 2, "period one")?;
-    said.extend(cycle(&c.three, "0.1", 6, "period three")?);
+    let mut said = cycle(&c.one, "0.1", 2, Kind::Attracts, "period one")?;
+    said.extend(cycle(&c.three, "0.1", 6, Kind::Attracts, "period three")?);
+    let points = all_different(&[&c.one, &c.three])?;
+    said.push(format!("the {points} upward crossings are all different: two orbits, and three returns are needed"));
+    Ok(said)
+}
+
+/// How many upward crossings closed orbits have, if no two are the same.
+fn all_different(orbits: &[&Cycle]) -> Check<usize> {
     let mut points = Vec::new();
-    for crossing in c.one.crossings.iter().chain(&c.three.crossings).filter(|c| c.upward) {
+    for crossing in orbits.iter().flat_map(|c| &c.crossings).filter(|c| c.upward) {
         points.push(ranges(crossing.point)?);
     }
     for (i, a) in points.iter().enumerate() {
         for b in &points[i + 1..] {
-            need(
-                !(a[0].meets(&b[0]) && a[1].meets(&b[1])),
-                "the upward crossings of the two orbits are all different",
-            )?;
+            need(!(a[0].meets(&b[0]) && a[1].meets(&b[1])), "the upward crossings of the orbits are all different")?;
         }
     }
-    said.push(format!(
-        "the {} upward crossings are all different: two orbits, and three returns are needed",
-        points.len()
-    ));
+    Ok(points.len())
+}
+
+fn saddles(c: &Saddles) -> Check<Vec<String>> {
+    let mut said = Vec::new();
+    let orbits = [
+        (&c.three, 6, "period three"),
+        (&c.inverting, 8, "period four, inverting"),
+        (&c.four, 8, "period four"),
+        (&c.five, 10, "period five"),
+    ];
+    for (orbit, crossings, name) in orbits {
+        said.extend(cycle(orbit, "0.1", crossings, Kind::Saddle, name)?);
+    }
+    let points = all_different(&orbits.map(|o| o.0))?;
+    said.push(format!("the {points} upward crossings are all different: four orbits, and all returns are needed"));
     Ok(said)
 }
 

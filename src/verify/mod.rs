@@ -15,6 +15,7 @@
 //! ```
 
 mod certificate;
+mod inner;
 mod plain;
 mod rational;
 

@@ -73,6 +73,25 @@ impl Rational {
         Self { numerator: self.numerator.magnitude().clone().into(), denominator: self.denominator.clone() }
     }
 
+    /// The largest multiple of a small power of two that is not above it.
+    fn rounded_down(&self) -> Self {
+        let scaled: BigInt = &self.numerator << GRID;
+        let mut whole: BigInt = &scaled / &self.denominator;
+        if self.is_negative() && &whole * &self.denominator != scaled {
+            whole -= 1;
+        }
+        Self::new(whole, BigInt::from(1) << GRID)
+    }
+
+    /// One over it; `None` of zero.
+    pub fn inverse(&self) -> Option<Self> {
+        match self.numerator.sign() {
+            Sign::NoSign => None,
+            Sign::Plus => Some(Self { numerator: self.denominator.clone(), denominator: self.numerator.clone() }),
+            Sign::Minus => Some(Self { numerator: -&self.denominator, denominator: -&self.numerator }),
+        }
+    }
+
     /// Whether it is below zero.
     pub fn is_negative(&self) -> bool {
         self.numerator.sign() == Sign::Minus
@@ -143,6 +162,41 @@ impl Mul for &Rational {
     }
 }
 
+/// Rounding is to multiples of 2^-GRID.
+const GRID: u32 = 240;
+
+/// An enclosure of twice the inverse hyperbolic tangent of t, |t| <= 1/3, from its series.
+fn twice_artanh(t: &Range) -> Option<Range> {
+    const TERMS: i64 = 80;
+    let square = t.squared().rounded();
+    let (mut power, mut sum) = (t.clone(), Range::point(&Rational::whole(0)));
+    for n in 0..TERMS {
+        let odd = Rational::whole(2 * n + 1).inverse()?;
+        sum = (&sum + &(&power * &Range::point(&odd))).rounded();
+        power = (&power * &square).rounded();
+    }
+    // The rest is less than twice the next power.
+    let sum = sum.widened(&(&power.magnitude() + &power.magnitude()));
+    Some(&sum + &sum)
+}
+
+/// An enclosure of the natural logarithm; `None` unless x is positive.
+fn logarithm(x: &Rational) -> Option<Range> {
+    if x.numerator.sign() != Sign::Plus {
+        return None;
+    }
+    // x = m 2^e with m between 1/2 and 2; ln m = 2 artanh((m - 1)/(m + 1)).
+    let exponent = x.numerator.bits() as i64 - x.denominator.bits() as i64;
+    let shift = BigInt::from(1) << exponent.unsigned_abs();
+    let power = Rational::new(shift, 1.into());
+    let m = if exponent >= 0 { x * &power.inverse()? } else { x * &power };
+    let one = Rational::whole(1);
+    let t = Range::point(&(&(&m - &one) * &(&m + &one).inverse()?)).rounded();
+    let third = Range::point(&Rational::whole(3).inverse()?).rounded();
+    let two = &Range::point(&Rational::whole(exponent)) * &twice_artanh(&third)?;
+    Some((&two + &twice_artanh(&t)?).rounded())
+}
+
 /// All numbers from `low` to `high`.
 #[derive(Clone, Debug)]
 pub struct Range {
@@ -186,6 +240,38 @@ impl Range {
     /// Wider by `by` on both sides.
     pub fn widened(&self, by: &Rational) -> Self {
         Self { low: &self.low - by, high: &self.high + by }
+    }
+
+    /// Wider, to bounds that are short: multiples of 2^-240.
+    pub fn rounded(&self) -> Self {
+        Self { low: self.low.rounded_down(), high: -&(-&self.high).rounded_down() }
+    }
+
+    /// One over its numbers; `None` if zero is one of them.
+    pub fn inverse(&self) -> Option<Self> {
+        let zero = Rational::whole(0);
+        if self.low <= zero && self.high >= zero {
+            return None;
+        }
+        Some(Self { low: self.high.inverse()?, high: self.low.inverse()? })
+    }
+
+    /// The square roots of its numbers; `None` if one of them is negative.
+    pub fn sqrt(&self) -> Option<Self> {
+        if self.low.is_negative() {
+            return None;
+        }
+        // Whole numbers of 4^-GRID, rounded down and up.
+        let fine = |x: &Rational| -> BigInt { (&x.numerator << (2 * GRID)) / &x.denominator };
+        let (low, high) = (fine(&self.low).sqrt(), BigInt::from(fine(&self.high) + 1).sqrt() + 1);
+        let of = |n: BigInt| Rational::new(n, BigInt::from(1) << GRID);
+        Some(Self { low: of(low), high: of(high) })
+    }
+
+    /// The natural logarithms of its numbers; `None` unless all are positive.
+    pub fn ln(&self) -> Option<Self> {
+        let (low, high) = (logarithm(&self.low)?, logarithm(&self.high)?);
+        Some(Self { low: low.low, high: high.high })
     }
 
     /// The squares of its numbers.
@@ -260,6 +346,35 @@ mod tests {
         for wrong in ["", "-", "1.2.3", "0x1", "1e", "ten", "1e99999"] {
             assert!(Rational::decimal(wrong).is_none(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn roots_and_logarithms_are_enclosed() {
+        let d = |t: &str| Rational::decimal(t).unwrap();
+        for (x, root, ln) in [
+            // 40 digits, from mpmath.
+            ("2", "1.414213562373095048801688724209698078570", "0.6931471805599453094172321214581765680755"),
+            ("1.01", "1.004987562112089027021926491275957618694", "0.009950330853168082848215357544260741688630"),
+            ("0.05", "0.2236067977499789696409173668731276235441", "-2.995732273553990993435223576142540775677"),
+            ("1e9", "31622.77660168379331998893544432718533720", "20.72326583694641115616192309215927786840"),
+        ] {
+            for (got, want) in [(Range::point(&d(x)).sqrt(), root), (Range::point(&d(x)).ln(), ln)] {
+                let (got, want) = (got.unwrap(), Range::point(&d(want)).widened(&Rational::tenth_to(34)));
+                assert!(got.within(&want) && got.low <= got.high, "{x}: {got}");
+            }
+            let root = Range::point(&d(x)).sqrt().unwrap();
+            assert!(&root.low * &root.low <= d(x) && &root.high * &root.high >= d(x));
+        }
+        let r = |a: &str, b: &str| Range { low: d(a), high: d(b) };
+        assert!(r("-1", "1").ln().is_none() && r("0", "1").ln().is_none() && r("-1", "1").sqrt().is_none());
+        assert!(r("-1", "1").inverse().is_none());
+        let i = r("-4", "-2").inverse().unwrap();
+        assert_eq!((i.low, i.high), (d("-0.5"), d("-0.25")));
+        let third = Range::point(&Rational::whole(-3).inverse().unwrap()).rounded();
+        assert!(
+            third.low < Rational::whole(-3).inverse().unwrap() && Rational::whole(-3).inverse().unwrap() < third.high
+        );
+        assert!(third.width() < Rational::tenth_to(70));
     }
 
     #[test]
