@@ -138,7 +138,8 @@ def torment(slurm: Slurm, folder: Path) -> None:
     victim = programs(folder)[0]
     os.kill(victim, signal.SIGKILL)
     print(f"process of one job killed; {rows()} rows in journals", flush=True)
-    time.sleep(3)
+    # Only then is what still runs another job.
+    slurm.wait("the end of that job", lambda: len(slurm.jobs("FAILED")) > 0, 120)
     slurm.wait("another job at work", lambda: len(slurm.jobs("RUNNING")) > 0 and len(programs(folder)) > 0, 300)
     job, node = slurm.jobs("RUNNING")[0]
     subprocess.run(["scancel", job], check=True)

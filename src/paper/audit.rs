@@ -17,6 +17,9 @@ pub const PANELS: [Panel; 7] = {
 /// Sweeps of the three figures, in their order: of fig. 7's intervals, of fig. 8's sigmas, and of fig. 9's first panel.
 pub type Sweeps = [Vec<Table>; 3];
 
+/// All runs of every panel, for [`cells`].
+pub const ALL: [usize; 7] = [usize::MAX; 7];
+
 /// A pair of parameters, and how likely the paper's seven outcomes are there.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
@@ -77,8 +80,8 @@ fn runs_at(table: &Table, [alpha, beta]: [f64; 2], panel: &Panel) -> Vec<Run> {
 }
 
 /// The cells of sweeps over `params.alpha` and `params.beta`, or over one of them at the paper's value of the other, in order; those in which
-/// every panel has a run. Of each panel at most the first `most` runs count.
-pub fn cells(sweeps: &Sweeps, most: usize, rules: &Rules) -> Vec<Cell> {
+/// every panel has a run. Of each panel at most so many of the first runs count as `most` says, in the panels' order.
+pub fn cells(sweeps: &Sweeps, most: [usize; 7], rules: &Rules) -> Vec<Cell> {
     let mut pairs: Vec<[f64; 2]> = Vec::new();
     for table in sweeps.iter().flatten() {
         let values = |name: &str, printed: f64| -> Vec<f64> {
@@ -95,7 +98,7 @@ pub fn cells(sweeps: &Sweeps, most: usize, rules: &Rules) -> Vec<Cell> {
         let mut found = [(0, 0, 0); 7];
         for (i, (panel, found)) in PANELS.iter().zip(&mut found).enumerate() {
             let runs = sweeps[i / 3].iter().flat_map(|table| runs_at(table, at, panel));
-            let runs: Vec<Run> = runs.take(most).collect();
+            let runs: Vec<Run> = runs.take(most[i]).collect();
             let far = runs.iter().filter(|r| r.outcome == "far").count() as u64;
             *found = (runs.len() as u64, census::bears_out(panel.said, &runs, rules), far);
         }
@@ -241,7 +244,10 @@ pub fn text(equal: &[Candidate], whole: &[Candidate]) -> String {
     );
     for c in equal {
         let posterior = c.posterior.map(|p| census::percent(p.mean, p.interval));
-        let runs = c.cell.runs.iter().min().copied().unwrap_or(0);
+        let runs = match [c.cell.runs.iter().min(), c.cell.runs.iter().max()].map(|n| n.copied().unwrap_or(0)) {
+            [fewest, most] if fewest == most => fewest.to_string(),
+            [fewest, most] => format!("{fewest} to {most}"),
+        };
         // Writing to a String cannot fail.
         let _ = write!(
             text,
@@ -311,7 +317,7 @@ mod tests {
         let all = |axis, range: std::ops::Range<usize>| PANELS[range].iter().map(|p| of(axis, p)).collect::<Vec<_>>();
         for (axis, expected) in [(("params.alpha", 0.1), [0.1, 1e-5]), (("params.beta", 1e-4), [1e-3, 1e-4])] {
             let sweeps = [all(axis, 0..3), all(axis, 3..6), all(axis, 6..7)];
-            let found = cells(&sweeps, usize::MAX, &claims().rules);
+            let found = cells(&sweeps, ALL, &claims().rules);
             assert_eq!(found.len(), 1);
             assert_eq!(([found[0].alpha, found[0].beta], found[0].runs), (expected, [1; 7]));
             assert_eq!(found[0].hits, [1, 0, 0, 0, 1, 1, 0]);
