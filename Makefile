@@ -164,6 +164,10 @@ torture: ## kill the program at random moments and look for losses: make torture
 	@$(CARGO) build --release --locked --bin twofold
 	@scripts/torture.sh $(or $(KILLS),100)
 
+.PHONY: fuzz
+fuzz: ## every reader of foreign bytes against inputs made by chance: make fuzz FUZZ_SECONDS=600 FUZZ="spec png"
+	@FUZZ_SECONDS=$(or $(FUZZ_SECONDS),60) FUZZ="$(FUZZ)" $(CARGO) test --locked --quiet --test fuzz -- --nocapture every_reader
+
 .PHONY: trap
 trap: ## check figures with every rounding function of the platform's mathematics replaced by an abort (Linux, needs a C compiler)
 	@$(CARGO) build --release --locked --bin twofold

@@ -21,8 +21,8 @@
 //!
 //! and the canard is p = q = 0. s falls all the time, from the attracting side (s > 0) to the repelling one (s < 0). eps enters by where an orbit comes in: at distance y + z = s sqrt(eps).
 //!
-//! Statement. Let an orbit come in at s = S >= S0 with 0 < |p| <= p1 and q/p between S - c1/S and S (that is where the sliding surface is). Then it leaves |p| < p2 exactly
-//! once, at s = -x say, on a side that is known from that of p, and with f = F(0)/w
+//! Statement. Let an orbit come in at s = S >= S0 with 0 < |p| <= p1 and q/p between S - c1/S and S (that is where the sliding surface is). Then it first leaves |p| <= p2
+//! at an s = -x, on a side that is known from that of p, and with f = F(0)/w
 //!
 //! ```text
 //! f x^2/2 - ln(x)/mu = (1/mu - 1) ln S - ln|p(S)| + C,
@@ -53,9 +53,10 @@ use twofold::num::{Arithmetic, Elementary, FromDecimal, Interval, Tape};
 use twofold::rigor::{Flow, Plane, Set, Settings};
 use twofold_proofs::{bounds, digits, refuse, write};
 
-const STATEMENT: &str = "In the inner problem of the two-fold with v+ = -1.2, v- = -1.4 and the tanh transition, every orbit that comes in along the sliding surface at \
-s = Y + Z = S, beyond a bound S0 and with 0 < |p| <= 0.05, leaves |p| < 0.05 exactly once, at s = -x: f x^2/2 - ln(x)/mu = (1/mu - 1) ln S - ln|p| + C, and the derivatives of x by the \
-state at s = 0, across and along the layer, are exp(K) S^(1/mu - 1)/(|p| x) in absolute value, with C and both K in given intervals that do not depend on the orbit or on S.";
+const STATEMENT: &str = "In the inner problem of the two-fold with v+ = -1.2, v- = -1.4 and the tanh transition, let p = phi - phi* and q = (1 - phi*) Z - phi* Y, phi* being \
+the value of phi on the canard. Every orbit that comes in along the sliding surface at s = Y + Z = S, beyond a bound S0, with 0 < |p| <= 0.05 and q/p \
+between S - c1/S and S, first leaves |p| <= 0.05 at an s = -x with f x^2/2 - ln(x)/mu = (1/mu - 1) ln S - ln|p| + C, and the derivatives of x by p and \
+by q at s = 0 are exp(K) S^(1/mu - 1)/(|p| x) in absolute value, with C and both K in given intervals that do not depend on the orbit or on S.";
 
 /// s at which the first part ends, ...
 const S0: f64 = 8.0;
@@ -89,7 +90,7 @@ fn equation() -> Tape {
         let c = Recorded::from_f64;
         let root = c(1.01).sqrt();
         let phi = (root + c(0.1)) / (root + c(1.1));
-        let p = e * a * (c(Q0) / c(E * UNIT));
+        let p = e * a * c(Q0) * c(1.0 / (E * UNIT));
         let rest = phi + p;
         let f = c(2.0) * rest * (Recorded::one() - rest);
         vec![f * (b - s * a), -(root + c(1.3)) * a, root - c(1.3) + c(0.2) * p, e * c(0.0)]

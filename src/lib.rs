@@ -56,6 +56,7 @@
 //! assert!(answer.table("section").is_some_and(|section| section.len() >= 3));
 //! # Ok::<(), twofold::job::JobError>(())
 //! ```
+#![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
 
 // The figures' files, which stand in figures/, call the library by its name.

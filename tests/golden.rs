@@ -6,6 +6,7 @@ use std::path::Path;
 
 use twofold::cli::in_pool;
 use twofold::job::Desk;
+use twofold::paper::checkpoints::{self, Checkpoints};
 use twofold::paper::figures;
 use twofold::paper::pipeline::{Computed, compute, questions};
 use twofold::paper::{Alterations, Figure};
@@ -34,6 +35,58 @@ fn golden_quick_figures_have_the_committed_hashes() {
             let actual = compute(picture, &desk).unwrap().record.hashes;
             let difference = expected.picture(&picture.name).unwrap().first_difference(&actual);
             assert_eq!(difference, None, "{} differs", picture.name);
+        }
+    }
+}
+
+/// The long figures, shortened to t = 300: a digest of what is asked, found and drawn. A picture that changes on purpose gets its new line here; the
+/// test prints it.
+const SHORTENED: [(&str, &str); 6] = [
+    ("fig7-printed-shortened", "aa01e4c401136e387d0c85243c48c7c1569107f52edac13a8f8637b3fd31a708"),
+    ("fig7-reconstructed-shortened", "17688ea47dd30f4a547fb8a7f052c1fc66527459383c4156aee0ff126e1996dd"),
+    ("fig8-printed-shortened", "113552eefd31f9e853d80318f25c7bf897d03a2d86d645fca298f7402cd665f6"),
+    ("fig8-reconstructed-shortened", "dbe577a8bf819e31002c659d9c05c6a2879ae0963c4d0ab0f41a83510fd35312"),
+    ("fig9-printed-shortened", "e1b516d7b60de40f5aed2c5612addb6b504e7f30120a6ebc497ab3303c78846b"),
+    ("fig9-reconstructed-shortened", "7c70ddedae65541d79cbb823137d1e135d9aa2a7e7c3181d8aa77031e73c448e"),
+];
+
+#[test]
+fn golden_shortened_figures_have_the_committed_hashes() {
+    let desk = Desk::quiet();
+    let mut found = Vec::new();
+    for figure in figures::all().iter().filter(|f| ["fig7", "fig8", "fig9"].contains(&f.id)) {
+        for picture in &figure.pictures {
+            let mut picture = picture.clone();
+            picture.alter(&Alterations { t_end: Some(300.0), ..Alterations::default() });
+            let hashes = compute(&picture, &desk).unwrap().record.hashes;
+            let all = [&hashes.spec, &hashes.data, &hashes.verdict, &hashes.pixels, &hashes.svg, &hashes.pdf];
+            let joined: Vec<&str> = all.iter().map(|h| h.as_str()).collect();
+            found.push((hashes.name, Hash::of(joined.join(" ").as_bytes())));
+        }
+    }
+    for (name, hash) in &found {
+        println!("    (\"{name}\", \"{}\"),", hash.as_str());
+    }
+    let found: Vec<(&str, &str)> = found.iter().map(|(name, hash)| (name.as_str(), hash.as_str())).collect();
+    assert_eq!(found, SHORTENED);
+}
+
+/// The checkpoints of the long figures are of today's runs and lead to their root, and one stretch of each figure comes out the same (`twofold audit` takes more).
+#[test]
+fn golden_checkpoints_are_those_of_the_references() {
+    for figure in figures::all() {
+        let runs = checkpoints::runs(&figure);
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("figures").join(figure.id).join("checkpoints.json");
+        let Ok(text) = fs::read_to_string(path) else { continue };
+        assert!(!runs.is_empty(), "{} has no long runs", figure.id);
+        let points = Checkpoints::parse(&text).unwrap();
+        points.confirm(&figure, &manifest(&figure)).unwrap_or_else(|doubt| {
+            panic!("{0}: {doubt}; make them anew: twofold audit {0} --make figures/{0}/checkpoints.json", figure.id)
+        });
+        let cheap: Vec<_> =
+            points.places().into_iter().filter(|p| !points.runs[p.run].panel.starts_with('c')).collect();
+        for place in checkpoints::choose(&cheap, 1, &points.root, 1) {
+            assert_eq!(points.recompute(&figure, place, &()).unwrap(), Ok(()));
         }
     }
 }

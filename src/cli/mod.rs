@@ -40,6 +40,10 @@ pub fn in_pool<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Resu
     if threads > MOST_THREADS {
         return Err(CliError::Threads { threads, reason: format!("at most {MOST_THREADS} are started") });
     }
+    if cfg!(target_family = "wasm") {
+        // There are no threads to start: what is asked side by side is computed one after the other.
+        return Ok(work());
+    }
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()

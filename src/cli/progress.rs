@@ -151,6 +151,7 @@ impl Watch for RunProgress<'_> {
 pub struct Tally<'a> {
     progress: &'a Progress,
     bar: Option<ProgressBar>,
+    unit: &'static str,
     total: u64,
     state: Mutex<TallyState>,
 }
@@ -169,21 +170,28 @@ const FIRST_LINE: Duration = Duration::from_millis(200);
 const LINE_EVERY: Duration = Duration::from_secs(60);
 
 impl<'a> Tally<'a> {
-    /// Counts up to `total`.
+    /// Counts rows up to `total`.
     pub fn new(progress: &'a Progress, total: u64) -> Self {
+        Self::counting(progress, "rows", total)
+    }
+
+    /// Counts up to `total` things of the kind `unit`, a word in the plural.
+    pub fn counting(progress: &'a Progress, unit: &'static str, total: u64) -> Self {
         let bar = match &progress.style {
             Style::Bars(bars) => {
                 let bar = bars.add(ProgressBar::new(total));
                 bar.set_style(
-                    ProgressStyle::with_template("{human_pos} of {human_len} rows {wide_bar} {eta} left {msg}")
-                        .unwrap_or_else(|_| ProgressStyle::default_bar()),
+                    ProgressStyle::with_template(&format!(
+                        "{{human_pos}} of {{human_len}} {unit} {{wide_bar}} {{eta}} left {{msg}}"
+                    ))
+                    .unwrap_or_else(|_| ProgressStyle::default_bar()),
                 );
                 Some(bar)
             }
             _ => None,
         };
         let state = TallyState { finished: 0, failed: 0, begun: Instant::now(), next: FIRST_LINE };
-        Self { progress, bar, total, state: Mutex::new(state) }
+        Self { progress, bar, unit, total, state: Mutex::new(state) }
     }
 
     /// A job is finished.
@@ -201,7 +209,8 @@ impl<'a> Tally<'a> {
         if spent >= state.next && state.finished < self.total {
             state.next = (2 * spent).min(spent + LINE_EVERY);
             let left = spent.mul_f64((self.total - state.finished) as f64 / state.finished as f64);
-            let line = format!("{} of {} rows{failures}, about {} left", state.finished, self.total, human(left));
+            let line =
+                format!("{} of {} {}{failures}, about {} left", state.finished, self.total, self.unit, human(left));
             self.progress.line(&line);
         }
     }

@@ -41,7 +41,7 @@ pub mod step;
 pub mod taylor;
 
 pub use dopri5::Dopri5;
-pub use driver::{Course, Ignore, Observer, Summary, Watch, drive};
+pub use driver::{Course, Ignore, Observer, Part, Summary, Watch, drive, drive_part};
 pub use layered::Layered;
 pub use lsoda::Lsoda;
 pub use method::{Method, PRECISIONS, WithStepper, with_extended};

@@ -80,6 +80,11 @@ pub(super) struct Segment {
 }
 
 impl Schedule {
+    /// How many segments cover (0, t_end].
+    pub fn count(&self, t_end: f64) -> u64 {
+        self.segments(0.0, t_end).count() as u64
+    }
+
     /// The segments that cover (t_start, t_end]. Times are multiples of the intervals, not running sums.
     pub(super) fn segments(&self, t_start: f64, t_end: f64) -> impl Iterator<Item = Segment> + use<> {
         let restart = self.restart_every;
@@ -170,6 +175,51 @@ mod tests {
         assert_eq!(ends.len(), 5, "{ends:?}");
         assert!(segments[..4].iter().all(|s| s.kick) && !segments[4].kick);
         assert_eq!(ends[4], 1.5);
+    }
+
+    /// Every schedule of small whole numbers, in several units of time, against what the words say: a segment ends at each multiple of either
+    /// interval and at the end, a kick follows where a multiple of the kick's interval is and the run goes on.
+    #[test]
+    fn every_small_schedule_is_what_the_words_say() {
+        let mut seen = 0;
+        for unit in [1.0, 0.1, 0.3, 1.0 / 3.0, 1e-6, 7e4] {
+            for restart in 0..=9_u32 {
+                for kick in 0..=9_u32 {
+                    for length in 1..=24_u32 {
+                        let interval = |n: u32| (n > 0).then(|| f64::from(n) * unit);
+                        let schedule = Schedule {
+                            restart_every: interval(restart),
+                            kick: interval(kick).map(|every| Kick {
+                                every,
+                                size: 1.0,
+                                law: KickLaw::Cube,
+                                seed: 0,
+                                stream: 0,
+                            }),
+                        };
+                        let t_end = f64::from(length) * unit;
+                        let is_multiple = |n: u32, of: u32| of > 0 && n.is_multiple_of(of);
+                        let wanted: Vec<(u32, bool)> = (1..=length)
+                            .filter(|n| is_multiple(*n, restart) || is_multiple(*n, kick) || *n == length)
+                            .map(|n| (n, is_multiple(n, kick) && n < length))
+                            .collect();
+                        let found: Vec<Segment> = schedule.segments(0.0, t_end).collect();
+                        let what = format!("unit {unit}, restart {restart}, kick {kick}, length {length}: {found:?}");
+                        assert_eq!(found.len(), wanted.len(), "{what}");
+                        assert_eq!(schedule.count(t_end), wanted.len() as u64, "{what}");
+                        for (segment, (n, kick)) in found.iter().zip(wanted) {
+                            assert!((segment.end - f64::from(n) * unit).abs() <= 1e-9 * segment.end.max(1.0), "{what}");
+                            assert_eq!(segment.kick, kick, "{what}");
+                        }
+                        assert_eq!(found.last().map(|s| s.end), Some(t_end), "{what}");
+                        assert!(found.windows(2).all(|w| w[0].end < w[1].end), "{what}");
+                        seen += 1;
+                    }
+                }
+            }
+        }
+        assert_eq!(seen, 6 * 10 * 10 * 24);
+        assert_eq!(Schedule::default().segments(1.0, 1.0).count(), 0, "no time, no segment");
     }
 
     #[test]

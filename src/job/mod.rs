@@ -58,6 +58,7 @@ pub mod scan;
 pub mod simulate;
 pub mod spec;
 pub mod store;
+pub mod stretch;
 pub mod sweep;
 pub mod table;
 

@@ -13,8 +13,8 @@ use crate::integrate::filippov::{
     self, AllModes, ExitRule, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent, SlidingFlow,
 };
 use crate::integrate::{
-    Course, Flow, Observer, PRECISIONS, Statistics, Step, Stepper, StopReason, Summary, Watch, WithStepper, drive,
-    with_extended,
+    Course, Flow, Observer, PRECISIONS, Part, Statistics, Step, Stepper, StopReason, Summary, Watch, WithStepper,
+    drive_part, with_extended,
 };
 use crate::system::{Bound, Compiled, Field, Hysteretic, PiecewiseSmooth, Smoothed, VectorField};
 
@@ -49,7 +49,7 @@ pub fn simulate_until(spec: &RunSpec, until: Until<'_>, watch: &dyn Watch) -> Re
     if spec.system.dimension() != 3 {
         return Err(too_many_states(spec, "three states are looked at here"));
     }
-    let recording = three_states(spec, &mut Aside { sink: None, until: Some(until) }, watch)?;
+    let recording = three_states(spec, &mut Aside { until: Some(until), ..Aside::default() }, watch)?;
     if recording.stop == StopReason::Observer && recording.data.len() >= MOST_POINTS {
         return Err(full(recording.t));
     }
@@ -78,6 +78,44 @@ pub fn answer(spec: &RunSpec, watch: &dyn Watch) -> Result<Answer, JobError> {
 }
 
 const UP_TO_EIGHT: &str = "runs are computed with up to eight states";
+
+/// Computes a part of a smoothed or hysteretic run whose section is recorded, from the equation's state at that part's beginning (which `spec`'s
+/// start and phi are): the rows, the time at its end, and the equation's state there.
+///
+/// # Errors
+///
+/// As [`answer`].
+pub(super) fn part(spec: &RunSpec, part: Part, watch: &dyn Watch) -> Result<(Table, f64, Vec<f64>), JobError> {
+    spec.validate()?;
+    match spec.system.dimension() {
+        1 => one_part(spec, part, |aside| record::<1, 2>(spec, aside, watch)),
+        2 => one_part(spec, part, |aside| record::<2, 3>(spec, aside, watch)),
+        3 => one_part(spec, part, |aside| three_states(spec, aside, watch)),
+        4 => one_part(spec, part, |aside| record::<4, 5>(spec, aside, watch)),
+        5 => one_part(spec, part, |aside| record::<5, 6>(spec, aside, watch)),
+        6 => one_part(spec, part, |aside| record::<6, 7>(spec, aside, watch)),
+        7 => one_part(spec, part, |aside| record::<7, 8>(spec, aside, watch)),
+        8 => one_part(spec, part, |aside| record::<8, 9>(spec, aside, watch)),
+        _ => Err(too_many_states(spec, UP_TO_EIGHT)),
+    }
+}
+
+fn one_part<const D: usize>(
+    spec: &RunSpec,
+    part: Part,
+    run: impl FnOnce(&mut Aside<'_, D>) -> Result<Recording<D>, JobError>,
+) -> Result<(Table, f64, Vec<f64>), JobError> {
+    let mut aside = Aside { part, ..Aside::default() };
+    let recording = run(&mut aside)?;
+    match recording.stop {
+        StopReason::EndTime => {}
+        StopReason::Watch => return Err(JobError::Interrupted),
+        _ => return Err(full(recording.t)),
+    }
+    let rows =
+        Recording::part(spec, &recording.data, 0).ok_or_else(|| JobError::Other("a funnel has no parts".into()))?;
+    Ok((rows, recording.t, aside.end))
+}
 
 /// How a streamed run ended.
 #[derive(Clone, Debug, PartialEq)]
@@ -125,11 +163,15 @@ struct Aside<'a, const D: usize> {
     sink: Option<Sink<'a, D>>,
     /// Ends a smoothed or hysteretic run.
     until: Option<Until<'a>>,
+    /// Which part of a smoothed or hysteretic run is computed.
+    part: Part,
+    /// The equation's whole state at its end.
+    end: Vec<f64>,
 }
 
 impl<const D: usize> Default for Aside<'_, D> {
     fn default() -> Self {
-        Self { sink: None, until: None }
+        Self { sink: None, until: None, part: Part::WHOLE, end: Vec::new() }
     }
 }
 
@@ -150,7 +192,7 @@ fn streamed<const D: usize>(
         }
         more
     };
-    let end = run(&mut Aside { sink: Some(&mut give), until: None })?;
+    let end = run(&mut Aside { sink: Some(&mut give), ..Aside::default() })?;
     let wanted = give(end.data);
     let stop = if wanted { end.stop.into() } else { Stop::Found };
     Ok(Streamed { t: end.t, rows: count, statistics: end.statistics, stop })
@@ -470,20 +512,25 @@ fn observe<F: VectorField<N>, const D: usize, const N: usize>(
     aside: &mut Aside<'_, D>,
     watch: &dyn Watch,
 ) -> Result<Recording<D>, JobError> {
+    let part = aside.part;
     let (summary, data) = match spec.observe {
         Observation::Path { chord } => {
-            let mut draining = Draining { recorder: PathRecorder::<D>::new(&x0, chord), aside };
-            (integrate(spec, field, x0, D, &mut draining, watch)?, Data::Path(draining.recorder.into_samples()))
+            let mut draining = Draining { recorder: PathRecorder::<D>::new(&x0, chord), aside: &mut *aside };
+            (integrate(spec, field, x0, D, part, &mut draining, watch)?, Data::Path(draining.recorder.into_samples()))
         }
         Observation::Times { every } => {
-            let mut draining = Draining { recorder: TimesRecorder::<D>::new(&x0, every), aside };
-            (integrate(spec, field, x0, D, &mut draining, watch)?, Data::Path(draining.recorder.into_samples()))
+            let mut draining = Draining { recorder: TimesRecorder::<D>::new(&x0, every), aside: &mut *aside };
+            (integrate(spec, field, x0, D, part, &mut draining, watch)?, Data::Path(draining.recorder.into_samples()))
         }
         Observation::Section { coordinate, value } => {
-            let mut draining = Draining { recorder: SectionRecorder::<D>::new(coordinate, value), aside };
-            (integrate(spec, field, x0, D, &mut draining, watch)?, Data::Section(draining.recorder.into_crossings()))
+            let mut draining = Draining { recorder: SectionRecorder::<D>::new(coordinate, value), aside: &mut *aside };
+            (
+                integrate(spec, field, x0, D, part, &mut draining, watch)?,
+                Data::Section(draining.recorder.into_crossings()),
+            )
         }
     };
+    aside.end = summary.x.as_slice().to_vec();
     Ok(Recording {
         data,
         t: summary.t,
@@ -500,12 +547,13 @@ fn integrate<'a, F: VectorField<N>, const N: usize>(
     field: &'a F,
     x0: SVector<f64, N>,
     states: usize,
+    part: Part,
     observer: &'a mut (dyn Observer<N> + 'a),
     watch: &'a dyn Watch,
 ) -> Result<Summary<N>, JobError> {
     let MethodSpec { name, tolerance, step_cap, max_steps, precision, order } = spec.method;
     let course = Course { t_end: spec.t_end, schedule: spec.schedule, step_cap, max_steps, kicked_states: states };
-    let orbit = Drive { field, x0, course, observer: AnyObserver(observer), watch };
+    let orbit = Drive { field, x0, course, part, observer: AnyObserver(observer), watch };
     match (precision, order) {
         (None, None) => name.with_stepper(tolerance, orbit),
         _ => with_extended(precision.unwrap_or(PRECISIONS[0]), order, tolerance, orbit),
@@ -517,6 +565,7 @@ struct Drive<'a, F, const N: usize> {
     field: &'a F,
     x0: SVector<f64, N>,
     course: Course,
+    part: Part,
     observer: AnyObserver<'a, dyn Observer<N> + 'a>,
     watch: &'a dyn Watch,
 }
@@ -524,7 +573,7 @@ struct Drive<'a, F, const N: usize> {
 impl<F: VectorField<N>, const N: usize> WithStepper<N> for Drive<'_, F, N> {
     type Answer = Result<Summary<N>, JobError>;
     fn with<M: Stepper<N>>(self, mut stepper: M) -> Self::Answer {
-        let Self { field, x0, course, mut observer, watch } = self;
-        Ok(drive(field, x0, &course, &mut stepper, &mut observer, watch)?.within_budget()?)
+        let Self { field, x0, course, part, mut observer, watch } = self;
+        Ok(drive_part(field, x0, &course, part, &mut stepper, &mut observer, watch)?.within_budget()?)
     }
 }

@@ -162,6 +162,15 @@ pub struct Entry {
     pub current: bool,
 }
 
+/// The answer in the bytes of an entry, whatever question it is for.
+///
+/// # Errors
+///
+/// If they are no whole entry.
+pub fn answer_in(bytes: &[u8]) -> Result<Answer, encode::Malformed> {
+    read(bytes).map(|(_, answer)| answer).map_err(encode::Malformed)
+}
+
 /// The header and answer in an entry's bytes.
 fn read(bytes: &[u8]) -> Result<(Header, Answer), String> {
     let (content, digest) = bytes.split_at_checked(bytes.len().saturating_sub(DIGEST)).ok_or("it is too short")?;

@@ -74,6 +74,12 @@ pub fn erf(x: f64) -> f64 {
     libm::erf(x)
 }
 
+/// Base-2 logarithm.
+#[inline]
+pub fn log2(x: f64) -> f64 {
+    libm::log2(x)
+}
+
 /// Base-10 logarithm.
 #[inline]
 pub fn log10(x: f64) -> f64 {

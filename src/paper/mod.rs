@@ -19,6 +19,7 @@
 
 pub mod audit;
 pub mod census;
+pub mod checkpoints;
 pub mod claim;
 pub mod claims;
 pub mod drawing;

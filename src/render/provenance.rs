@@ -244,6 +244,44 @@ mod tests {
     }
 
     #[test]
+    fn what_is_looked_for_is_found_from_where_one_looks() {
+        assert_eq!(find(b"abcabcab", b"abc", 0), Some(0));
+        assert_eq!(find(b"abcabcab", b"abc", 1), Some(3));
+        assert_eq!(find(b"abcabcab", b"abc", 3), Some(3));
+        assert_eq!(find(b"abcabcab", b"abc", 4), None);
+        assert_eq!(find(b"abc", b"abc", 9), None);
+        // A picture's beginning tells that it is an SVG: its first 1024 bytes.
+        let later = |n: usize| format_of(&[&vec![b' '; n][..], b"<svg"].concat());
+        assert_eq!((later(1020), later(1021)), (Ok(Format::Svg), Err(ProvenanceError::UnknownFormat)));
+    }
+
+    #[test]
+    fn a_seal_is_whole_or_none() {
+        let open = format!("<svg><entry key=\"{SEAL_KEY}\">");
+        let whole = format!("{open}{}", "0".repeat(SEAL_LENGTH));
+        assert_eq!(seal_position(whole.as_bytes(), Format::Svg), Some(open.len()));
+        assert_eq!(seal_position(&whole.as_bytes()[..whole.len() - 1], Format::Svg), None);
+        // In a PDF it stands behind our own entry, not before.
+        let (key, entry) = (format!("[\"{SEAL_KEY}\",\""), format!("/{}", pdf::INFO_KEY));
+        let seal = "0".repeat(SEAL_LENGTH);
+        let behind = format!("%PDF{entry}({key}{seal}");
+        assert_eq!(seal_position(behind.as_bytes(), Format::Pdf), Some(behind.len() - SEAL_LENGTH));
+        let before = format!("%PDF{key}{seal}{entry}");
+        assert_eq!(seal_position(before.as_bytes(), Format::Pdf), None);
+    }
+
+    #[test]
+    fn chunks_end_where_they_say() {
+        let chunk = |length: u32, data: &[u8]| [&length.to_be_bytes()[..], b"iTXt", data, b"crc!"].concat();
+        let file = |parts: &[Vec<u8>]| [b"\x89PNG\r\n\x1a\n".to_vec(), parts.concat()].concat();
+        let lengths = |file: &[u8]| chunks(file).map(|c| (c.start, c.length)).collect::<Vec<_>>();
+        assert_eq!(lengths(&file(&[chunk(3, b"abc"), chunk(0, b"")])), [(16, 3), (31, 0)]);
+        assert_eq!(lengths(&file(&[chunk(4, b"abc")])), [], "it claims a byte more than there is");
+        assert_eq!(lengths(&file(&[chunk(u32::MAX, b"abc")])), []);
+        assert_eq!(lengths(&file(&[chunk(2, b"ab"), vec![0; 7]])), [(16, 2)], "half a head is no chunk");
+    }
+
+    #[test]
     fn other_files_are_refused() {
         assert_eq!(read_provenance(b""), Err(ProvenanceError::UnknownFormat));
         assert_eq!(read_provenance(b"\x89PNG\r\n\x1a\n\0\0\0"), Err(ProvenanceError::Foreign));

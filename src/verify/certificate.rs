@@ -255,10 +255,10 @@ const STATEMENTS: [(&str, &str); 8] = [
     ),
     (
         "inner-law",
-        "In the inner problem of the two-fold with v+ = -1.2, v- = -1.4 and the tanh transition, every orbit that comes in along the sliding surface at s = Y + Z = S, \
-         beyond a bound S0 and with 0 < |p| <= 0.05, leaves |p| < 0.05 exactly once, at s = -x: f x^2/2 - ln(x)/mu = (1/mu - 1) ln S - ln|p| + C, and the derivatives \
-         of x by the state at s = 0, across and along the layer, are exp(K) S^(1/mu - 1)/(|p| x) in absolute value, with C and both K in given intervals that do not \
-         depend on the orbit or on S.",
+        "In the inner problem of the two-fold with v+ = -1.2, v- = -1.4 and the tanh transition, let p = phi - phi* and q = (1 - phi*) Z - phi* Y, phi* being \
+         the value of phi on the canard. Every orbit that comes in along the sliding surface at s = Y + Z = S, beyond a bound S0, with 0 < |p| <= 0.05 and q/p \
+         between S - c1/S and S, first leaves |p| <= 0.05 at an s = -x with f x^2/2 - ln(x)/mu = (1/mu - 1) ln S - ln|p| + C, and the derivatives of x by p and \
+         by q at s = 0 are exp(K) S^(1/mu - 1)/(|p| x) in absolute value, with C and both K in given intervals that do not depend on the orbit or on S.",
     ),
     (
         "crossings",

@@ -263,7 +263,7 @@ impl Range {
         }
         // Whole numbers of 4^-GRID, rounded down and up.
         let fine = |x: &Rational| -> BigInt { (&x.numerator << (2 * GRID)) / &x.denominator };
-        let (low, high) = (fine(&self.low).sqrt(), BigInt::from(fine(&self.high) + 1).sqrt() + 1);
+        let (low, high) = (fine(&self.low).sqrt(), (fine(&self.high) + 1u32).sqrt() + 1);
         let of = |n: BigInt| Rational::new(n, BigInt::from(1) << GRID);
         Some(Self { low: of(low), high: of(high) })
     }

@@ -1,5 +1,6 @@
 //! The commands of `twofold`.
 
+mod audit;
 mod bless;
 mod check;
 mod figure;
@@ -44,6 +45,7 @@ enum Command {
     Figure(Box<figure::Arguments>),
     Sweep(Box<sweep::Arguments>),
     Check(check::Arguments),
+    Audit(audit::Arguments),
     Bless(bless::Arguments),
     Report(report::Arguments),
     Inspect(inspect::Arguments),
@@ -70,6 +72,7 @@ pub fn main() -> ExitCode {
         Command::Figure(arguments) => figure::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Audit(arguments) => audit::run(&arguments),
         Command::Bless(arguments) => bless::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),

@@ -419,3 +419,64 @@ impl Rows {
         Ok(Self { sweep, numerics, lines: BTreeMap::new() })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::spec::*;
+    use crate::system::Caricature;
+
+    /// Every way to have some of four rows in three parts: merged in any grouping and order they are the same rows, and one row with two contents is
+    /// refused wherever it stands.
+    #[test]
+    fn every_small_merge_is_a_union() {
+        let run = RunSpec {
+            system: Caricature::with_reinjection(1e-1, 1e-5).into(),
+            switch: SwitchSpec::tanh(1e-3),
+            start: vec![0.2, 0.0, -1.0],
+            t_end: 60.0,
+            method: MethodSpec::ndsolve_defaults(Method::Dopri5),
+            schedule: Default::default(),
+            observe: Observation::Section { coordinate: 1, value: 0.0 },
+        };
+        let sweep = Sweep::new(run, vec!["interval=1,2,3,4".parse().unwrap()], None).unwrap();
+        let row = |number: u64, reason: &str| Row::failed(number, sweep.settings(number), None, reason.to_owned());
+        let part = |set: u32| {
+            let mut rows = Rows::of(sweep.clone());
+            (0..4).filter(|i| set >> i & 1 == 1).for_each(|i| rows.insert(row(i, "why")).unwrap());
+            rows
+        };
+        let union = |parts: [u32; 3]| {
+            let mut rows = part(parts[0]);
+            rows.merge(part(parts[1])).unwrap();
+            rows.merge(part(parts[2])).unwrap();
+            rows.journal()
+        };
+        for parts in 0..16_u32.pow(3) {
+            let [a, b, c] = [parts & 15, parts >> 4 & 15, parts >> 8];
+            let wanted = part(a | b | c).journal();
+            assert_eq!(union([a, b, c]), wanted, "{a:b} {b:b} {c:b}");
+            let mut later = part(b);
+            later.merge(part(c)).unwrap();
+            let mut rows = part(a);
+            rows.merge(later).unwrap();
+            assert_eq!(rows.journal(), wanted, "the other way round: {a:b} {b:b} {c:b}");
+            let missing: Vec<u64> = (0..4).filter(|i| (a | b | c) >> i & 1 == 0).collect();
+            assert_eq!(rows.missing(Shard::WHOLE), missing);
+        }
+        for number in 0..4 {
+            let mut rows = part(15);
+            let mut other = Rows::of(sweep.clone());
+            other.insert(row(number, "another")).unwrap();
+            assert_eq!(rows.merge(other), Err(RowsError::Conflict(number)));
+            assert_eq!(rows.insert(row(number, "another")), Err(RowsError::Conflict(number)));
+            assert_eq!(rows.insert(row(number, "why")), Ok(()));
+        }
+        // Every shard of every number of shards: each row once.
+        for n in 1..=6 {
+            let mut all: Vec<u64> = (1..=n).flat_map(|k| Shard { k, n }.rows(&sweep)).collect();
+            all.sort_unstable();
+            assert_eq!(all, [0, 1, 2, 3], "{n} shards");
+        }
+    }
+}
