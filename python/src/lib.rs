@@ -22,8 +22,8 @@ mod _native {
 
     use pyo3::prelude::*;
     use pyo3::types::PyDict;
-    use twofold::job::question::NUMERICS;
     use twofold::integrate::PRECISIONS;
+    use twofold::job::question::NUMERICS;
     use twofold::job::spec::{DEFAULT_MAX_STEPS, Method, MethodSpec, finest_extended};
 
     #[pymodule_init]
