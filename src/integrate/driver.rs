@@ -162,7 +162,12 @@ where
     }
     'run: for segment in segments.take(count(part.to.saturating_sub(part.from))) {
         let steps_before = stepper.statistics().steps;
-        stepper.restart(field, t, x, segment.end, step_cap.for_segment(segment.end - t))?;
+        let longest = step_cap.for_segment(segment.end - t);
+        if t == 0.0 {
+            stepper.restart(field, t, x, segment.end, longest)?;
+        } else {
+            stepper.restart_again(field, t, x, segment.end, longest)?;
+        }
         while t < segment.end {
             let step = stepper.step(field)?;
             (t, x) = (step.t1, step.x1);
