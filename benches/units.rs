@@ -12,7 +12,7 @@ use twofold::integrate::ensemble::{InstructionSet, Run, ensemble_with};
 use twofold::integrate::{
     Course, Dopri5, Failure, Ignore, Layered, Lsoda, Radau5, Schedule, StepCap, Stepper, Taylor, Tolerance, drive,
 };
-use twofold::system::{Caricature, Smoothed, Transition};
+use twofold::system::{BoundField, Caricature, Field as Recorded, Smoothed, System, Transition, VectorField};
 
 const TOLERANCE: Tolerance = Tolerance { rtol: 1.0536712e-8, atol: 1.0536712e-8 };
 
@@ -27,7 +27,14 @@ fn field(set: &str) -> Field {
     Smoothed { system, transition: Transition::Tanh, eps: 1e-3 }
 }
 
-fn w1<M: Stepper<3>>(field: &Field, mut stepper: M) -> Done {
+/// The same from its file, as a user's system is.
+fn from_file(set: &str) -> Option<BoundField<3>> {
+    let (alpha, beta) = if set == "A" { (1e-3, 1e-5) } else { (1e-1, 1e-4) };
+    let system = System::builtin("caricature")?.with("alpha", alpha).ok()?.with("beta", beta).ok()?;
+    Recorded::smoothed(&system, Transition::Tanh, 1e-3).bind().ok()
+}
+
+fn w1<F: VectorField<3>, M: Stepper<3>>(field: &F, mut stepper: M) -> Done {
     let mut section = SectionRecorder::<3>::new(1, 0.0);
     let course = Course {
         t_end: 2e5,
@@ -40,7 +47,7 @@ fn w1<M: Stepper<3>>(field: &Field, mut stepper: M) -> Done {
     Ok((end.statistics.steps, section.crossings().len(), end.x))
 }
 
-fn w2<M: Stepper<3>>(field: &Field, make: impl Fn() -> M) -> Done {
+fn w2<F: VectorField<3>, M: Stepper<3>>(field: &F, make: impl Fn() -> M) -> Done {
     let mut done = (0, 0, vector![0.0, 0.0, 0.0]);
     let course = Course {
         t_end: 2000.0,
@@ -58,7 +65,7 @@ fn w2<M: Stepper<3>>(field: &Field, make: impl Fn() -> M) -> Done {
 }
 
 /// W2 in lanes.
-fn w2_in_lanes(field: &Field, set: InstructionSet) -> Done {
+fn w2_in_lanes<F: VectorField<3>>(field: &F, set: InstructionSet) -> Done {
     let course = Course { step_cap: StepCap::Absolute(10.0), ..Course::to(2000.0) };
     let run = |k: u32| Run { start: vector![0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0, 0.0, -1.0], course };
     let runs: Vec<_> = (0..1000).map(run).collect();
@@ -83,6 +90,9 @@ fn once(unit: &str, set: &str, method: &str) -> Option<Done> {
         ("W2", "dopri5-lanes-avx512") if InstructionSet::Avx512.is_here() => {
             w2_in_lanes(&field, InstructionSet::Avx512)
         }
+        ("W2", "dopri5-lanes-portable") => w2_in_lanes(&field, InstructionSet::Portable),
+        ("W1", "dopri5-file") => w1(&from_file(set)?, Dopri5::new(TOLERANCE)),
+        ("W2", "dopri5-lanes-file") => w2_in_lanes(&from_file(set)?, InstructionSet::best()),
         ("W2", "lsoda") => w2(&field, || Lsoda::new(TOLERANCE)),
         _ => return None,
     })

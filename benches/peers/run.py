@@ -32,6 +32,10 @@ PEERS = [
 METHODS = {
     "dopri5": (W1 + ["W2 B"], "Boost.odeint dopri5", 0.8),
     "layered": (W1 + ["W2 B"], "Boost.odeint dopri5", 0.4),
+    # A system from a file: beside the compiled one.
+    "dopri5-file": (W1, "ours, dopri5", 3.0),
+    "dopri5-lanes-file": (["W2 B"], "ours, dopri5-lanes-avx512", 1.3),
+    "dopri5-lanes-portable": (["W2 B"], "Boost.odeint dopri5", None),
     "dopri5-lanes-avx2": (["W2 B"], "Boost.odeint dopri5", 1 / 12),
     "dopri5-lanes-avx512": (["W2 B"], "Boost.odeint dopri5", 1 / 12),
     "lsoda": (W1, "CVODE Adams", 1 / 7),

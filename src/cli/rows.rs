@@ -1,15 +1,18 @@
 //! Rows of a sweep, computed side by side and kept as they finish.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
 use super::progress::{Progress, Tally};
 use super::{CliError, in_pool};
-use crate::job::sweep::Rows;
+use crate::job::sweep::{Row, Rows};
 use crate::record::Journal;
+
+/// Fewest and most rows that a thread takes at once for its lanes.
+const LEAST: usize = 8;
+const MOST: usize = 48;
 
 /// The name of the journal of a file.
 pub fn journal_of(file: &Path) -> PathBuf {
@@ -34,29 +37,50 @@ pub fn compute(
     let sweep = rows.sweep().clone();
     let shared = Mutex::new((rows, journal, None::<CliError>));
     let tally = Tally::new(progress, pending.len() as u64);
-    let next = AtomicUsize::new(0);
+    let next = Mutex::new(pending);
+    let keep = |row: Row| {
+        let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
+        let (rows, journal, trouble) = &mut *shared;
+        if trouble.is_some() {
+            return false;
+        }
+        if let Some(journal) = journal.as_mut()
+            && let Err(error) = journal.append(&row.line())
+        {
+            *trouble = Some(error.into());
+            return false;
+        }
+        tally.done(row.reason().is_some());
+        // A row of this number is not there: it was missing.
+        let _ = rows.insert(row);
+        true
+    };
     in_pool(threads, || {
-        (0..rayon::current_num_threads()).into_par_iter().with_max_len(1).for_each(|_| {
-            // Rows are taken in order, so that what is finished at any moment is a fair part of the whole.
-            while let Some(number) = pending.get(next.fetch_add(1, Ordering::Relaxed)) {
-                if progress.asked_to_stop().is_some() {
+        let threads = rayon::current_num_threads();
+        // Rows are taken in order, so that what is finished at any moment is a fair part of the whole: those that may share lanes a few at a time, and
+        // fewer towards the end, lest one thread be left with many.
+        let some = || {
+            let mut next = next.lock().unwrap_or_else(PoisonError::into_inner);
+            let alike = matches!(next[..], [a, b, ..] if sweep.share_lanes(a, b));
+            let count = (next.len() / (2 * threads)).clamp(if alike { LEAST } else { 1 }, MOST);
+            let (now, later) = next.split_at(count.min(next.len()));
+            *next = later;
+            now
+        };
+        (0..threads).into_par_iter().with_max_len(1).for_each(|_| {
+            loop {
+                let numbers = some();
+                if numbers.is_empty() || progress.asked_to_stop().is_some() {
                     break;
                 }
-                let Ok(row) = sweep.row(*number, &tally) else { break };
-                let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
-                let (rows, journal, trouble) = &mut *shared;
-                if trouble.is_some() {
+                let mut more = true;
+                let taken = sweep.rows_together(numbers, &tally, &mut |row| {
+                    more = keep(row);
+                    more
+                });
+                if taken.is_err() || !more {
                     break;
                 }
-                if let Some(journal) = journal.as_mut()
-                    && let Err(error) = journal.append(&row.line())
-                {
-                    *trouble = Some(error.into());
-                    break;
-                }
-                tally.done(row.reason().is_some());
-                // A row of this number is not there: it was missing.
-                let _ = rows.insert(row);
             }
         });
     })?;

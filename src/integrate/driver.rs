@@ -150,6 +150,7 @@ where
     let Course { t_end, ref schedule, step_cap, max_steps, kicked_states } = *course;
     let mut kicker = schedule.kick.map(|kick| Kicker::new(kick, kicked_states));
     let (mut t, mut x) = (0.0, x0);
+    let mut begun = false;
     let mut most_steps_in_segment = 0;
     let mut stop = StopReason::EndTime;
     let count = |segments: u64| usize::try_from(segments).unwrap_or(usize::MAX);
@@ -162,7 +163,12 @@ where
     }
     'run: for segment in segments.take(count(part.to.saturating_sub(part.from))) {
         let steps_before = stepper.statistics().steps;
-        stepper.restart(field, t, x, segment.end, step_cap.for_segment(segment.end - t))?;
+        let longest = step_cap.for_segment(segment.end - t);
+        if !std::mem::replace(&mut begun, true) {
+            stepper.restart(field, t, x, segment.end, longest)?;
+        } else {
+            stepper.restart_again(field, t, x, segment.end, longest)?;
+        }
         while t < segment.end {
             let step = stepper.step(field)?;
             (t, x) = (step.t1, step.x1);

@@ -15,7 +15,7 @@ use pulp::bytemuck::{cast_slice, cast_slice_mut};
 use pulp::{Scalar, Simd, WithSimd};
 
 use super::dopri5::{Dense, Dopri5, control, tableau::*};
-use super::driver::{Course, Observer, Summary};
+use super::driver::{Course, Observer, Summary, Watch};
 use super::schedule::{Kicker, Segment};
 use super::step::{Failure, Flow, Statistics, Step, Stepper, StopReason, Tolerance};
 use crate::num::elementary::kernels::{rough_exp2, rough_log2};
@@ -47,6 +47,19 @@ pub struct Plane {
     pub coordinate: usize,
     /// Its value there.
     pub value: f64,
+}
+
+/// What runs side by side have in common besides their equation.
+#[derive(Clone, Copy)]
+pub struct Common<'a, const N: usize> {
+    /// The local errors that all may make.
+    pub tolerance: Tolerance,
+    /// What the observers look at; without one they hear of kicks alone.
+    pub plane: Option<Plane>,
+    /// A run ends as if its observer had stopped it ([`StopReason::Observer`]) at the first step's end where each component of the state is above this one's.
+    pub corner: Option<SVector<f64, N>>,
+    /// Is asked now and then whether to go on; if not, runs that have not come to their end are given up.
+    pub watch: &'a dyn Watch,
 }
 
 /// The instructions that lanes are computed with.
@@ -115,8 +128,26 @@ where
     F: VectorField<N>,
     O: Observer<N>,
 {
+    let mut ends: Vec<Option<End<O, N>>> = runs.iter().map(|_| None).collect();
+    let common = Common { tolerance, plane, corner: None, watch: &() };
+    ensemble_watched(set, field, runs, common, observer, &mut |run, end| ends[run] = Some(end));
+    ends.into_iter().flatten().collect()
+}
+
+/// [`ensemble_with`] that gives each run's number and end to `finished` as it comes to it: in an order that depends on the number of lanes.
+pub fn ensemble_watched<F, O, const N: usize>(
+    set: InstructionSet,
+    field: &F,
+    runs: &[Run<N>],
+    common: Common<'_, N>,
+    observer: impl Fn(usize) -> O,
+    finished: &mut dyn FnMut(usize, End<O, N>),
+) where
+    F: VectorField<N>,
+    O: Observer<N>,
+{
     let set = if set.is_here() { set } else { InstructionSet::best() };
-    let all = All::<_, _, _, N, 1> { field, runs, tolerance, plane, observer };
+    let all = All::<_, _, _, N, 1> { field, runs, common, observer, finished };
     match set {
         InstructionSet::Portable => all.with_simd(Scalar),
         // Two registers side by side: while one waits for a quotient, the other goes on.
@@ -139,35 +170,38 @@ where
 struct All<'a, F, O, M: Fn(usize) -> O, const N: usize, const K: usize> {
     field: &'a F,
     runs: &'a [Run<N>],
-    tolerance: Tolerance,
-    plane: Option<Plane>,
+    common: Common<'a, N>,
     observer: M,
+    finished: &'a mut dyn FnMut(usize, End<O, N>),
 }
 
 impl<'a, F, O, M: Fn(usize) -> O, const N: usize, const K: usize> All<'a, F, O, M, N, K> {
     fn in_registers<const L: usize>(self) -> All<'a, F, O, M, N, L> {
-        let Self { field, runs, tolerance, plane, observer } = self;
-        All { field, runs, tolerance, plane, observer }
+        let Self { field, runs, common, observer, finished } = self;
+        All { field, runs, common, observer, finished }
     }
 }
+
+/// The watch is asked after so many steps, as [`drive`](super::drive) asks it.
+const STEPS_UNWATCHED: u32 = 4096;
 
 impl<F: VectorField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, const K: usize> WithSimd
     for All<'_, F, O, M, N, K>
 {
-    type Output = Vec<End<O, N>>;
+    type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, set: S) -> Self::Output {
-        let Self { field, runs, tolerance, plane, observer } = self;
+        let Self { field, runs, common, observer, finished } = self;
         let width = Registers::<S, K>::WIDTH;
-        let mut ends: Vec<Option<End<O, N>>> = runs.iter().map(|_| None).collect();
         let mut waiting = 0..runs.len();
-        let mut state = State::<S, O, N, K>::idle(set, tolerance);
+        let mut state = State::<S, O, N, K>::idle(set, common.tolerance);
+        let mut unwatched = 0;
         loop {
             for l in 0..width {
                 while state.lanes[l].is_none() {
                     let Some(run) = waiting.next() else { break };
                     if let Some(end) = state.begin(l, field, run, &runs[run], observer(run)) {
-                        ends[run] = Some(end);
+                        finished(run, end);
                     }
                 }
             }
@@ -175,9 +209,16 @@ impl<F: VectorField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, const
                 break;
             }
             // Until a lane is empty.
-            while !state.step(field, plane, &mut ends) {}
+            while !state.step(field, &common, finished) {
+                unwatched += 1;
+                if unwatched == STEPS_UNWATCHED {
+                    unwatched = 0;
+                    if !common.watch.reached(get(&state.t, 0)) {
+                        return;
+                    }
+                }
+            }
         }
-        ends.into_iter().flatten().collect()
     }
 }
 
@@ -330,7 +371,12 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
 
     /// One trial step in every lane. Says whether a lane has become empty.
     #[inline(always)]
-    fn step<F: VectorField<N>>(&mut self, field: &F, plane: Option<Plane>, ends: &mut [Option<End<O, N>>]) -> bool {
+    fn step<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        common: &Common<'_, N>,
+        finished: &mut dyn FnMut(usize, End<O, N>),
+    ) -> bool {
         let set = self.set;
         let vector = |parts: &[[S::f64s; K]; N]| {
             let mut v = SVector::<Registers<S, K>, N>::from_element(Registers::splat(set, 0.0));
@@ -408,11 +454,20 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         let unsound = sound.select(zero, one).size();
         let mut noted = tiny.or(ended).or(number(0.5).less(unsound, set));
         let mut met = None;
-        if let Some(Plane { coordinate, value }) = plane {
+        if let Some(Plane { coordinate, value }) = common.plane {
             let may = may_meet(coordinate, number(value), h, &x0, &x1, [&k1, &k3, &k4, &k5, &k6, &k7], set);
             let may = may.and(accepted);
             met = Some(may.select(one, zero).parts());
             noted = noted.or(may);
+        }
+        let mut beyond = None;
+        if let Some(corner) = common.corner {
+            let mut all = accepted;
+            for i in 0..N {
+                all = all.and(number(corner[i]).less(x1[i], set));
+            }
+            beyond = Some(all.select(one, zero).parts());
+            noted = noted.or(all);
         }
         if !noted.any() {
             return false;
@@ -426,20 +481,28 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             sound: lanes(sound),
             last: lanes(last),
             met,
+            beyond,
             x: bare(&x0),
             k: [bare(&k1), bare(&k3), bare(&k4), bare(&k5), bare(&k6), bare(&k7)],
         };
-        self.attend(field, &seen, ends)
+        self.attend(field, &seen, finished)
     }
 
     /// The scalar part of a step, for the lanes that need one. Says whether a lane has become empty.
     #[inline(never)]
-    fn attend<F: VectorField<N>>(&mut self, field: &F, seen: &Seen<S, N, K>, ends: &mut [Option<End<O, N>>]) -> bool {
+    fn attend<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        seen: &Seen<S, N, K>,
+        finished: &mut dyn FnMut(usize, End<O, N>),
+    ) -> bool {
         let mut emptied = false;
         for l in 0..Registers::<S, K>::WIDTH {
             let Some(run) = self.lanes[l].as_ref().map(|lane| lane.run) else { continue };
             if let Some(stop) = self.attend_one(l, field, seen) {
-                ends[run] = self.finish(l, stop);
+                if let Some(end) = self.finish(l, stop) {
+                    finished(run, end);
+                }
                 emptied = true;
             }
         }
@@ -476,6 +539,9 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             let k = std::array::from_fn(|j| SVector::from_fn(|i, _| get(&seen.k[j][i], l)));
             let dense = Dense { h, x0, x1, k };
             flow = lane.observer.step(&Step { t0, t1, x0, x1, interpolant: &dense });
+        }
+        if seen.beyond.as_ref().is_some_and(yes) {
+            flow = Flow::Stop;
         }
         let stop = if flow == Flow::Stop {
             Some(StopReason::Observer)
@@ -515,6 +581,7 @@ struct Seen<S: Simd, const N: usize, const K: usize> {
     sound: [S::f64s; K],
     last: [S::f64s; K],
     met: Option<[S::f64s; K]>,
+    beyond: Option<[S::f64s; K]>,
     x: [[S::f64s; K]; N],
     /// Stages 1, 3, 4, 5, 6, 7.
     k: [[[S::f64s; K]; N]; 6],

@@ -158,6 +158,10 @@ impl Passages {
                 self.side = h0.signum();
                 return Vec::new();
             }
+        } else if (h0 > 0.0 && h1 < 0.0 || h0 < 0.0 && h1 > 0.0) && step.interpolant.is_monotone(coordinate) {
+            self.side = h1.signum();
+            let theta = brent(|theta| step.coordinate(theta, coordinate) - value, 0.0, 1.0, h0, h1);
+            return vec![Passage { theta, upward: h1 > 0.0 }];
         }
         self.of(step.interpolant.degree(), |theta| step.coordinate(theta, coordinate) - value)
     }

@@ -20,6 +20,10 @@ pub trait Interpolant<const N: usize> {
     fn reach(&self, _coordinate: usize) -> f64 {
         f64::INFINITY
     }
+    /// Whether the coordinate is known to grow all along the step, or to fall all along it.
+    fn is_monotone(&self, _coordinate: usize) -> bool {
+        false
+    }
 }
 
 /// One accepted step from (t0, x0) to (t1, x1).
@@ -97,6 +101,22 @@ pub trait Stepper<const N: usize> {
         t_end: f64,
         max_step: f64,
     ) -> Result<(), Failure>;
+
+    /// [`Stepper::restart`] with the field of the last restart: what a method has found out about the equation itself still holds.
+    ///
+    /// # Errors
+    ///
+    /// As of [`Stepper::restart`].
+    fn restart_again<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
+        self.restart(field, t, x, t_end, max_step)
+    }
 
     /// Makes one accepted step. Never passes `t_end`; the step that reaches it has `t1 == t_end` exactly. Must not be
     /// called again after that without [`Stepper::restart`].

@@ -9,15 +9,17 @@ use super::scalar::{Arithmetic, Elementary};
 #[derive(Clone, Copy, Debug)]
 pub struct Given<T = f64> {
     value: T,
-    /// That tanh; a constant has not been told. All that have been told have been told the same.
-    tanh: Option<T>,
+    /// That tanh, of no meaning in a constant, which has not been told. All that have been told have been told the same.
+    tanh: T,
+    // No option: a number in a register would be moved through memory for it.
+    told: bool,
 }
 
 impl<T: Elementary> Given<T> {
     /// The number `value`, in an equation where tanh is `tanh`.
     #[inline(always)]
     pub fn new(value: T, tanh: T) -> Self {
-        Self { value, tanh: Some(tanh) }
+        Self { value, tanh, told: true }
     }
 
     /// The number.
@@ -44,8 +46,8 @@ macro_rules! as_number {
             type Output = Self;
             #[inline(always)]
             fn $function(self, other: Self) -> Self {
-                let tanh = if self.tanh.is_some() { self.tanh } else { other.tanh };
-                Self { value: self.value $operator other.value, tanh }
+                let tanh = if self.told { self.tanh } else { other.tanh };
+                Self { value: self.value $operator other.value, tanh, told: self.told || other.told }
             }
         }
     )*};
@@ -77,14 +79,15 @@ impl<T: Elementary> SubAssign for Given<T> {
 impl<T: Elementary> Arithmetic for Given<T> {
     #[inline(always)]
     fn from_f64(value: f64) -> Self {
-        Self { value: T::from_f64(value), tanh: None }
+        let value = T::from_f64(value);
+        Self { value, tanh: value, told: false }
     }
 }
 
 impl<T: Elementary> Elementary for Given<T> {
     #[inline(always)]
     fn tanh(self) -> Self {
-        Self { value: self.tanh.unwrap_or_else(|| self.value.tanh()), ..self }
+        Self { value: if self.told { self.tanh } else { self.value.tanh() }, ..self }
     }
     #[inline]
     fn exp(self) -> Self {
@@ -116,7 +119,7 @@ impl<T: Elementary> Elementary for Given<T> {
     }
     #[inline(always)]
     fn pi() -> Self {
-        Self { value: T::pi(), tanh: None }
+        Self { value: T::pi(), tanh: T::pi(), told: false }
     }
     #[inline]
     fn sign(self) -> Self {

@@ -5,6 +5,9 @@
 //! it is another rounding of the equation than its tape, for methods whose bits are their own. The series come by the Cauchy
 //! product alone (Moore 1966, ch. 11).
 
+mod radial;
+
+use self::radial::Radial;
 use super::decimal::Decimal;
 use super::tape::{Operation, Tape};
 
@@ -210,6 +213,8 @@ pub struct Flow {
     argument: Option<Sum>,
     /// The argument's gradient and value at 0, if it is a sum of states.
     linear: Option<(Vec<f64>, f64)>,
+    /// The equation in a form that has a faster way.
+    radial: Option<Radial>,
 }
 
 impl Flow {
@@ -248,7 +253,9 @@ impl Flow {
         if dimension + sums.len() > MANY {
             return Err(NotPolynomial::Size);
         }
-        Ok(Self { dimension, sums, derivatives, argument, linear })
+        // What is wanted of the series of an argument that is no sum of states are its own products too.
+        let radial = Radial::new(&reduced).filter(|_| argument.is_none() || linear.is_some());
+        Ok(Self { dimension, sums, derivatives, argument, linear, radial })
     }
 
     /// Whether the equation has a layer.
@@ -271,6 +278,9 @@ impl Flow {
             x.len() == self.dimension && degree <= Series::MOST,
             "one number a component, and a degree that there is room for"
         );
+        if let (Some(radial), &[x, y, z]) = (&self.radial, x) {
+            return radial.expand([x, y, z], degree, series);
+        }
         pulp::Arch::new().dispatch(Expansion { flow: self, x, degree, series });
     }
 
@@ -466,18 +476,22 @@ mod tests {
             let flow = Flow::new(&tape, side).unwrap();
             // The sum of three squares and two factors; the other field has cancelled.
             assert_eq!(flow.sums.len(), 3, "{flow:?}");
+            assert!(flow.radial.is_some(), "{flow:?}");
+            let by_sums = Flow { radial: None, ..flow.clone() };
             let mut found = Series::default();
             for degree in [7, 12, 13, 15, 16, 17, 31] {
                 let mut solution = Solution::new(degree, &tape, Constants::Binary);
-                // What an earlier expansion has left is not in the way.
-                for x in [[1e3, 7.0, -2.0], x] {
-                    flow.expand(&x, degree, &mut found);
-                    solution.expand(&x);
-                }
-                for i in 0..3 {
-                    for (k, want) in solution.component(i).iter().enumerate() {
-                        let got = found.component(i)[k];
-                        assert!((got - want).abs() <= 1e-13 * (1.0 + want.abs()), "{degree} {i} {k}: {got} {want}");
+                for flow in [&flow, &by_sums] {
+                    // What an earlier expansion has left is not in the way.
+                    for x in [[1e3, 7.0, -2.0], x] {
+                        flow.expand(&x, degree, &mut found);
+                        solution.expand(&x);
+                    }
+                    for i in 0..3 {
+                        for (k, want) in solution.component(i).iter().enumerate() {
+                            let got = found.component(i)[k];
+                            assert!((got - want).abs() <= 1e-13 * (1.0 + want.abs()), "{degree} {i} {k}: {got} {want}");
+                        }
                     }
                 }
             }
@@ -517,9 +531,11 @@ mod tests {
 
     #[test]
     fn instructions_change_no_bit() {
-        use pulp::WithSimd;
+        use pulp::{Simd, WithSimd};
         let flow = Flow::new(&Tape::record(3, blend), 1.0).unwrap();
-        for degree in [9, 14, 25] {
+        let radial = flow.radial.clone().unwrap();
+        let flow = Flow { radial: None, ..flow };
+        for degree in [9, 14, 16, 17, 18, 25, 31] {
             let (mut plain, mut here) = (Series::default(), Series::default());
             let x = [0.3, -0.7, 0.4];
             Expansion { flow: &flow, x: &x, degree, series: &mut plain }.with_simd(pulp::Scalar);
@@ -528,7 +544,46 @@ mod tests {
                 let bits = |series: &Series| series.component(i).iter().map(|c| c.to_bits()).collect::<Vec<_>>();
                 assert_eq!(bits(&plain), bits(&here), "{degree}");
             }
+            let bits = |expand: &dyn Fn(radial::Task<'_>)| {
+                let mut series = Series::default();
+                expand(radial::Task { of: &radial, x, degree, series: &mut series });
+                (0..3).flat_map(|i| series.component(i).to_vec()).map(f64::to_bits).collect::<Vec<_>>()
+            };
+            let want = bits(&|task| radial::In::<_, 16>(task).with_simd(pulp::Scalar));
+            if degree <= 17 {
+                assert_eq!(bits(&|task| radial::In::<_, 8>(task).with_simd(pulp::Scalar)), want, "{degree}");
+            }
+            assert_eq!(bits(&|task| radial.expand(task.x, task.degree, task.series)), want, "{degree}");
+            #[cfg(target_arch = "x86_64")]
+            {
+                match pulp::x86::V3::try_new() {
+                    Some(set) => {
+                        assert_eq!(bits(&|task| Simd::vectorize(set, radial::In::<_, 4>(task))), want, "{degree}");
+                    }
+                    None => println!("not run: AVX2"),
+                }
+                match pulp::x86::V4::try_new() {
+                    Some(set) => {
+                        assert_eq!(bits(&|task| Simd::vectorize(set, radial::In::<_, 2>(task))), want, "{degree}");
+                    }
+                    None => println!("not run: AVX-512"),
+                }
+            }
         }
+    }
+
+    #[test]
+    fn other_forms_are_no_radial_ones() {
+        let c = |v: f64| Recorded::from_f64(v);
+        let r2 = |x: &[Recorded]| x[0].squared() + x[1].squared() + x[2].squared();
+        let form = |f: &dyn Fn(&[Recorded]) -> Vec<Recorded>| Flow::new(&Tape::record(3, f), 1.0).unwrap().radial;
+        assert!(form(&|x| vec![x[1], r2(x).scale(0.3), c(1.0) + (c(2.0) - x[2]) * r2(x)]).is_some());
+        // A square is missing, is doubled, a factor is of another state, a product is in the first component, a term beside the product.
+        assert!(form(&|x| vec![x[1], x[0].squared() + x[1].squared(), c(1.0)]).is_none());
+        assert!(form(&|x| vec![x[1], r2(x) + x[0].squared(), c(1.0)]).is_none());
+        assert!(form(&|x| vec![x[1], (c(1.0) - x[2]) * r2(x), c(1.0)]).is_none());
+        assert!(form(&|x| vec![x[1] * x[2], (c(1.0) - x[1]) * r2(x), c(1.0)]).is_none());
+        assert!(form(&|x| vec![x[1], x[1] + (c(1.0) - x[1]) * r2(x), c(1.0)]).is_none());
     }
 
     #[test]

@@ -48,6 +48,42 @@ impl<S: Simd, const K: usize> Registers<S, K> {
         Self::new(set, [set.splat_f64s(value); K])
     }
 
+    /// The numbers at the start of `values`, one for each lane.
+    ///
+    /// # Panics
+    /// If there are fewer.
+    #[inline(always)]
+    pub fn load(set: S, values: &[f64]) -> Self {
+        let mut parts = [set.splat_f64s(0.0); K];
+        cast_slice_mut::<_, f64>(&mut parts).copy_from_slice(&values[..Self::WIDTH]);
+        Self::new(set, parts)
+    }
+
+    /// The number in the first lane.
+    #[inline(always)]
+    pub fn first(self) -> f64 {
+        cast_slice::<_, f64>(&self.parts())[0]
+    }
+
+    /// In every lane what was in the one after it; zero in the last.
+    #[inline(always)]
+    pub fn shifted(self, set: S) -> Self {
+        let mut end = set.splat_f64s(0.0);
+        if let Some(last) = cast_slice_mut::<_, f64>(std::slice::from_mut(&mut end)).last_mut() {
+            *last = 1.0;
+        }
+        let end = set.less_than_f64s(set.splat_f64s(0.5), end);
+        let mut parts = self.parts();
+        for k in 0..K {
+            parts[k] = set.rotate_left_f64s(parts[k], 1);
+        }
+        for k in 0..K {
+            let after = if k + 1 < K { parts[k + 1] } else { set.splat_f64s(0.0) };
+            parts[k] = set.select_f64s(end, after, parts[k]);
+        }
+        Self::new(set, parts)
+    }
+
     /// The registers.
     #[inline(always)]
     pub fn parts(self) -> [S::f64s; K] {

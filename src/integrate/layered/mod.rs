@@ -5,7 +5,7 @@
 //! as in [`Taylor`](super::Taylor) (Jorba & Zou 2005), and where such a step meets the edge is a zero of a polynomial, found with certainty
 //! (`Contact`). Inside, an orbit that crosses the layer does so in a time of order eps, in which x hardly moves while tanh runs from one end to the
 //! other: as a function of u, dx/du = f/u' is smooth, small, and has tanh at places that are known beforehand. Eight-stage Gauss collocation in u
-//! (`Gauss`, order 16) on a few fixed parts of the layer, solved by a few fixed-point iterations, does it. (Taking a component of the state as
+//! (`Gauss`, order 16) on a few fixed parts of the layer, all parts side by side, solved by a few fixed-point iterations, does it: one step. (Taking a component of the state as
 //! clock to land on a surface: Henon 1982.)
 //!
 //! An orbit that does not cross - it slides along the layer, or touches it and turns back - is followed through it by
@@ -14,21 +14,20 @@
 //! The edge lies where 1 - tanh u is a hundredth of the tolerance: what is dropped outside is never more than that part of the field.
 
 mod contact;
+mod crossing;
 mod gauss;
 
 use std::sync::Arc;
 
 use nalgebra::SVector;
-use pulp::bytemuck::{cast_slice, cast_slice_mut};
-use pulp::{Simd, WithSimd};
 
 use self::contact::{Contact, MOST};
-use self::gauss::{Gauss, STAGES, Stages};
+use self::crossing::{Collocation, Crossing, Layer, Section};
 use super::Dopri5;
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
-use crate::num::elementary::{exp, ln, rough_exp2, rough_log2, tanh};
+use crate::num::elementary::{exp, ln, rough_exp2, rough_log2};
 use crate::num::polynomial::{Flow, NotPolynomial, Series};
-use crate::num::{Given, Registers, Tape};
+use crate::num::{Given, Tape};
 use crate::system::VectorField;
 
 /// How far a step in time inside the layer may move u.
@@ -41,11 +40,8 @@ const BEYOND: f64 = 1.0;
 /// Jorba & Zou (2005), sec. 3: the step is shortened by exp(-0.7/(p - 1)) for safety.
 const SAFETY_EXPONENT: f64 = -0.7;
 
-/// Most fixed-point iterations of a collocation step.
-const SWEEPS: usize = 12;
-
-/// How often a part of the layer may be halved before the layer is left to the other method.
-const HALVINGS: usize = 5;
+/// How often the parts of the layer may be halved before the layer is left to the other method.
+const HALVINGS: u32 = 5;
 
 /// Whether the equation on `tape` can be integrated by [`Layered`].
 ///
@@ -70,8 +66,8 @@ pub struct Layered<const N: usize> {
     t_end: f64,
     max_step: f64,
     place: Place,
-    /// dx/du where the last part of a crossing ended.
-    slope: SVector<f64, N>,
+    /// The field where the layer was met, for tanh = -1 and +1.
+    ends: [SVector<f64, N>; 2],
     /// Of each side.
     series: [Series; 2],
     arc: Polynomial<N>,
@@ -86,18 +82,6 @@ struct Equation<const N: usize> {
     /// For tanh = -1 and +1.
     sides: [Flow; 2],
     layer: Option<Layer<N>>,
-}
-
-/// A layer whose variable is a sum of states.
-#[derive(Clone)]
-struct Layer<const N: usize> {
-    gradient: SVector<f64, N>,
-    /// u at x = 0.
-    constant: f64,
-    /// The parts that it is crossed in, for u > 0: [parts\[i\], parts\[i + 1\]].
-    parts: Vec<f64>,
-    /// tanh at the nodes of each.
-    tanh: Vec<Stages>,
 }
 
 /// Where the orbit is.
@@ -127,79 +111,67 @@ struct Polynomial<const N: usize> {
     count: usize,
 }
 
+impl<const N: usize> Polynomial<N> {
+    /// The coefficients of degree 0 to `degree` in the fraction of a step of length `h`, from those in time.
+    fn scale(&mut self, series: &Series, h: f64, degree: usize) {
+        let mut powers = [0.0; MOST];
+        powers[0] = 1.0;
+        for k in 1..=degree {
+            powers[k] = powers[k - 1] * h;
+        }
+        for i in 0..N {
+            let from = series.component(i);
+            for k in 0..=degree {
+                self.coefficients[i][k] = from[k] * powers[k];
+            }
+        }
+        self.count = degree + 1;
+    }
+}
+
 impl<const N: usize> Interpolant<N> for Polynomial<N> {
     fn at(&self, theta: f64) -> SVector<f64, N> {
         SVector::from_fn(|i, _| self.coordinate(theta, i))
     }
+    // Four polynomials in theta^4 (Estrin 1960): a single one would wait for itself all the way. Beyond the last coefficient are zeros.
+    #[inline]
     fn coordinate(&self, theta: f64, i: usize) -> f64 {
-        self.coefficients[i][..self.count].iter().rev().fold(0.0, |sum, c| sum * theta + c)
+        let theta2 = theta * theta;
+        let theta4 = theta2 * theta2;
+        let mut sums = [0.0; 4];
+        for four in self.coefficients[i][..self.count.next_multiple_of(4)].chunks_exact(4).rev() {
+            for (sum, c) in sums.iter_mut().zip(four) {
+                *sum = *sum * theta4 + c;
+            }
+        }
+        (sums[0] + sums[1] * theta) + (sums[2] + sums[3] * theta) * theta2
     }
     fn degree(&self) -> usize {
         self.count - 1
     }
-    /// The distance from the start, term by term.
+    /// The distance from the chord, term by term: theta - theta^2 is at most 1/4, theta - theta^k less than 1.
     fn reach(&self, coordinate: usize) -> f64 {
-        self.coefficients[coordinate][1..self.count].iter().map(|c| c.abs()).sum()
+        let c = &self.coefficients[coordinate];
+        0.25 * c[2].abs() + c[3..self.count].iter().map(|c| c.abs()).sum::<f64>()
+    }
+    /// The derivative keeps the sign that it has at the start.
+    fn is_monotone(&self, coordinate: usize) -> bool {
+        let c = &self.coefficients[coordinate];
+        let bend = c[..self.count].iter().zip(DEGREES).skip(2).map(|(c, k)| c.abs() * k);
+        c[1].abs() > bend.sum::<f64>() * (1.0 + 1e-12)
     }
 }
 
-/// A part of a crossing: x and t as functions of u.
-#[derive(Clone)]
-struct Crossing<const N: usize> {
-    x0: SVector<f64, N>,
-    /// Half the part's length in u, with its sign.
-    half: f64,
-    /// dx/du and dt/du at the nodes.
-    slopes: [Stages; N],
-    rate: Stages,
-    /// The step's length in time.
-    duration: f64,
-}
-
-impl<const N: usize> Crossing<N> {
-    /// Where in the part, from -1 to 1, the time `elapsed` has passed.
-    fn position(&self, elapsed: f64) -> f64 {
-        let rate = Gauss::get().coefficients(&self.rate);
-        let (mut low, mut high) = (-1.0, 1.0);
-        let whole = self.half * gauss::integral(&rate, 1.0);
-        let mut s = (2.0 * (elapsed / whole) - 1.0).clamp(low, high);
-        for _ in 0..60 {
-            let excess = self.half * gauss::integral(&rate, s) - elapsed;
-            if excess > 0.0 {
-                high = s;
-            } else {
-                low = s;
-            }
-            let step = excess / (self.half * gauss::sum(&rate, s));
-            let next = if (low..=high).contains(&(s - step)) { s - step } else { 0.5 * (low + high) };
-            if (next - s).abs() <= 4.0 * f64::EPSILON {
-                return next;
-            }
-            s = next;
-        }
-        s
+/// 0, 1, 2, ...
+const DEGREES: [f64; MOST] = {
+    let mut degrees = [0.0; MOST];
+    let mut k = 0;
+    while k < MOST {
+        degrees[k] = k as f64;
+        k += 1;
     }
-
-    fn state(&self, s: f64) -> SVector<f64, N> {
-        SVector::from_fn(|i, _| {
-            self.x0[i] + self.half * gauss::integral(&Gauss::get().coefficients(&self.slopes[i]), s)
-        })
-    }
-}
-
-impl<const N: usize> Interpolant<N> for Crossing<N> {
-    fn at(&self, theta: f64) -> SVector<f64, N> {
-        self.state(self.position(theta * self.duration))
-    }
-    fn degree(&self) -> usize {
-        STAGES
-    }
-    /// The length of the way at most.
-    fn reach(&self, coordinate: usize) -> f64 {
-        let fastest = self.slopes[coordinate].iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        2.0 * self.half.abs() * fastest * Gauss::get().lebesgue
-    }
-}
+    degrees
+};
 
 impl<const N: usize> Layered<N> {
     /// A stepper with the given tolerances.
@@ -222,10 +194,10 @@ impl<const N: usize> Layered<N> {
             t_end: 0.0,
             max_step: f64::INFINITY,
             place: Place::Inside,
-            slope: zero,
+            ends: [zero; 2],
             series: [Series::default(), Series::default()],
             arc: Polynomial { coefficients: [[0.0; MOST]; N], count: degree + 1 },
-            crossing: Crossing { x0: zero, half: 0.0, slopes: [[0.0; STAGES]; N], rate: [0.0; STAGES], duration: 0.0 },
+            crossing: Crossing::none(),
             inner: Dopri5::new(tolerance),
         }
     }
@@ -259,10 +231,11 @@ impl<const N: usize> Layered<N> {
     fn speeds<F: VectorField<N>>(&mut self, field: &F) -> [f64; 2] {
         let Some(equation) = &self.equation else { return [0.0; 2] };
         if let Some(layer) = &equation.layer {
-            return [-1.0, 1.0].map(|side| {
+            self.ends = [-1.0, 1.0].map(|side| {
                 let f = field.eval(&self.x.map(|x| Given::new(x, side)));
-                (0..N).map(|i| layer.gradient[i] * f[i].value()).sum()
+                SVector::from_fn(|i, _| f[i].value())
             });
+            return self.ends.each_ref().map(|f| layer.gradient.dot(f));
         }
         std::array::from_fn(|side| {
             equation.sides[side].expand(self.x.as_slice(), 2, &mut self.series[side]);
@@ -313,10 +286,26 @@ impl<const N: usize> Layered<N> {
         if flow.has_layer() {
             let mut distance = [0.0; MOST];
             let mut power = side;
-            let known = if equation.layer.is_some() { width } else { degree };
-            for (k, c) in distance[..known].iter_mut().enumerate() {
-                *c = flow.argument(k, series) * power;
-                power *= h;
+            match &equation.layer {
+                Some(layer) => {
+                    for i in (0..N).filter(|i| layer.gradient[*i] != 0.0) {
+                        let (gradient, component) = (layer.gradient[i], series.component(i));
+                        for k in 0..width {
+                            distance[k] += gradient * component[k];
+                        }
+                    }
+                    distance[0] += layer.constant;
+                    for c in &mut distance[..width] {
+                        *c *= power;
+                        power *= h;
+                    }
+                }
+                None => {
+                    for (k, c) in distance[..degree].iter_mut().enumerate() {
+                        *c = flow.argument(k, series) * power;
+                        power *= h;
+                    }
+                }
             }
             distance[0] -= self.edge;
             if leaving || distance[0] <= 0.0 {
@@ -339,13 +328,7 @@ impl<const N: usize> Layered<N> {
                 Err(Failure::StepUnderflow { t: self.t, h, state: Failure::state(&self.x) })
             };
         }
-        for i in 0..N {
-            let mut power = 1.0;
-            for k in 0..width {
-                self.arc.coefficients[i][k] = series.component(i)[k] * power;
-                power *= h;
-            }
-        }
+        self.arc.scale(series, h, degree);
         self.x = self.arc.at(1.0);
         self.t = if last { self.t_end } else { self.t + h };
         if !arrived {
@@ -359,77 +342,49 @@ impl<const N: usize> Layered<N> {
         let crosses = self.equation.as_ref().is_some_and(|equation| equation.layer.is_some());
         let [minus, plus] = self.speeds(field);
         if crosses && minus * plus > 0.0 && (u * plus < 0.0 || u.abs() < self.edge) {
-            self.slope = SVector::zeros();
             Place::Crossing { u, direction: plus.signum() }
         } else {
             Place::Inside
         }
     }
 
-    /// The next part of a crossing; none if there is no good way to make it.
+    /// The next parts of a crossing; none if there is no good way to make them.
     fn cross<F: VectorField<N>>(&mut self, field: &F, u: f64, direction: f64) -> Option<Made> {
         let layer = self.equation.as_ref()?.layer.as_ref()?;
-        let (mut to, known) = layer.next(u, direction);
-        let mut tanh_there = known.unwrap_or_else(|| stages(u, to).map(tanh));
-        let mut found = None;
-        for _ in 0..HALVINGS {
-            let (crossing, evaluations) = self.part(field, layer, u, to, &tanh_there);
+        let (v, edge) = (u * direction, layer.edge());
+        let mut place = Section::default();
+        let mut reached = None;
+        for halvings in 0..HALVINGS {
+            let section = layer.section(v, halvings, &mut place);
+            let (tolerance, x0, ends, crossing) = (self.tolerance, self.x, &self.ends, &mut self.crossing);
+            let task = Collocation { field, layer, section, direction, tolerance, x0, ends, crossing };
+            let (good, evaluations) = task.solve();
             self.statistics.evaluations += evaluations;
-            if crossing.is_some() {
-                found = crossing;
+            if good {
+                reached = Some(section.to);
                 break;
             }
-            to = 0.5 * (u + to);
-            tanh_there = stages(u, to).map(tanh);
         }
-        let mut crossing = found?;
-        let end_slope = SVector::from_fn(|i, _| crossing.slopes[i][STAGES - 1]);
+        let mut reached = reached?;
         let longest = self.max_step.min(self.t_end - self.t);
-        let (mut position, mut reached) = (1.0, to);
-        let last = self.t + crossing.duration * 1.000_000_1 >= self.t_end;
-        if crossing.duration > longest {
-            position = crossing.position(longest);
-            reached = u + crossing.half * (position + 1.0);
-            crossing.duration = longest;
+        let whole = self.crossing.whole();
+        let last = self.t + whole * 1.000_000_1 >= self.t_end;
+        let mut x = self.crossing.end;
+        if whole > longest {
+            (reached, x) = self.crossing.after(longest);
+            self.crossing.duration = longest;
         }
-        let t = if last { self.t_end } else { self.t + crossing.duration };
-        let x = if position < 1.0 { crossing.state(position) } else { crossing.end() };
+        let t = if last { self.t_end } else { self.t + self.crossing.duration };
         if t <= self.t || !finite(&x) {
             return None;
         }
-        (self.t, self.x, self.crossing) = (t, x, crossing);
-        self.slope = end_slope;
-        self.place = if reached == direction * self.edge {
+        (self.t, self.x) = (t, x);
+        self.place = if reached == edge {
             Place::Outside { side: direction, leaving: true }
         } else {
-            Place::Crossing { u: reached, direction }
+            Place::Crossing { u: reached * direction, direction }
         };
         Some(Made::Crossing)
-    }
-
-    /// Collocation from u to `to`, and the evaluations that it took; nothing if the orbit turns back, the iteration does not converge, or the error is
-    /// too large.
-    fn part<F: VectorField<N>>(
-        &self,
-        field: &F,
-        layer: &Layer<N>,
-        u: f64,
-        to: f64,
-        tanh: &Stages,
-    ) -> (Option<Crossing<N>>, u64) {
-        let tolerance = self.tolerance;
-        let scale = self.x.map(|x| 1.0 / (tolerance.atol + tolerance.rtol * x.abs()));
-        let half = 0.5 * (to - u);
-        let gradient = layer.gradient;
-        let part = Collocation { field, gradient, half, tanh, x0: self.x, slope: self.slope, scale };
-        // All stages are in one register, two, or one each.
-        #[cfg(target_arch = "x86_64")]
-        if let Some(set) = pulp::x86::V4::try_new() {
-            return Simd::vectorize(set, In::<_, 1>(part));
-        } else if let Some(set) = pulp::x86::V3::try_new() {
-            return Simd::vectorize(set, In::<_, 2>(part));
-        }
-        In::<_, STAGES>(part).with_simd(pulp::Scalar)
     }
 
     /// A step in time inside the layer.
@@ -456,170 +411,20 @@ impl<const N: usize> Layered<N> {
     }
 }
 
-/// One part of a crossing to compute, all stages side by side in the machine's own instructions: each lane rounds by itself, so that they change
-/// no bit.
-struct Collocation<'a, F, const N: usize> {
-    field: &'a F,
-    gradient: SVector<f64, N>,
-    /// Half the part's length in u, with its sign.
-    half: f64,
-    tanh: &'a Stages,
-    x0: SVector<f64, N>,
-    /// A guess of dx/du.
-    slope: SVector<f64, N>,
-    /// One over the tolerated error of each component.
-    scale: SVector<f64, N>,
-}
-
-/// A task for `K` registers.
-struct In<T, const K: usize>(T);
-
-impl<F: VectorField<N>, const N: usize, const K: usize> WithSimd for In<Collocation<'_, F, N>, K> {
-    type Output = (Option<Crossing<N>>, u64);
-
-    // Loops by number: iterators and closures may stay calls, compiled for the wrong instruction set.
-    #[allow(clippy::needless_range_loop)]
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, set: S) -> Self::Output {
-        let Collocation { field, gradient, half, tanh, x0, slope, scale } = self.0;
-        let gauss = Gauss::get();
-        let number = |value: f64| Registers::<S, K>::splat(set, value);
-        let stages = |values: &Stages| {
-            let mut parts = [set.splat_f64s(0.0); K];
-            cast_slice_mut::<_, f64>(&mut parts).copy_from_slice(values);
-            Registers::<S, K>::new(set, parts)
-        };
-        let bare = |stages: Registers<S, K>| {
-            let mut values = [0.0; STAGES];
-            values.copy_from_slice(cast_slice::<_, f64>(&stages.parts()));
-            values
-        };
-        let tanh = stages(tanh);
-        let along = (stages(&gauss.nodes) + number(1.0)) * number(half);
-        let mut states = SVector::<_, N>::from_element(number(0.0));
-        for i in 0..N {
-            states[i] = number(x0[i]) + number(slope[i]) * along;
-        }
-        let (mut evaluations, mut before) = (0, f64::NAN);
-        for _ in 0..SWEEPS {
-            evaluations += STAGES as u64;
-            let mut x = SVector::<_, N>::from_element(Given::new(tanh, tanh));
-            for i in 0..N {
-                x[i] = Given::new(states[i], tanh);
-            }
-            let f = field.eval(&x);
-            let mut speed = number(0.0);
-            for i in 0..N {
-                speed += number(gradient[i]) * f[i].value();
-            }
-            let rate = number(1.0) / speed;
-            // Time goes on everywhere.
-            if !bare(rate * number(half)).iter().all(|time| *time > 0.0) {
-                return (None, evaluations);
-            }
-            let mut slopes = [[0.0; STAGES]; N];
-            let mut most = number(0.0);
-            for i in 0..N {
-                slopes[i] = bare(f[i].value() * rate);
-                let mut sum = number(0.0);
-                for m in 0..STAGES {
-                    sum += stages(&gauss.integrals[m]) * number(slopes[i][m]);
-                }
-                let new = number(x0[i]) + sum * number(half);
-                let moved = (new - states[i]).size() * number(scale[i]);
-                most = most.less(moved, set).select(moved, most);
-                states[i] = new;
-            }
-            let change = bare(most).iter().fold(0.0_f64, |m, v| m.max(*v));
-            let contraction = change / before;
-            before = change;
-            // What is left is about change * contraction / (1 - contraction); of the first iteration nothing is known.
-            if contraction < 0.5 && change * contraction <= 0.02 || change <= 0.02 {
-                let error = (0..N).fold(0.0_f64, |most, i| {
-                    let rough = gauss.roughness(&slopes[i]);
-                    let size = slopes[i].iter().fold(rough, |m, v| m.max(v.abs()));
-                    // At the end the method is of twice the order.
-                    let at_end = rough * rough / size.max(f64::MIN_POSITIVE);
-                    most.max(half.abs() * at_end.max(rough / 160.0) * scale[i])
-                });
-                let rate = bare(rate);
-                let duration = half * weighted(&gauss.weights, &rate);
-                let crossing = Crossing { x0, half, slopes, rate, duration };
-                return ((error <= 1.0).then_some(crossing), evaluations);
-            }
-            if contraction >= 0.5 {
-                return (None, evaluations);
-            }
-        }
-        (None, evaluations)
-    }
-}
-
-/// sum of a_j b_j.
-fn weighted(a: &Stages, b: &Stages) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// The nodes of the part from `u` to `to`.
-fn stages(u: f64, to: f64) -> Stages {
-    let (middle, half) = (0.5 * (u + to), 0.5 * (to - u));
-    Gauss::get().nodes.map(|node| middle + half * node)
-}
-
-impl<const N: usize> Crossing<N> {
-    fn end(&self) -> SVector<f64, N> {
-        SVector::from_fn(|i, _| self.x0[i] + self.half * weighted(&Gauss::get().weights, &self.slopes[i]))
-    }
-}
-
-impl<const N: usize> Layer<N> {
-    fn new(gradient: SVector<f64, N>, constant: f64, edge: f64, atol: f64) -> Self {
-        let gauss = Gauss::get();
-        // A unit of u in units of the state.
-        let width = 1.0 / gradient.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
-        let good = |from: f64, to: f64| {
-            let rough = 0.5 * gauss.roughness(&stages(from, to).map(tanh));
-            width * 0.5 * (to - from) * (rough * rough).max(rough / 160.0) <= 0.2 * atol
-        };
-        let mut parts = vec![0.0];
-        let mut from = 0.0;
-        while from < edge {
-            let mut to = edge;
-            while !good(from, to) && to - from > 0.1 {
-                to = from + 0.85 * (to - from);
-            }
-            parts.push(to);
-            from = to;
-        }
-        let tanh = parts.windows(2).map(|part| stages(part[0], part[1]).map(tanh)).collect();
-        Self { gradient, constant, parts, tanh }
-    }
-
-    /// Where the part that begins at `u` ends, in this direction, and tanh at its nodes if it is one of the usual ones.
-    fn next(&self, u: f64, direction: f64) -> (f64, Option<Stages>) {
-        let v = u * direction;
-        // Never a tiny part.
-        const LEAST: f64 = 1e-2;
-        if v < -LEAST {
-            // Inwards: from -parts[i + 1] to -parts[i].
-            let i = self.parts.iter().rposition(|p| *p < -v - LEAST).unwrap_or(0);
-            let known = self.parts.get(i + 1).is_some_and(|p| *p == -v).then(|| {
-                let mut there = self.tanh[i];
-                there.reverse();
-                there.map(|value| -value * direction)
-            });
-            (-self.parts[i] * direction, known)
-        } else {
-            let last = self.parts.len() - 1;
-            let i = self.parts.iter().position(|p| *p > v + LEAST).unwrap_or(last);
-            let known = (i > 0 && self.parts[i - 1] == v).then(|| self.tanh[i - 1].map(|value| value * direction));
-            (self.parts[i] * direction, known)
-        }
-    }
-}
-
 impl<const N: usize> Stepper<N> for Layered<N> {
     fn restart<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
+        self.read(field.tape()).map_err(|why| Failure::NotApplicable { method: "layered", why: why.to_string() })?;
+        self.restart_again(field, t, x, t_end, max_step)
+    }
+
+    fn restart_again<F: VectorField<N>>(
         &mut self,
         field: &F,
         t: f64,
@@ -633,7 +438,6 @@ impl<const N: usize> Stepper<N> for Layered<N> {
         if !finite(&x) || !finite(&field.eval(&x)) {
             return Err(Failure::NotFinite { t, state: Failure::state(&x) });
         }
-        self.read(field.tape()).map_err(|why| Failure::NotApplicable { method: "layered", why: why.to_string() })?;
         self.place = self.locate();
         Ok(())
     }

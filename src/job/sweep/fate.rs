@@ -130,23 +130,37 @@ impl Question for Fate {
 
     fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
         let run = &self.0.run;
-        let is_far = far::corner(run).map(|c| move |x: &[f64]| x[1] > c && x[2] > c);
-        let answer = match (&is_far, run.switch) {
+        let answer = match (&self.is_far(), run.switch) {
             // Filippov motion has no layer to be stiff in: it gets to its end.
             (Some(is_far), SwitchSpec::Smoothed { .. } | SwitchSpec::Hysteretic { .. }) => {
                 simulate_until(run, is_far, watch)?.to_answer(run)
             }
             _ => Run(run.clone()).compute(desk, watch)?,
         };
+        Ok(Answer::of_tables(Vec::new()).with_fact("outcome", &self.judged(desk, &answer)?))
+    }
+}
+
+impl Fate {
+    /// Whether a state is one that no orbit of the run's system comes back from.
+    fn is_far(&self) -> Option<impl Fn(&[f64]) -> bool + use<>> {
+        far::corner(&self.0.run).map(|c| move |x: &[f64]| x[1] > c && x[2] > c)
+    }
+
+    /// What the answer to the run's question comes to.
+    ///
+    /// # Errors
+    ///
+    /// Whatever the computation met.
+    pub(super) fn judged(&self, desk: &Desk<'_>, answer: &Answer) -> Result<Outcome, JobError> {
         if answer.stop == Stop::Interrupted {
             return Err(JobError::Interrupted);
         }
         let state: Vec<f64> = answer.fact("state")?;
-        let outcome = if is_far.is_some_and(|far| far(&state)) {
-            Outcome::far(&answer)?
+        if self.is_far().is_some_and(|far| far(&state)) {
+            Outcome::far(answer)
         } else {
-            Outcome::of(&self.0.evidence_of(desk, &answer)?, &answer)?
-        };
-        Ok(Answer::of_tables(Vec::new()).with_fact("outcome", &outcome))
+            Outcome::of(&self.0.evidence_of(desk, answer)?, answer)
+        }
     }
 }

@@ -36,6 +36,7 @@
 mod axis;
 mod far;
 mod fate;
+mod lanes;
 mod rows;
 
 use serde::{Deserialize, Serialize};

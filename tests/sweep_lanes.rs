@@ -1,0 +1,115 @@
+//! Rows of a sweep that share lanes against the same rows alone.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use twofold::integrate::ensemble::InstructionSet;
+use twofold::integrate::{Kick, KickLaw, Schedule, Watch};
+use twofold::job::spec::*;
+use twofold::job::sweep::{Axis, Draws, Row, Sweep};
+use twofold::job::{JobError, JobWatch, Progress};
+use twofold::system::{Caricature, System};
+
+fn run(system: System, t_end: f64) -> RunSpec {
+    RunSpec {
+        system,
+        switch: SwitchSpec::tanh(1e-3),
+        start: vec![0.2, 0.0, -1.0],
+        t_end,
+        method: MethodSpec::ndsolve_defaults(Method::Dopri5),
+        schedule: Schedule::default(),
+        observe: Observation::Section { coordinate: 1, value: 0.0 },
+    }
+}
+
+fn caricature() -> System {
+    Caricature::with_reinjection(1e-1, 1e-5).into()
+}
+
+fn axes(texts: &[&str]) -> Vec<Axis> {
+    texts.iter().map(|t| t.parse().unwrap()).collect()
+}
+
+fn lines(sweep: &Sweep, set: InstructionSet) -> Vec<String> {
+    let mut lines = vec![String::new(); sweep.rows() as usize];
+    let numbers: Vec<u64> = (0..sweep.rows()).collect();
+    let mut take = |row: Row| {
+        lines[row.number() as usize] = row.line();
+        true
+    };
+    sweep.rows_together_with(set, &numbers, &(), &mut take).unwrap();
+    lines
+}
+
+fn are_the_rows(sweep: &Sweep) {
+    let alone: Vec<String> = (0..sweep.rows()).map(|row| sweep.row(row, &()).unwrap().line()).collect();
+    for set in InstructionSet::ALL {
+        if set.is_here() {
+            assert_eq!(lines(sweep, set), alone, "{set:?}");
+        } else {
+            println!("not run: {set:?}");
+        }
+    }
+}
+
+#[test]
+fn rows_are_those_computed_alone() {
+    // Two equations; restarts that differ; a cell that is wrong, one that runs out of steps, one that goes far, and another method among them.
+    let over = axes(&["params.alpha=0.1,0.2", "interval=20,40", "shift.x=-1e-3..1e-3", "t-end=30,60"]);
+    are_the_rows(&Sweep::new(run(caricature(), 60.0), over, Some(Draws { count: 2, seed: 4 })).unwrap());
+    let mut poor = run(caricature(), 200.0);
+    poor.method.max_steps = 1500;
+    are_the_rows(&Sweep::new(poor, axes(&["start.x=0.1,0.2,0.3", "start.y=0,1,30", "t-end=20,-1"]), None).unwrap());
+    let mixed = axes(&["method=dopri5,lsoda", "tolerance=1e-7,1e-8", "shift.x=1e-9*3"]);
+    are_the_rows(&Sweep::new(run(caricature(), 20.0), mixed, None).unwrap());
+    let far = axes(&["start.y=3,3.5,4,0.1", "start.z=3"]);
+    let far = Sweep::new(run(caricature(), 200.0), far, None).unwrap();
+    assert!((0..3).all(|row| far.row(row, &()).unwrap().outcome() == "far"));
+    are_the_rows(&far);
+    // Another kind of run entirely.
+    let kick = Some(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 9, stream: 5 });
+    let kicked = RunSpec { schedule: Schedule { restart_every: None, kick }, ..run(caricature(), 30.0) };
+    are_the_rows(&Sweep::new(kicked, axes(&["shift.x=1e-9*4"]), None).unwrap());
+}
+
+#[test]
+fn rows_of_recorded_equations_are_those_computed_alone() {
+    let mut wheel = run(System::builtin("wheel").unwrap(), 3.0);
+    wheel.start = vec![0.69267, 0.0, 0.0];
+    are_the_rows(&Sweep::new(wheel, axes(&["shift.r=1e-6*5"]), None).unwrap());
+}
+
+/// Stops after so many questions.
+struct Refuses(AtomicU64);
+impl Watch for &Refuses {
+    fn reached(&self, _: f64) -> bool {
+        self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| Some(n.saturating_sub(1))).is_ok_and(|n| n > 1)
+    }
+}
+impl JobWatch for &Refuses {
+    fn done(self: Box<Self>, _: &str) {}
+}
+impl Progress for Refuses {
+    fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn JobWatch + 'a> {
+        Box::new(self)
+    }
+}
+
+#[test]
+fn who_asks_to_stop_gets_the_finished_rows() {
+    let sweep = Sweep::new(run(caricature(), 4000.0), axes(&["shift.x=1e-9*8", "t-end=10,4000"]), None).unwrap();
+    let numbers: Vec<u64> = (0..sweep.rows()).collect();
+    let mut taken = Vec::new();
+    let stopped = sweep.rows_together(&numbers, &Refuses(AtomicU64::new(2)), &mut |row| {
+        taken.push(row.number());
+        true
+    });
+    assert_eq!(stopped, Err(JobError::Interrupted));
+    assert!(taken.len() < numbers.len(), "{taken:?}");
+    // Whoever wants no more gets no more, and that is no error.
+    let mut count = 0;
+    let enough = sweep.rows_together(&numbers, &(), &mut |_| {
+        count += 1;
+        count < 2
+    });
+    assert_eq!((enough, count), (Ok(()), 2));
+}
