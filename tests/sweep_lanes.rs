@@ -72,7 +72,7 @@ fn rows_are_those_computed_alone() {
 }
 
 #[test]
-fn rows_of_recorded_equations_are_those_computed_alone() {
+fn rows_that_lanes_do_not_take_are_computed_alone() {
     let mut wheel = run(System::builtin("wheel").unwrap(), 3.0);
     wheel.start = vec![0.69267, 0.0, 0.0];
     are_the_rows(&Sweep::new(wheel, axes(&["shift.r=1e-6*5"]), None).unwrap());

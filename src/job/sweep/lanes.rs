@@ -15,7 +15,7 @@ use crate::job::recording::{Data, Recording};
 use crate::job::spec::{Method, Observation, RunSpec, SwitchSpec};
 use crate::job::table::Entry;
 use crate::record::Hash;
-use crate::system::{Compiled, Field, Smoothed, VectorField};
+use crate::system::{Caricature, Compiled, Smoothed, VectorField};
 
 /// Fewer cells than this are computed one after the other.
 const FEWEST: usize = 3;
@@ -36,14 +36,15 @@ impl Cell {
         &self.question.0.run
     }
 
-    /// What its section is taken at, if lanes can compute it: a smoothed run by Dormand-Prince of a system with three states.
+    /// What its section is taken at, if lanes compute it sooner: a smoothed run by Dormand-Prince of the compiled caricature. Recorded equations are interpreted, which
+    /// in lanes was found to be slower than alone.
     fn plane(&self) -> Option<Plane> {
         let run = self.run();
         let method = &run.method;
         let plain = method.name == Method::Dopri5 && method.precision.is_none() && method.order.is_none();
         match (run.switch, run.observe) {
             (SwitchSpec::Smoothed { .. }, Observation::Section { coordinate, value })
-                if plain && run.system.dimension() == STATES && run.validate().is_ok() =>
+                if plain && caricature(run).is_some() && run.validate().is_ok() =>
             {
                 Some(Plane { coordinate, value })
             }
@@ -156,15 +157,20 @@ impl Sweep {
         take: &mut dyn FnMut(Row) -> bool,
     ) -> Result<bool, JobError> {
         let run = cells[0].run();
-        let SwitchSpec::Smoothed { eps, transition } = run.switch else { return Ok(false) };
-        if let Some(Compiled::Caricature(system)) = run.system.compiled() {
-            let field = Smoothed { system, transition, eps };
-            return side_by_side(set, &field, cells, progress, enough, take).map(|()| true);
+        match (caricature(run), run.switch) {
+            (Some(system), SwitchSpec::Smoothed { eps, transition }) => {
+                let field = Smoothed { system, transition, eps };
+                side_by_side(set, &field, cells, progress, enough, take).map(|()| true)
+            }
+            _ => Ok(false),
         }
-        match Field::smoothed(&run.system, transition, eps).bind::<STATES>() {
-            Ok(field) => side_by_side(set, &field, cells, progress, enough, take).map(|()| true),
-            Err(_) => Ok(false),
-        }
+    }
+}
+
+fn caricature(run: &RunSpec) -> Option<Caricature> {
+    match run.system.compiled() {
+        Some(Compiled::Caricature(system)) => Some(system),
+        _ => None,
     }
 }
 

@@ -144,9 +144,7 @@ impl<const K: usize> WithSimd for In<Task<'_>, K> {
             if k == 0 {
                 r = r_start;
                 next += constants[0];
-                for i in 0..2 {
-                    outer[i] = constants[i + 1];
-                }
+                outer.copy_from_slice(&constants[1..]);
             } else {
                 r = (twice[0] * x[0] + sum_r.first()) + (twice[1] * x[1] + twice[2] * x[2]);
                 for i in 0..2 {
