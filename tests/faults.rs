@@ -480,7 +480,74 @@ fn too_much_is_refused_before_it_is_tried() {
         refuses(&twofold(&["run", "--spec", path]), 2, &["spec.json", "not a spec"]);
         refuses(&twofold(&["check", "--against", path]), 2, &["spec.json", "not a manifest"]);
     }
+    // The same as a system's file, a certificate, a table; and 10^18 cells.
+    for (name, text) in
+        [
+            ("deep.toml", format!("name = \"deep\"\nx = {}", "[".repeat(100_000))),
+            ("deep-table.toml", format!("name = \"deep\"\n{}", "a.".repeat(100_000))),
+            (
+                "deep-expression.toml",
+                fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/systems/relay-linear.toml"))
+                    .unwrap()
+                    .replacen("= \"", &format!("= \"{}", "(".repeat(100_000)), 1),
+            ),
+        ]
+    {
+        let file = folder.path().join(name);
+        fs::write(&file, text).unwrap();
+        refuses(&twofold(&["run", "--system", file.to_str().unwrap(), "--t-end", "1"]), 2, &[name]);
+    }
+    for (name, text) in [
+        ("deep.json", "[".repeat(100_000)),
+        ("wide.json", format!("{{\"theorem\":\"printed-cycle\",\"statement\":\"{}\"}}", "x".repeat(10_000_000))),
+    ] {
+        let file = folder.path().join(name);
+        fs::write(&file, text).unwrap();
+        refuses(&twofold(&["verify", file.to_str().unwrap()]), 2, &[name, "not a certificate"]);
+    }
+    let table = folder.path().join("deep.csv");
+    fs::write(&table, format!("# {}\nt\n1\n", "{\"about\":".repeat(100_000))).unwrap();
+    refuses(&twofold(&["sweep", "merge", table.to_str().unwrap()]), 2, &["deep.csv"]);
+    let cells = ["sweep", "--over", "start.x=0..1:1000000000", "--over", "start.z=0..1:1000000000"];
+    refuses(&twofold(&cells), 2, &["--over", "1000000000000000000 rows"]);
+    assert!(begun.elapsed() < 3 * AT_ONCE);
+}
+
+/// A picture that grows a thousandfold when it is unpacked, and one whose text does: neither is unpacked further than its header allows.
+#[test]
+fn decompression_bombs_stay_packed() {
+    let folder = tempfile::tempdir().unwrap();
+    // Zeros pack 1000:1: 128 MiB of them in the data, and in a text, of an image of one pixel.
+    let zeros = miniz_oxide::deflate::compress_to_vec_zlib(&vec![0_u8; 1 << 27], 9);
+    assert!(zeros.len() < 1 << 18);
+    let chunk = |kind: &[u8; 4], data: &[u8]| {
+        let mut chunk = (data.len() as u32).to_be_bytes().to_vec();
+        chunk.extend_from_slice(kind);
+        chunk.extend_from_slice(data);
+        chunk.extend_from_slice(&crc(&chunk[4..]).to_be_bytes());
+        chunk
+    };
+    let head = [&[0, 0, 0, 1, 0, 0, 0, 1][..], &[8, 6, 0, 0, 0]].concat();
+    let text = [b"twofold:Picture\0\x01\0\0\0".as_slice(), &zeros].concat();
+    let mut bomb = b"\x89PNG\r\n\x1a\n".to_vec();
+    bomb.extend(chunk(b"IHDR", &head));
+    bomb.extend(chunk(b"iTXt", &text));
+    bomb.extend(chunk(b"IDAT", &zeros));
+    bomb.extend(chunk(b"IEND", b""));
+    let file = folder.path().join("fig1.png");
+    fs::write(&file, bomb).unwrap();
+    let begun = Instant::now();
+    refuses(&twofold(&["inspect", file.to_str().unwrap()]), 1, &["ours"]);
+    let against = twofold(&["check", "fig1", "--quiet", "--against", folder.path().to_str().unwrap()]);
+    refuses(&against, 1, &["fig1.png: DIFFERS"]);
     assert!(begun.elapsed() < 2 * AT_ONCE);
+}
+
+/// The checksum of PNG's chunks (ISO 3309).
+fn crc(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0_u32, |crc, b| {
+        (0..8).fold(crc ^ u32::from(*b), |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0xedb8_8320 } else { crc >> 1 })
+    })
 }
 
 /// 46 bytes that claim a picture of 100000 by 100000 pixels; a link to nothing; a name that steers terminals: each costs one line.
