@@ -74,6 +74,9 @@ struct LongRuns {
     reference: Manifest,
 }
 
+/// Whether a stretch could be computed, and whether it came out the same.
+type Recomputed = Result<Result<(), Doubt>, JobError>;
+
 /// What came of it.
 struct Report {
     name: String,
@@ -195,7 +198,7 @@ fn stretches(arguments: &Arguments, runs: &LongRuns, progress: &Progress) -> Res
     }
     let wanted = if arguments.all { places } else { choose(&places, arguments.segments, &points.root, arguments.seed) };
     let tally = Tally::counting(progress, "stretches", wanted.len() as u64);
-    let found: Vec<(Place, Result<Result<(), Doubt>, JobError>)> = in_pool(arguments.threads, || {
+    let found: Vec<(Place, Recomputed)> = in_pool(arguments.threads, || {
         let one = |place: &Place| {
             let found = points.recompute(figure, *place, &());
             tally.done(!matches!(found, Ok(Ok(()))));
