@@ -401,7 +401,8 @@ mod tests {
 
             // A bit of a state, of a digest, of a time, of a place: the tree says so, and if the tree is made to fit, the computation.
             let place = Place { run: 1, stretch: 40 };
-            let changes: [(&str, fn(&mut End)); 4] = [
+            type Change = fn(&mut End);
+            let changes: [(&str, Change); 4] = [
                 ("state", |end| end.state[1] = f64::from_bits(end.state[1].to_bits() ^ 1)),
                 ("rows", |end| end.rows = Hash::of(end.rows.as_str().as_bytes())),
                 ("time", |end| end.t = f64::from_bits(end.t.to_bits() ^ 1)),
