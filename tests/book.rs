@@ -114,6 +114,11 @@ fn every_command_of_the_book_does_what_it_says() {
                         .output()
                         .unwrap();
                     let said = String::from_utf8_lossy(&output.stderr);
+                    if command.starts_with("twofold check") && std::env::var_os("TWOFOLD_BLESS").is_some() {
+                        // The references are about to be made anew.
+                        assert!(matches!(output.status.code(), Some(0 | 1)), "{place}\n{said}");
+                        continue;
+                    }
                     assert_eq!(output.status.code(), Some(exit), "{place}\n{said}");
                     assert_eq!(exit == 0, !said.contains("error:"), "{place}\n{said}");
                     run += 1;

@@ -42,12 +42,12 @@ fn golden_quick_figures_have_the_committed_hashes() {
 /// The long figures, shortened to t = 300: a digest of what is asked, found and drawn. A picture that changes on purpose gets its new line here; the
 /// test prints it.
 const SHORTENED: [(&str, &str); 6] = [
-    ("fig7-printed-shortened", "aa01e4c401136e387d0c85243c48c7c1569107f52edac13a8f8637b3fd31a708"),
-    ("fig7-reconstructed-shortened", "17688ea47dd30f4a547fb8a7f052c1fc66527459383c4156aee0ff126e1996dd"),
-    ("fig8-printed-shortened", "113552eefd31f9e853d80318f25c7bf897d03a2d86d645fca298f7402cd665f6"),
-    ("fig8-reconstructed-shortened", "dbe577a8bf819e31002c659d9c05c6a2879ae0963c4d0ab0f41a83510fd35312"),
-    ("fig9-printed-shortened", "e1b516d7b60de40f5aed2c5612addb6b504e7f30120a6ebc497ab3303c78846b"),
-    ("fig9-reconstructed-shortened", "7c70ddedae65541d79cbb823137d1e135d9aa2a7e7c3181d8aa77031e73c448e"),
+    ("fig7-printed-shortened", "6c24739219839d530ec0b140ec117faadc37d1823665dbcad89aedf80201ed11"),
+    ("fig7-reconstructed-shortened", "2594875d17c6a59f1d4162369110d4700a7708f1d23f1b8493def48711cdc7c0"),
+    ("fig8-printed-shortened", "fab77af605355f6c0b0f9c75adf7172a7c187a29c63ff319731eee414be8df53"),
+    ("fig8-reconstructed-shortened", "4c145c6bced8d49b282b14dc1c8912c672d5225b300fde87727bd36e1dd194d8"),
+    ("fig9-printed-shortened", "b3975cb3c6db89dca80720edbffa8d44f540be0169f197d75bf4634b5f128aa2"),
+    ("fig9-reconstructed-shortened", "795b54e95d35a9faf8f16b2a2363e13b3c546aa35f4cd2e06a7cc73918e2ace0"),
 ];
 
 #[test]
