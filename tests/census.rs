@@ -217,9 +217,11 @@ fn rows_that_come_out_the_same_pass_and_others_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let progress = Progress::new(true);
     let committed = small(30.0).parquet();
-    recompute(&[("a.parquet", &committed)], folder.path(), 1, &progress).unwrap();
-    assert_eq!(std::fs::read(folder.path().join("a.parquet")).unwrap(), committed);
-    assert!(!journal_of(&folder.path().join("a.parquet")).exists());
+    // Into a folder that is not there yet.
+    let new = folder.path().join("figures").join("census");
+    recompute(&[("a.parquet", &committed)], &new, 1, &progress).unwrap();
+    assert_eq!(std::fs::read(new.join("a.parquet")).unwrap(), committed);
+    assert!(!journal_of(&new.join("a.parquet")).exists());
 
     // The same sweep with one row of another.
     let (mut forged, other) = (Rows::of(small(30.0).sweep().clone()), small(29.0));
