@@ -8,7 +8,7 @@ use super::rows::{compute, journal_of};
 use crate::job::question::NUMERICS;
 use crate::job::sweep::Rows;
 use crate::record::Journal;
-use crate::record::files::{FileError, write};
+use crate::record::files::write;
 
 /// Computes every row of these Parquet files (name, content) anew and compares it with the committed one. What was computed is kept in
 /// `folder` under the same names, with a journal until a file is whole, from which the next call goes on.
@@ -19,7 +19,6 @@ use crate::record::files::{FileError, write};
 /// file cannot be read or written.
 pub fn recompute(data: &[(&str, &[u8])], folder: &Path, threads: usize, progress: &Progress) -> Result<(), CliError> {
     let mut otherwise = Vec::new();
-    std::fs::create_dir_all(folder).map_err(FileError::new("create the folder", folder))?;
     for (name, bytes) in data {
         let unusable = |e: &dyn std::fmt::Display| CliError::Usage(format!("{name}: {e}"));
         let committed = Rows::from_parquet(bytes).map_err(|e| unusable(&e))?;

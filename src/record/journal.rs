@@ -4,7 +4,7 @@
 //! journal is opened again; a line that was damaged otherwise is an error, because what it said cannot be known. The process that
 //! writes holds a lock on the file.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
@@ -22,12 +22,15 @@ pub struct Journal {
 const DIGEST: usize = 12;
 
 impl Journal {
-    /// Opens the journal at `path` for writing, making it if it is not there. Returns it with the whole lines that it holds.
+    /// Opens the journal at `path` for writing, making it and its folder if they are not there. Returns it with the whole lines that it holds.
     ///
     /// # Errors
     /// If the file cannot be read or written, another process writes it, or it is damaged before its last line.
     pub fn open(path: &Path) -> Result<(Self, Vec<String>), FileError> {
         let failed = |source| FileError { action: "open the journal", path: path.to_path_buf(), source };
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).map_err(failed)?;
+        }
         let mut file =
             OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
         file.try_lock().map_err(|e| match e {
