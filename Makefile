@@ -36,8 +36,10 @@ test: ## all tests, in the debug profile
 rigor-test: ## millions of interval operations against exact integer arithmetic (minutes)
 	@$(CARGO) test --release --locked --test rigor_interval -- --ignored
 
-elementary: ## tanh and exp against double-double arithmetic: 2^24 and 2^30 points each (half an hour)
-	@$(CARGO) test --release --locked --lib num::elementary -- --include-ignored --nocapture
+# 2^24 points a function; make elementary SKIP= : tanh and exp at 2^30 points too (half an hour).
+SKIP := --skip 2_30
+elementary: ## elementary functions against double-double arithmetic, and their frozen bits: 2^24 points each (minutes)
+	@$(CARGO) test --release --locked --lib num::elementary -- --include-ignored --nocapture $(SKIP)
 
 # The sweeps behind figures/census, figures/audit and figures/basin: 300 starts within 1e-9 of the paper's; fig. 7(iii) by other methods and
 # tolerances, and to shorter times with small local errors; alpha and beta over three decades each, and one exponent changed; starts on a plane.
@@ -169,6 +171,24 @@ torture: ## kill the program at random moments and look for losses: make torture
 .PHONY: fuzz
 fuzz: ## every reader of foreign bytes against inputs made by chance: make fuzz FUZZ_SECONDS=600 FUZZ="spec png"
 	@FUZZ_SECONDS=$(or $(FUZZ_SECONDS),60) FUZZ="$(FUZZ)" $(CARGO) test --locked --quiet --test fuzz -- --nocapture every_reader
+
+.PHONY: symbols
+# Every program of the workspace and the Python module, as cargo leaves them; and other files: make symbols PROGRAMS="path ..."
+symbols: ## no program and no module asks the platform for mathematics: all of them are built and their ELF files read (Linux)
+	@$(CARGO) build --release --locked --workspace
+	@found=$$(find target/release -maxdepth 1 -type f \( -executable -o -name 'lib_native.so' \) ! -name '.*'); \
+	TWOFOLD_PROGRAMS="$$found $(PROGRAMS)" $(CARGO) test --locked --quiet --test binary -- --ignored --nocapture
+
+.PHONY: check-arch check-levels reprotest
+check-arch: ## the same bytes on arm64, s390x, i686, riscv64 and wasm, emulated: make check-arch TARGETS="s390x" (Debian; scripts/check-arch.sh says what it needs)
+	@sh scripts/check-arch.sh $(TARGETS)
+
+check-levels: ## the same bytes at every level of optimisation, with fat LTO, and for this processor: make check-levels LEVELS="s z"
+	@sh scripts/check-levels.sh $(LEVELS)
+
+reprotest: ## figures made twice with everything around them changed; WHAT=sources builds the program twice too (Debian, as root; scripts/reprotest.sh)
+	@[ "$(WHAT)" = sources ] || $(CARGO) build --release --locked --bin twofold
+	@sh scripts/reprotest.sh $(or $(WHAT),target/release/twofold) $(FIGURES)
 
 .PHONY: trap
 trap: ## check figures with every rounding function of the platform's mathematics replaced by an abort (Linux, needs a C compiler)

@@ -6,6 +6,10 @@
 
 mod answers;
 mod errors;
+// The names of the platform's mathematics that dependencies ask for, defined as our own; python/build.rs binds them.
+#[cfg(target_os = "linux")]
+#[path = "../../src/bin/twofold/mathematics.rs"]
+mod mathematics;
 mod paper;
 mod supervise;
 mod system;

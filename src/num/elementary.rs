@@ -123,4 +123,6 @@ pub fn exp10(x: f64) -> f64 {
 }
 
 #[cfg(test)]
+mod others;
+#[cfg(test)]
 mod tests;

@@ -7,7 +7,7 @@ use super::kernels::{self, Pointwise, TANH_IS_ONE};
 use super::*;
 
 /// A well-mixed number for each index (splitmix64: Steele, Lea & Flood 2014).
-fn mixed(index: u64) -> u64 {
+pub(super) fn mixed(index: u64) -> u64 {
     let mut z = index.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -69,7 +69,7 @@ const EXP: Function = Function {
 };
 
 /// Distance of `y` from the exact value in units of its last place. The oracle's own error, some 2^-100, is far below.
-fn error(y: f64, exact: DoubleDouble) -> f64 {
+pub(super) fn error(y: f64, exact: DoubleDouble) -> f64 {
     let unit = f64::from_bits(exact.to_f64().abs().to_bits() + 1) - exact.to_f64().abs();
     ((DoubleDouble::from_f64(y) - exact).to_f64() / unit).abs()
 }

@@ -1,0 +1,146 @@
+#!/bin/sh
+# Builds the program for other architectures, runs it there under emulation, and says of each whether every byte is the committed one.
+#
+#   scripts/check-arch.sh [TARGET...]      (make check-arch; Debian or Ubuntu with qemu-user-static; wasm32 wants PyPI's package wasmtime)
+#
+# Targets: aarch64, s390x (big-endian), i686 (32 bits), riscv64, wasm32. i686 runs without emulation where the kernel takes it.
+#
+# COMPILER=rustup: the project's own compiler, the target's standard library from rustup and a cross linker from Debian (gcc-aarch64-linux-gnu libc6-dev-arm64-cross, ...).
+# COMPILER=debian: another compiler, that of Debian's unstable suite, in a root of its own (ROOT, 5 GB; needs root and debootstrap; `scripts/check-arch.sh clean` removes
+# it). Crates are those of Cargo.lock (cargo vendor). Not said: rustup's where it can build for that target, Debian's where it cannot.
+#
+# RUN: what is run, "check fig1 fig2 fig3 fig4 fig5 fig6" if nothing is said; "check" is all figures (hours under emulation). LEVEL: optimisation (1). THREADS (1).
+# ONLY=build, ONLY=run: half of it. MIRROR: Debian's. PYTHON: one that has wasmtime. The results are added to target/arch/report.txt.
+set -u
+work=${WORK:-$PWD/target/arch}
+root=${ROOT:-$work/root}
+mirror=${MIRROR:-http://deb.debian.org/debian}
+run=${RUN:-check fig1 fig2 fig3 fig4 fig5 fig6}
+level=${LEVEL:-1}
+threads=${THREADS:-1}
+only=${ONLY:-}
+here=$(dirname "$0")
+
+# Nothing is ever mounted in the root but for the command that runs there, so that it can be removed like any folder.
+inside() {
+    # shellcheck disable=SC2016
+    unshare --mount sh -c 'mount -t proc proc "$0/proc" && exec chroot "$0" /usr/bin/env -i HOME=/root LC_ALL=C DEBIAN_FRONTEND=noninteractive PATH=/usr/sbin:/usr/bin:/sbin:/bin "$@"' "$root" "$@"
+}
+
+if [ "${1:-}" = clean ]; then
+    if mount | grep -q " on $root/"; then echo "something is mounted in $root: unmount it first"; exit 2; fi
+    rm -rf "$root"
+    exit
+fi
+[ $# -gt 0 ] || set -- aarch64 s390x i686 riscv64 wasm32
+mkdir -p "$work"
+
+# The root: a compiler, cross linkers, and the standard libraries of the other targets. Those packages are unpacked, not installed: what they depend on (the compiler's own
+# libraries for that machine) is not needed to build for it.
+setup() {
+    [ -e "$root/.ready" ] && return
+    [ -e "$root/etc/debian_version" ] || debootstrap --variant=minbase sid "$root" "$mirror" > "$work/debootstrap.log" 2>&1 || return 1
+    # A mirror may be a picture of some past day.
+    echo 'Acquire::Check-Valid-Until "false";' > "$root/etc/apt/apt.conf.d/00mirror"
+    for a in arm64 s390x i386 riscv64; do inside dpkg --add-architecture $a; done
+    {
+        inside apt-get update && inside apt-get install -y --no-install-recommends rustc cargo libstd-rust-dev-wasm32 lld gcc libc6-dev \
+            gcc-aarch64-linux-gnu libc6-dev-arm64-cross gcc-s390x-linux-gnu libc6-dev-s390x-cross gcc-riscv64-linux-gnu libc6-dev-riscv64-cross \
+            gcc-i686-linux-gnu libc6-dev-i386-cross &&
+            mkdir -p "$root/debs" && inside sh -c 'cd /debs && for a in arm64 s390x i386 riscv64; do apt-get download libstd-rust-dev:$a; done' &&
+            for deb in "$root"/debs/*.deb; do dpkg-deb -x "$deb" "$root"; done
+    } > "$work/apt.log" 2>&1 || return 1
+    rm -rf "$root/debs" "$root"/var/cache/apt/archives/*.deb
+    touch "$root/.ready"
+}
+
+# The sources as they are committed, and every crate they name.
+sources() {
+    mkdir -p "$root/src/twofold/.cargo"
+    git archive HEAD | tar -x -C "$root/src/twofold" --exclude rust-toolchain.toml || return 1
+    rm -f "$root/src/twofold/rust-toolchain.toml"
+    cargo vendor --locked --quiet "$root/src/vendor" > /dev/null || return 1
+    printf '[source.crates-io]\nreplace-with = "vendored"\n[source.vendored]\ndirectory = "/src/vendor"\n' > "$root/src/twofold/.cargo/config.toml"
+}
+
+# Can the project's own compiler build for this target?
+by_rustup() {
+    command -v rustup > /dev/null && rustup target add "$triple" > /dev/null 2>&1 && { [ -z "$cross" ] || command -v "$cross-gcc" > /dev/null; }
+}
+
+# Debian's compiler into $1, or ours.
+build() {
+    name=$(echo "$triple" | tr 'a-z-' 'A-Z_')
+    if [ -n "$cross" ]; then linker=$cross-gcc; else linker=; fi
+    if [ "$compiler" = rustup ]; then
+        version=$(rustc --version | cut -d ' ' -f 1,2)
+        env ${linker:+"CARGO_TARGET_${name}_LINKER=$linker"} CARGO_PROFILE_RELEASE_OPT_LEVEL="$level" CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16 CARGO_PROFILE_RELEASE_LTO=off \
+            cargo build --release --locked --quiet --bin twofold --target "$triple" --target-dir "$work/rustup" || return 1
+        made=$work/rustup/$triple/release
+    else
+        setup || { echo "the root could not be made: see $work/*.log"; return 1; }
+        [ -n "${sourced:-}" ] || sources || { echo "the crates could not be fetched"; return 1; }
+        sourced=yes
+        version=$(inside rustc --version | cut -d ' ' -f 1,2)
+        inside env "CARGO_TARGET_${name}_LINKER=${linker:-wasm-ld}" CARGO_PROFILE_RELEASE_OPT_LEVEL="$level" CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16 CARGO_PROFILE_RELEASE_LTO=off \
+            sh -c "cd /src/twofold && cargo build --release --locked --offline --quiet --bin twofold --target $triple" || return 1
+        made=$root/src/twofold/target/$triple/release
+    fi
+    mkdir -p "$work/$target-$compiler"
+    for file in twofold twofold.wasm; do [ ! -e "$made/$file" ] || cp "$made/$file" "$work/$target-$compiler/"; done
+    echo "$version, level $level" > "$work/$target-$compiler/compiler"
+}
+
+# The program on its own kind of machine. The C library is that of the cross compiler.
+on_it() {
+    libraries=/usr/$cross
+    [ "$compiler" = rustup ] || libraries=$root$libraries
+    program=$work/$target-$compiler/twofold
+    case $target in
+        wasm32) "${PYTHON:-python3}" "$here/wasm.py" "$program.wasm" "$@" ;;
+        i686)
+            # A kernel that takes programs of 32 bits needs no emulation.
+            if "$libraries/lib/ld-linux.so.2" --library-path "$libraries/lib" "$program" --version > /dev/null 2>&1; then
+                "$libraries/lib/ld-linux.so.2" --library-path "$libraries/lib" "$program" "$@"
+            else
+                qemu-i386-static -L "$libraries" "$program" "$@"
+            fi
+            ;;
+        *) "qemu-$target-static" -L "$libraries" "$program" "$@" ;;
+    esac
+}
+
+bad=0
+for target in "$@"; do
+    case $target in
+        aarch64) triple=aarch64-unknown-linux-gnu cross=aarch64-linux-gnu ;;
+        s390x) triple=s390x-unknown-linux-gnu cross=s390x-linux-gnu ;;
+        i686) triple=i686-unknown-linux-gnu cross=i686-linux-gnu ;;
+        riscv64) triple=riscv64gc-unknown-linux-gnu cross=riscv64-linux-gnu ;;
+        wasm32) triple=wasm32-wasip1 cross= ;;
+        *) echo "$target: not one of aarch64, s390x, i686, riscv64, wasm32"; exit 2 ;;
+    esac
+    compiler=${COMPILER:-}
+    [ -n "$compiler" ] || if by_rustup; then compiler=rustup; else compiler=debian; fi
+    [ "$compiler" != rustup ] || by_rustup || { echo "$target: rustup has no standard library for it, or $cross-gcc is missing"; bad=1; continue; }
+    if [ "$only" != run ]; then
+        build > "$work/$target.build.log" 2>&1 || { echo "$target: NOT BUILT: see $work/$target.build.log"; bad=1; continue; }
+    fi
+    [ "$only" != build ] || continue
+    begun=$(date +%s)
+    # shellcheck disable=SC2086
+    on_it $run --quiet --threads "$threads" > "$work/$target.txt" 2> "$work/$target.said"
+    found=$?
+    took=$(($(date +%s) - begun))
+    [ "$found" -eq 0 ] || bad=1
+    case $run in
+        check*)
+            # The first that is not the same, and which layer of it.
+            result="$(grep -c ': same ' "$work/$target.txt") pictures the same"
+            [ "$found" -eq 0 ] || result="$result, exit code $found: $(grep -v ': same ' "$work/$target.txt" | head -n 3 | tr '\n' ' ')$(tail -n 1 "$work/$target.said")"
+            ;;
+        *) result="exit code $found: $(grep . "$work/$target.txt" | tail -n 1)$(tail -n 1 "$work/$target.said")" ;;
+    esac
+    echo "$(date -u +%F) | $target | $(cat "$work/$target-$compiler/compiler") | $threads thread | $run | $result | $took s" | tee -a "$work/report.txt"
+done
+exit "$bad"
