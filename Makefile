@@ -168,6 +168,14 @@ torture: ## kill the program at random moments and look for losses: make torture
 	@$(CARGO) build --release --locked --bin twofold
 	@scripts/torture.sh $(or $(KILLS),100)
 
+# Scratch trees and builds of its own under target/; a call goes on where the last one was stopped. As root, the tests run as nobody: a mutant of code
+# that writes files must not be let loose on the system's.
+.PHONY: mutants
+mutants: ## mutation testing, all mutants in one build (docs/mutants.md): make mutants ROOMS="record compare" SLOW=5 JOBS=1 (Linux, util-linux; hours)
+	@$(CARGO) build --locked --quiet --manifest-path scripts/mutants/Cargo.toml
+	@scripts/mutants/target/debug/mutants --rooms "$(or $(ROOMS),record compare)" --scratch target/mutants --slow $(or $(SLOW),5) --jobs $(or $(JOBS),1) \
+	$$(if [ $$(id -u) = 0 ]; then echo --user 65534; fi)
+
 .PHONY: fuzz
 fuzz: ## every reader of foreign bytes against inputs made by chance: make fuzz FUZZ_SECONDS=600 FUZZ="spec png"
 	@FUZZ_SECONDS=$(or $(FUZZ_SECONDS),60) FUZZ="$(FUZZ)" $(CARGO) test --locked --quiet --test fuzz -- --nocapture every_reader

@@ -459,4 +459,106 @@ mod tests {
         let blue = d.rgba.chunks_exact(4).filter(|p| p[..3] == ONLY_ACTUAL).count();
         assert_eq!(blue, 49);
     }
+
+    /// One pixel of colour among many: every mean counts three channels, and the worst block is the small one in the corner.
+    #[test]
+    fn means_are_over_channels_and_blocks() {
+        let white = grey(20, 20, |_| 255);
+        let mut pinker = white.clone();
+        pinker.rgba[4 * (20 * 3 + 17) + 1] -= 30;
+        let c = compare(&white, &pinker).unwrap();
+        assert_eq!((c.changed_pixels, c.largest_difference), (1, 30));
+        close(c.changed_share, 1.0 / 400.0);
+        close(c.rms, (900.0_f64 / 1200.0).sqrt());
+        // Columns 16 to 19, rows 0 to 15.
+        close(c.worst_block_rms, (900.0_f64 / 192.0).sqrt());
+    }
+
+    #[test]
+    fn a_small_picture_is_one_window() {
+        let (a, b) = ([10, 20, 30, 40], [12, 18, 33, 47]);
+        let c = compare(&grey(2, 2, |i| a[i]), &grey(2, 2, |i| b[i])).unwrap();
+        // Means 25 and 27.5, variances 125 and 185.25, covariance 150.
+        let (c1, c2) = (6.5025, 58.5225);
+        close(c.ssim, (1375.0 + c1) * (300.0 + c2) / ((625.0 + 756.25 + c1) * (310.25 + c2)));
+        assert_eq!(c.ssim, c.worst_ssim);
+        // Too low for a window, though wide enough; and the other way round.
+        for (w, h) in [(40, 10), (10, 40)] {
+            let c = compare(&noise(w, h, 1), &noise(w, h, 2)).unwrap();
+            assert_eq!(c.ssim, c.worst_ssim);
+        }
+        for (w, h) in [(11, 12), (12, 11)] {
+            let c = compare(&noise(w, h, 1), &noise(w, h, 2)).unwrap();
+            assert!(c.worst_ssim < c.ssim, "two windows of their own");
+        }
+    }
+
+    /// Colours have the luminance of ITU-R BT.601.
+    #[test]
+    fn colours_are_as_light_as_they_look() {
+        let flat = |c: [u8; 3]| Pixels { width: 12, height: 12, rgba: [c[0], c[1], c[2], 255].repeat(144) };
+        for (colour, luminance) in [([200, 0, 0], 59.8), ([0, 200, 0], 117.4), ([0, 0, 200], 22.8)] {
+            let c = compare(&flat(colour), &flat([90; 3])).unwrap();
+            close(c.ssim, (2.0 * 90.0 * luminance + C1) / (8100.0 + luminance * luminance + C1));
+        }
+    }
+
+    #[test]
+    fn half_transparent_colours_are_mixed_with_white() {
+        let half = Pixels { width: 1, height: 1, rgba: vec![100, 200, 0, 128] };
+        // 255 + (c - 255) 128/255, rounded.
+        assert_eq!(on_white(&half), [[177, 227, 127]]);
+        let opaque = Pixels { width: 1, height: 1, rgba: vec![100, 200, 0, 255] };
+        assert_eq!(on_white(&opaque), [[100, 200, 0]]);
+    }
+
+    #[test]
+    fn the_difference_is_drawn_inside_the_picture_and_the_rest_faintly() {
+        let (black, lighter) = (grey(6, 4, |_| 0), grey(6, 4, |i| if i == 0 || i == 23 { 9 } else { 0 }));
+        let d = difference_image(&black, &lighter).unwrap();
+        let orange: Vec<usize> = (0..24).filter(|i| d.rgba[4 * i..][..3] == ONLY_EXPECTED).collect();
+        // Two corners and what touches them.
+        assert_eq!(orange, [0, 1, 6, 7, 16, 17, 22, 23]);
+        // Shared black: a tenth and a fifth of ink are seen and do not shout.
+        assert_eq!(d.rgba[4 * 3], 255 - 56);
+        let d = difference_image(&grey(1, 1, |_| 155), &grey(1, 1, |_| 155)).unwrap();
+        assert_eq!(d.rgba, [233, 233, 233, 255]);
+    }
+
+    #[test]
+    fn limits_are_said_in_words() {
+        let limits = Limits::default();
+        assert_eq!(
+            limits.describe(Rung::ChangedPixels),
+            "changed pixels: at most 1 % changed, none by more than 32 levels of 255"
+        );
+        assert_eq!(limits.describe(Rung::Ssim), "SSIM: at least 0.98, at least 0.5 in any window");
+        // At the limit is inside it.
+        let c = compare(&grey(2, 2, |_| 0), &grey(2, 2, |_| 0)).unwrap();
+        let just = Comparison { changed_share: 0.01, largest_difference: 32, ..c };
+        assert_eq!(limits.rung(&just), Some(Rung::ChangedPixels));
+        assert_eq!(
+            limits.rung(&Comparison { largest_difference: 33, rms: 2.0, worst_block_rms: 8.0, ..just }),
+            Some(Rung::Rms)
+        );
+        let blurred = Comparison { largest_difference: 33, rms: 2.1, ssim: 0.98, worst_ssim: 0.5, ..just };
+        assert_eq!(limits.rung(&blurred), Some(Rung::Ssim));
+        assert_eq!(limits.rung(&Comparison { ssim: 0.97, ..blurred }), None);
+    }
+
+    /// Few changed pixels are drawn wide, many are not: one in a thousand is the border.
+    #[test]
+    fn as_wide_as_they_are_few() {
+        let white = grey(1050, 100, |_| 255);
+        let blue = |changed: usize| {
+            let specked = grey(1050, 100, |i| if i % 1000 == 500 && i / 1000 < changed { 0 } else { 255 });
+            let d = difference_image(&white, &specked).unwrap();
+            d.rgba.chunks_exact(4).filter(|p| p[..3] == ONLY_ACTUAL).count() as f64 / changed as f64
+        };
+        assert!(blue(104) > 40.0, "seven by seven, some of them cut at an edge");
+        assert!(blue(105) < 10.0, "three by three");
+        let dense = grey(1050, 100, |i| if i % 100 == 50 { 0 } else { 255 });
+        let d = difference_image(&white, &dense).unwrap();
+        assert!(d.rgba.chunks_exact(4).filter(|p| p[..3] == ONLY_ACTUAL).count() < 9 * 1051);
+    }
 }

@@ -580,4 +580,100 @@ mod tests {
         assert!(error.contains("endless") && error.contains("16 MiB"), "{error}");
         assert!(read_text_from(&b"\xff"[..], "x").unwrap_err().to_string().contains("not UTF-8"));
     }
+
+    #[test]
+    fn a_folder_may_be_called_like_that_of_descriptors() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("fd/x");
+        write(&path, b"the first and longer one").unwrap();
+        write(&path, b"two").unwrap();
+        assert_eq!(read(&path).unwrap(), b"two");
+    }
+
+    #[test]
+    fn only_files_with_a_temporary_name_are_swept() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at(".twofold-Folder.tmp")).unwrap();
+        let left = [".twofold-Folder.tmp", ".twofold-a-b_c+.tmp", ".twofold-seven77.tmp"];
+        for name in [left[1], left[2], ".twofold-abcdef.tmp", ".twofold-ABCDEF.tmp"] {
+            fs::write(at(name), b"half").unwrap();
+        }
+        assert_eq!(sweep(folder.path()), 2);
+        assert_eq!(names(folder.path()), left);
+        assert_eq!(sweep(&at("nowhere")), 0);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_growing_file_is_seen_when_it_is_finished() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        write(&at("old"), b"what was there").unwrap();
+        fs::set_permissions(at("old"), fs::Permissions::from_mode(0o640)).unwrap();
+        let mut growing = Growing::begin(&at("old")).unwrap();
+        growing.append(b"one ").unwrap();
+        growing.append(b"two").unwrap();
+        assert_eq!(read(&at("old")).unwrap(), b"what was there");
+        growing.finish(None).unwrap();
+        assert_eq!(read(&at("old")).unwrap(), b"one two");
+        // In another place than it was begun for: with the permissions of what is there.
+        let mut growing = Growing::begin(&at("new")).unwrap();
+        growing.append(b"three").unwrap();
+        assert!(growing.finish(Some(folder.path())).is_err());
+        let mut growing = Growing::begin(&at("new")).unwrap();
+        growing.append(b"three").unwrap();
+        growing.finish(Some(&at("old"))).unwrap();
+        assert_eq!(read(&at("old")).unwrap(), b"three");
+        assert_eq!(fs::metadata(at("old")).unwrap().permissions().mode() & 0o7777, 0o640);
+        // One that is never finished leaves nothing.
+        drop(Growing::begin(&at("new")).unwrap());
+        assert_eq!(names(folder.path()), ["old"]);
+    }
+
+    #[test]
+    fn removing_what_is_gone_is_no_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x");
+        write(&path, b"x").unwrap();
+        remove(&path).unwrap();
+        assert!(!path.exists());
+        remove(&path).unwrap();
+        assert!(remove(folder.path()).unwrap_err().to_string().contains("cannot remove"));
+    }
+
+    #[test]
+    fn a_place_where_nothing_can_be_written_is_told_beforehand() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        write(&file, b"x").unwrap();
+        assert!(try_folder(&file.join("deeper/still")).is_err());
+        // A name that no file system takes.
+        assert!(try_place(&folder.path().join("n".repeat(300))).is_err());
+        assert_eq!(names(folder.path()), ["file"]);
+    }
+
+    #[test]
+    fn what_is_under_way_is_known_until_it_is_done() {
+        let folder = tempfile::tempdir().unwrap();
+        let known = || under_way().temporaries.iter().filter(|p| p.starts_with(folder.path())).count();
+        let first = Temporary::new_in(folder.path()).unwrap();
+        let second = Temporary::new_in(folder.path()).unwrap();
+        assert_eq!(known(), 2);
+        drop(first);
+        assert_eq!(known(), 1);
+        second.persist(&folder.path().join("x")).unwrap();
+        assert_eq!(known(), 0);
+        assert_eq!(names(folder.path()), ["x"]);
+    }
+
+    #[test]
+    fn a_text_is_read_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x");
+        write(&path, "two\nlines, é\n".as_bytes()).unwrap();
+        assert_eq!(read_text(&path).unwrap(), "two\nlines, é\n");
+        assert!(read_text(&folder.path().join("y")).unwrap_err().to_string().contains("cannot read"));
+    }
 }

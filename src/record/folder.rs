@@ -138,4 +138,30 @@ mod tests {
         let error = read_tree(&folder.path().join("nowhere"), &|_| true).unwrap_err().to_string();
         assert!(error.contains("nowhere"), "{error}");
     }
+
+    #[test]
+    fn as_deep_and_as_much_as_is_promised() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["1/2/3/4/in.txt", "1/2/3/4/5/out.txt"] {
+            files::write(&folder.path().join(name), b"12345").unwrap();
+        }
+        let tree = read_tree(folder.path(), &|_| true).unwrap();
+        let paths: Vec<&str> = tree.files.iter().map(|f| f.path.as_str()).collect();
+        assert_eq!(paths, ["1/2/3/4/in.txt"]);
+        let after = |already: u64| {
+            let mut walk = Walk { wanted: &|_| true, tree: Tree::default(), bytes: already };
+            walk.folder(folder.path(), "", DEPTH)
+        };
+        after(LARGEST_TREE - 5).unwrap();
+        assert!(after(LARGEST_TREE - 4).unwrap_err().to_string().contains("more than 4 GiB"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_in_a_circle_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        std::os::unix::fs::symlink("b", folder.path().join("a")).unwrap();
+        std::os::unix::fs::symlink("a", folder.path().join("b")).unwrap();
+        assert!(read_tree(folder.path(), &|_| true).unwrap_err().to_string().contains("cannot read"));
+    }
 }

@@ -152,4 +152,9 @@ mod tests {
         let error = Hash::try_from("\u{1b}".repeat(1000)).unwrap_err().to_string();
         assert!(!error.contains('\u{1b}') && error.len() < 1000, "{error}");
     }
+
+    #[test]
+    fn small_print_shows_the_beginning() {
+        assert_eq!(Hash::of(b"abc").short(), "ba7816bf8f01");
+    }
 }

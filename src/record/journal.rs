@@ -140,4 +140,14 @@ mod tests {
         std::fs::write(&path, &bytes).unwrap();
         assert!(Journal::open(&path).unwrap_err().to_string().contains("line 1 is damaged"));
     }
+
+    #[test]
+    fn a_journal_is_gone_when_it_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("j");
+        let (mut journal, _) = Journal::open(&path).unwrap();
+        journal.append("a").unwrap();
+        journal.remove().unwrap();
+        assert!(!path.exists());
+    }
 }

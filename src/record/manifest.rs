@@ -314,4 +314,64 @@ mod tests {
         let m = Manifest { version: VERSION, figure: "fig7".into(), made_by: "0.1.0".into(), pictures: vec![entry()] };
         assert_eq!(Manifest::parse(std::str::from_utf8(&m.to_json()).unwrap(), "m").unwrap(), m);
     }
+
+    /// Each layer alone, with the panels that it differs in.
+    #[test]
+    fn every_layer_is_looked_at() {
+        let other = Hash::of(b"other");
+        let verdict = |h: &str| VerdictEntry {
+            claim: "c".into(),
+            found: "f".into(),
+            agrees: true,
+            sha256: Hash::of(h.as_bytes()),
+        };
+        let mut expected = entry();
+        expected.panels.iter_mut().for_each(|p| p.verdict = Some(verdict("v")));
+        type Change = fn(&mut PictureEntry, Hash);
+        let changes: [(Layer, Change, &[&str]); 7] = [
+            (Layer::Spec, |p, h| (p.spec, p.panels[0].spec) = (h.clone(), h), &["i"]),
+            (Layer::Data, |p, h| (p.data, p.panels[1].data) = (h.clone(), h), &["ii"]),
+            (Layer::Verdict, |p, h| (p.verdict, p.panels[1].verdict) = (h, None), &["ii"]),
+            (Layer::Pixels, |p, h| p.pixels = h, &[]),
+            (Layer::Png, |p, h| p.png = h, &[]),
+            (Layer::Svg, |p, h| p.svg = h, &[]),
+            (Layer::Pdf, |p, h| p.pdf = h, &[]),
+        ];
+        let mut all = expected.clone();
+        for (layer, change, panels) in changes.into_iter().rev() {
+            let mut one = expected.clone();
+            change(&mut one, other.clone());
+            // Alone, and with everything behind it.
+            change(&mut all, other.clone());
+            for actual in [&one, &all] {
+                let difference = expected.first_difference(actual).unwrap();
+                assert_eq!(difference.layer, layer);
+                assert_eq!(difference.panels, panels);
+            }
+        }
+        // A panel that is not there differs.
+        let mut fewer = expected.clone();
+        (fewer.data, _) = (other, fewer.panels.remove(0));
+        assert_eq!(expected.first_difference(&fewer).unwrap().panels, ["i"]);
+    }
+
+    #[test]
+    fn a_picture_is_found_by_its_name() {
+        let mut second = entry();
+        second.name = "fig7-reconstructed".into();
+        let pictures = vec![entry(), second.clone()];
+        let m = Manifest { version: VERSION, figure: "fig7".into(), made_by: "0".into(), pictures };
+        assert_eq!(m.picture("fig7-reconstructed"), Some(&second));
+        assert_eq!(m.picture("fig7"), None);
+        let longest = "a".repeat(LONGEST_NAME);
+        assert!(is_plain_name(&longest) && !is_plain_name(&format!("{longest}a")));
+    }
+
+    #[test]
+    fn layers_are_called_as_in_messages() {
+        let layers = [Layer::Spec, Layer::Data, Layer::Verdict, Layer::Pixels, Layer::Png, Layer::Svg, Layer::Pdf];
+        let names = ["spec", "data", "verdict", "pixels", "PNG file", "SVG file", "PDF file"];
+        assert_eq!(layers.map(Layer::name), names);
+        assert!(layers.is_sorted());
+    }
 }
