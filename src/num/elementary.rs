@@ -30,7 +30,9 @@ fn tanh_inside(x: f64) -> f64 {
 ///
 /// Largest error found: 0.716 units in the last place where the result is a normal number, on 2^24 points (`make elementary`, which
 /// can also go to 2^30); at most one in a subnormal one.
-#[inline]
+///
+/// Out of line, as [`tanh`]'s work is: straight-line code beside a branch would be computed whether its result is wanted or not.
+#[inline(never)]
 pub fn exp(x: f64) -> f64 {
     kernels::exp(x)
 }

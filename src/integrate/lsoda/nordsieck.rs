@@ -36,12 +36,34 @@ impl<const N: usize> Nordsieck<N> {
 
     /// Taylor's formula one step ahead: multiplication by Pascal's triangle, by additions alone.
     pub fn predict(&mut self, order: usize) {
-        for start in (0..order).rev() {
-            for j in start..order {
-                let next = self.y[j + 1];
-                self.y[j] += next;
+        match order {
+            1 => self.predict_of::<1>(),
+            2 => self.predict_of::<2>(),
+            3 => self.predict_of::<3>(),
+            4 => self.predict_of::<4>(),
+            5 => self.predict_of::<5>(),
+            6 => self.predict_of::<6>(),
+            7 => self.predict_of::<7>(),
+            8 => self.predict_of::<8>(),
+            9 => self.predict_of::<9>(),
+            10 => self.predict_of::<10>(),
+            11 => self.predict_of::<11>(),
+            _ => self.predict_of::<12>(),
+        }
+    }
+
+    /// For one order, so that the columns stay in registers from the first addition to the last: through memory each would wait for the one
+    /// before to be written and read again.
+    #[inline]
+    fn predict_of<const ORDER: usize>(&mut self) {
+        let mut y = self.y;
+        for start in (0..ORDER).rev() {
+            for j in start..ORDER {
+                let next = y[j + 1];
+                y[j] += next;
             }
         }
+        self.y[..=ORDER].copy_from_slice(&y[..=ORDER]);
     }
 
     /// Undoes [`Nordsieck::predict`] up to rounding.
