@@ -599,11 +599,7 @@ impl<F: VectorField<N>, S: Simd, const N: usize, const K: usize> WithSimd for Fi
     #[inline(always)]
     fn with_simd<T: Simd>(self, _: T) -> Self::Output {
         // The instruction set is that of the caller, who has chosen it.
-        let mut x = SVector::<Registers<S, K>, N>::from_element(Registers::splat(self.set, 0.0));
-        for i in 0..N {
-            x[i] = Registers::new(self.set, self.x[i]);
-        }
-        bare(&self.field.eval(&x))
+        self.field.eval_in_registers(self.set, self.x)
     }
 }
 

@@ -1,11 +1,13 @@
 //! The question of what a run settles on.
 
+use std::sync::Arc;
+
 use serde_json::{Value, json};
 
 use super::answer::{Answer, Stop};
 use super::desk::Desk;
 use super::exponent::LargestExponent;
-use super::question::{JobError, Question};
+use super::question::{AnyQuestion, JobError, Question};
 use super::run::Run;
 use super::spec::{Observation, RunSpec, SwitchSpec};
 use crate::analyse::Direction;
@@ -54,7 +56,16 @@ impl Question for Classification {
     }
 
     fn cost(&self) -> f64 {
-        Run(self.run.clone()).cost()
+        // Most runs are judged at a glance; some want an exponent.
+        0.02 * Run(self.run.clone()).cost()
+    }
+
+    fn rests_on(&self) -> Vec<AnyQuestion> {
+        if plane(&self.run).is_err() {
+            return Vec::new();
+        }
+        let twins = if self.run.schedule.kick.is_some() { self.noise_free_twins() } else { Vec::new() };
+        std::iter::once(self.run.clone()).chain(twins).map(|run| Arc::new(Run(run)) as _).collect()
     }
 
     fn compute(&self, desk: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
@@ -134,18 +145,24 @@ impl Classification {
         Ok(desk.ask(&question)?.fact("exponent").ok())
     }
 
-    /// The structure that noise can wash out: sections of the same run without kicks, from starts a little apart, each as long as it was not
-    /// captured by a closed orbit.
-    fn noise_free_structure(&self, desk: &Desk<'_>) -> Result<Vec<Vec<SectionPoint>>, JobError> {
+    /// The same run without kicks, from starts a little apart.
+    fn noise_free_twins(&self) -> Vec<RunSpec> {
         let run = &self.run;
+        let twin = |k: usize| {
+            let mut start = run.start.clone();
+            if let Some(x) = start.first_mut() {
+                *x += k as f64 * LENGTHS.free_shift;
+            }
+            let schedule = Schedule { kick: None, ..run.schedule };
+            RunSpec { start, schedule, t_end: run.t_end.min(LENGTHS.free_length), ..run.clone() }
+        };
+        (0..LENGTHS.free_runs).map(twin).collect()
+    }
+
+    /// The structure that noise can wash out: sections of its twins without kicks, each as long as it was not captured by a closed orbit.
+    fn noise_free_structure(&self, desk: &Desk<'_>) -> Result<Vec<Vec<SectionPoint>>, JobError> {
         let mut free = Vec::new();
-        for k in 0..LENGTHS.free_runs {
-            let mut twin = RunSpec {
-                schedule: Schedule { kick: None, ..run.schedule },
-                t_end: run.t_end.min(LENGTHS.free_length),
-                ..run.clone()
-            };
-            twin.start[0] += k as f64 * LENGTHS.free_shift;
+        for twin in self.noise_free_twins() {
             let (_, section) = section(&twin, &*desk.ask(&Run(twin.clone()))?)?;
             let question = attractor::Question {
                 t_end: Some(twin.t_end),

@@ -45,7 +45,8 @@ impl Question for PathComparison {
 }
 
 fn path(desk: &Desk<'_>, run: &RunSpec) -> Result<Vec<Sample>, JobError> {
-    let recording = Recording::of_answer(run, &*desk.ask(&Run(run.clone()))?)?.whole()?;
+    // Many pairs are compared, of paths that nobody else looks at and that together fill much memory.
+    let recording = Recording::of_answer(run, &*desk.ask_in_passing(&Run(run.clone()))?)?.whole()?;
     match recording.data {
         Data::Path(samples) => Ok(samples),
         _ => Err(JobError::Other("only paths can be compared as paths; leave out --section".into())),

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::answer::{Answer, Stop};
+use super::plan::Plan;
 use super::question::{AnyQuestion, JobError, Question, key};
 use super::store::{Kept, Store};
 use crate::integrate::Watch;
@@ -79,6 +80,20 @@ impl<'a> Desk<'a> {
         cell.get_or_init(|| self.answer(question, &key)).clone()
     }
 
+    /// The answer to a question that nobody else is expected to ask: it is not kept in memory, only in the store.
+    ///
+    /// # Errors
+    ///
+    /// As [`Desk::ask`].
+    pub fn ask_in_passing(&self, question: &dyn Question) -> Result<Arc<Answer>, JobError> {
+        let key = key(question);
+        let cell = self.answers.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
+        match cell {
+            Some(cell) => cell.get_or_init(|| self.answer(question, &key)).clone(),
+            None => self.answer(question, &key),
+        }
+    }
+
     fn answer(&self, question: &dyn Question, key: &Hash) -> Result<Arc<Answer>, JobError> {
         if let Some(store) = &self.store {
             match store.get(key, question) {
@@ -104,15 +119,10 @@ impl<'a> Desk<'a> {
         Ok(Arc::new(answer))
     }
 
-    /// Asks all these questions side by side on the current thread pool, the longest first. Errors wait in the desk until they are asked for.
+    /// Asks all these questions side by side on the current thread pool: first what others rest on, and of that the longest. Errors wait in the
+    /// desk until they are asked for.
     pub fn gather(&self, questions: &[AnyQuestion]) {
-        let mut order: Vec<&AnyQuestion> = questions.iter().collect();
-        order.sort_by(|a, b| b.cost().total_cmp(&a.cost()));
-        rayon::scope_fifo(|scope| {
-            for question in order {
-                scope.spawn_fifo(|_| drop(self.ask(&**question)));
-            }
-        });
+        Plan::of(questions).carry_out(|question| drop(self.ask(&**question)));
     }
 }
 

@@ -1,12 +1,14 @@
 //! The questions of what smoothed orbits tend to as the switch steepens: before the first visit to a two-fold, and after it.
 
+use std::sync::Arc;
+
 use serde::Serialize;
 use serde_json::Value;
 
 use super::answer::{Answer, Stop};
 use super::desk::Desk;
 use super::passage::TwoFoldPassage;
-use super::question::{JobError, Question};
+use super::question::{AnyQuestion, JobError, Question};
 use super::recording::side_word;
 use super::table::{Column, Entry, Table};
 use crate::analyse::limit::{AfterVisitQuestion, ConvergenceQuestion, after_visit, convergence};
@@ -71,17 +73,27 @@ pub struct AfterVisit {
 type Smoothed = (f64, Option<Vec<f64>>);
 
 impl AfterVisit {
-    /// Where the smoothed orbits cross: a question of its own.
-    fn smoothed(&self, desk: &Desk<'_>) -> Result<Vec<Smoothed>, JobError> {
+    /// The smoothed orbits, each a question of its own.
+    fn passages(&self) -> Result<Vec<TwoFoldPassage>, JobError> {
         let AfterVisitQuestion { start, eps, beyond, t_end, .. } = &self.compared;
         let [x, y, z] = start[..] else {
             return Err(JobError::Other(format!("the start has {} components, not three", start.len())));
         };
         let followed = PassageQuestion::far([x, y, z], *beyond, *t_end);
-        let mut found = Vec::with_capacity(eps.len());
-        for &eps in eps {
+        let passage = |&eps: &f64| {
             let (system, transition) = (self.system.clone(), Transition::Tanh);
-            let answer = desk.ask(&TwoFoldPassage { system, transition, eps, followed: followed.clone() })?;
+            TwoFoldPassage { system, transition, eps, followed: followed.clone() }
+        };
+        Ok(eps.iter().map(passage).collect())
+    }
+
+    /// Where they cross.
+    fn smoothed(&self, desk: &Desk<'_>) -> Result<Vec<Smoothed>, JobError> {
+        let passages = self.passages()?;
+        let mut found = Vec::with_capacity(passages.len());
+        for passage in passages {
+            let eps = passage.eps;
+            let answer = desk.ask(&passage)?;
             let far = |c: &str| answer.table("passage").and_then(|t| t.numbers(c).first().copied());
             let place: Option<Vec<f64>> = ["far_x", "far_y", "far_z"].into_iter().map(far).collect();
             found.push((eps, place.filter(|p| p.iter().all(|c| c.is_finite()))));
@@ -104,7 +116,11 @@ impl Question for AfterVisit {
     }
 
     fn cost(&self) -> f64 {
-        1e5 + self.compared.eps.iter().map(|eps| 3e3 + 0.1 / eps.max(1e-12)).sum::<f64>()
+        1e5
+    }
+
+    fn rests_on(&self) -> Vec<AnyQuestion> {
+        self.passages().unwrap_or_default().into_iter().map(|passage| Arc::new(passage) as _).collect()
     }
 
     fn compute(&self, desk: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {

@@ -51,6 +51,7 @@ pub mod orbit;
 #[cfg(feature = "parquet")]
 pub mod parquet;
 pub mod passage;
+mod plan;
 pub mod question;
 pub mod recording;
 pub mod run;

@@ -38,9 +38,16 @@ pub trait Question: fmt::Debug + Send + Sync {
         1.0
     }
 
-    /// Expected work in arbitrary units, the same for all kinds: it decides only in which order things are done.
+    /// Expected work in arbitrary units, the same for all kinds, without that of the questions it rests on: it decides only in which order things
+    /// are done.
     fn cost(&self) -> f64 {
         1.0
+    }
+
+    /// Questions that computing this one will ask, as far as they are known beforehand. [`Desk::gather`] has them answered first, so that no
+    /// thread waits for another; nothing else depends on it.
+    fn rests_on(&self) -> Vec<AnyQuestion> {
+        Vec::new()
     }
 
     /// Computes the answer. Other questions may be asked of `desk`; each is computed once.

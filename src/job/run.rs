@@ -35,12 +35,13 @@ impl Question for Run {
     fn cost(&self) -> f64 {
         // Ratios of measured times per unit of time; they order the work and decide nothing else.
         let switch = match self.0.switch {
-            SwitchSpec::Hysteretic { .. } => 20.0,
+            SwitchSpec::Hysteretic { .. } => 6.0,
             SwitchSpec::Smoothed { .. } => 1.0,
             SwitchSpec::Filippov { .. } => 0.1,
         };
         let method = match self.0.method.name {
-            Method::Lsoda | Method::Radau5 => 2.0,
+            Method::Lsoda => 2.0,
+            Method::Radau5 => 6.0,
             Method::Dopri5 => 1.0,
             Method::Taylor => 10.0,
             Method::TaylorExtended => 500.0,

@@ -28,6 +28,8 @@
 //! # use twofold::num::Arithmetic;
 //! ```
 
+mod side_by_side;
+
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -558,6 +560,8 @@ pub struct Program {
 impl Program {
     /// Registers that an evaluation keeps on the stack.
     pub const ON_STACK: usize = 32;
+    /// As many as most systems need: fewer are sooner cleared.
+    const FEW: usize = 16;
     /// Most registers of a program.
     const MOST: usize = 1 << 16;
 
@@ -624,7 +628,11 @@ impl Program {
     #[inline]
     pub fn evaluate<S: Elementary>(&self, x: &[S], out: &mut [S]) {
         assert!(x.len() == self.variables && out.len() == self.outputs.len(), "one number a variable and a value");
-        if self.registers <= Self::ON_STACK {
+        if self.registers <= Self::FEW {
+            let mut registers = [S::zero(); Self::FEW];
+            registers[..x.len()].copy_from_slice(x);
+            self.run(&mut registers, out);
+        } else if self.registers <= Self::ON_STACK {
             let mut registers = [S::zero(); Self::ON_STACK];
             registers[..x.len()].copy_from_slice(x);
             self.run(&mut registers, out);
@@ -636,7 +644,7 @@ impl Program {
     }
 
     #[inline]
-    fn run<S: Elementary, R: Registers<S>>(&self, r: &mut R, out: &mut [S]) {
+    fn run<S: Elementary, R: Results<S>>(&self, r: &mut R, out: &mut [S]) {
         for i in &self.code {
             let a = r.get(i.a);
             let value = match i.code {
@@ -713,24 +721,24 @@ fn instruction(operation: Operation, register: &[u16], fixed: &[Option<f64>]) ->
 }
 
 /// Intermediate results.
-trait Registers<S> {
+trait Results<S> {
     fn get(&self, i: u16) -> S;
     fn set(&mut self, i: u16, value: S);
 }
 
-impl<S: Copy> Registers<S> for [S; Program::ON_STACK] {
-    // The mask changes nothing, since registers are fewer than ON_STACK, and spares the check.
+impl<S: Copy, const M: usize> Results<S> for [S; M] {
+    // The remainder changes nothing, since the program's registers are at most M, a power of two, and spares the way to a panic.
     #[inline(always)]
     fn get(&self, i: u16) -> S {
-        self[usize::from(i) & (Program::ON_STACK - 1)]
+        self[usize::from(i) % M]
     }
     #[inline(always)]
     fn set(&mut self, i: u16, value: S) {
-        self[usize::from(i) & (Program::ON_STACK - 1)] = value;
+        self[usize::from(i) % M] = value;
     }
 }
 
-impl<S: Copy> Registers<S> for Vec<S> {
+impl<S: Copy> Results<S> for Vec<S> {
     #[inline(always)]
     fn get(&self, i: u16) -> S {
         self[usize::from(i)]

@@ -131,7 +131,7 @@ pub fn questions<'a>(pictures: impl IntoIterator<Item = &'a Picture>) -> Vec<Any
     let mut all = Vec::new();
     for picture in pictures {
         all.extend(parts(picture).into_iter().map(|(_, question)| question));
-        all.extend((0..picture.panels.len()).filter_map(|i| verdict::question(picture, i)));
+        all.extend((0..picture.panels.len()).flat_map(|i| verdict::questions(picture, i)));
     }
     all
 }

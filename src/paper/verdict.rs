@@ -114,7 +114,7 @@ fn neighbours(picture: &Picture, index: usize) -> Vec<PathComparison> {
 }
 
 /// The question behind a panel's verdict; none if there is nothing to judge it by (one panel alone of two that the claim compares).
-pub fn question(picture: &Picture, index: usize) -> Option<AnyQuestion> {
+fn question(picture: &Picture, index: usize) -> Option<AnyQuestion> {
     let panel = picture.panels.get(index)?;
     Some(match panel.claim? {
         Claim::Section(_) => Arc::new(Classification::of(panel.run.clone())),
@@ -122,6 +122,15 @@ pub fn question(picture: &Picture, index: usize) -> Option<AnyQuestion> {
             Arc::new(PathComparison(panel.run.clone(), picture.panels.get(index + 1)?.run.clone()))
         }
     })
+}
+
+/// Every question that a panel's judgement asks.
+pub fn questions(picture: &Picture, index: usize) -> Vec<AnyQuestion> {
+    let compared = match picture.panels.get(index).and_then(|panel| panel.claim) {
+        Some(Claim::LessOrganisedThanNext) => neighbours(picture, index),
+        _ => Vec::new(),
+    };
+    question(picture, index).into_iter().chain(compared.into_iter().map(|c| Arc::new(c) as _)).collect()
 }
 
 /// Judges every panel of a picture that a claim is made of.

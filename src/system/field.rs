@@ -7,6 +7,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use nalgebra::SVector;
+use pulp::Simd;
 
 use super::instance::{BindError, run};
 use super::{Relaxation, System, Transition, VectorField};
@@ -295,6 +296,10 @@ impl<const N: usize> VectorField<N> for BoundField<N> {
     #[inline]
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
         run(&self.program, x)
+    }
+    #[inline(always)]
+    fn eval_in_registers<S: Simd, const K: usize>(&self, set: S, x: [[S::f64s; K]; N]) -> [[S::f64s; K]; N] {
+        self.program.evaluate_in_registers(set, x)
     }
     fn tape(&self) -> Arc<Tape> {
         self.tape.clone()

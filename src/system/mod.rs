@@ -30,10 +30,11 @@ pub mod wheel;
 
 use std::sync::Arc;
 
-use nalgebra::{SMatrix, SVector};
-
 use crate::num::tape::Recorded;
-use crate::num::{Dual, Elementary, Tape};
+use nalgebra::{SMatrix, SVector};
+use pulp::Simd;
+
+use crate::num::{Dual, Elementary, Registers, Tape};
 
 pub use caricature::Caricature;
 pub use definition::Definition;
@@ -52,6 +53,22 @@ pub use wheel::Wheel;
 pub trait VectorField<const N: usize>: Sync {
     /// The right-hand side f(x).
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
+    /// The right-hand side at several states side by side, in the registers of an instruction set: in every lane the bits of [`VectorField::eval`].
+    #[doc(hidden)]
+    #[inline(always)]
+    fn eval_in_registers<S: Simd, const K: usize>(&self, set: S, x: [[S::f64s; K]; N]) -> [[S::f64s; K]; N] {
+        // Loops by number: closures may stay calls, compiled for the wrong instruction set.
+        let mut state = SVector::<Registers<S, K>, N>::from_element(Registers::splat(set, 0.0));
+        for i in 0..N {
+            state[i] = Registers::new(set, x[i]);
+        }
+        let f = self.eval(&state);
+        let mut parts = x;
+        for i in 0..N {
+            parts[i] = f[i].parts();
+        }
+        parts
+    }
     /// The right-hand side as data. Made by recording [`VectorField::eval`], unless the equation is data already.
     fn tape(&self) -> Arc<Tape> {
         let record = |x: &[Recorded]| self.eval(&SVector::<_, N>::from_column_slice(x)).as_slice().to_vec();
