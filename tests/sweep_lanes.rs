@@ -7,7 +7,7 @@ use twofold::integrate::{Kick, KickLaw, Schedule, Watch};
 use twofold::job::spec::*;
 use twofold::job::sweep::{Axis, Draws, Row, Sweep};
 use twofold::job::{JobError, JobWatch, Progress};
-use twofold::system::{Caricature, System};
+use twofold::system::{Caricature, Definition, System, Transition};
 
 fn run(system: System, t_end: f64) -> RunSpec {
     RunSpec {
@@ -71,11 +71,49 @@ fn rows_are_those_computed_alone() {
     are_the_rows(&Sweep::new(kicked, axes(&["shift.x=1e-9*4"]), None).unwrap());
 }
 
+/// Systems from files, which are interpreted: two, three and four states, one and two switching surfaces, every transition function.
+#[test]
+fn systems_from_files_share_lanes() {
+    let of = |name: &str, start: &[f64], t_end: f64| {
+        let run = run(System::builtin(name).unwrap(), t_end);
+        RunSpec { start: start.to_vec(), ..run }
+    };
+    are_the_rows(&Sweep::new(of("stick-slip", &[0.1, 0.2], 20.0), axes(&["shift.x=-1e-2..1e-2:5"]), None).unwrap());
+    are_the_rows(&Sweep::new(of("wheel", &[0.69267, 0.0, 0.0], 3.0), axes(&["shift.r=1e-6*5"]), None).unwrap());
+    let forced = of("dry-friction", &[0.0, 0.5, 1.0, 0.0], 20.0);
+    are_the_rows(&Sweep::new(forced, axes(&["params.friction=0.2,0.3", "shift.v=1e-3*4"]), None).unwrap());
+    are_the_rows(&Sweep::new(of("two-blocks", &[0.0, 0.1, 10.0, 0.5], 9.0), axes(&["shift.v1=1e-3*4"]), None).unwrap());
+    let two_fold = of("two-fold", &[0.2, 0.0, -1.0], 1.0);
+    for transition in
+        [Transition::PerturbedTanh { sigma: 0.1 }, Transition::Arctan, Transition::Algebraic, Transition::Erf]
+    {
+        let run = RunSpec { switch: SwitchSpec::Smoothed { eps: 1e-2, transition }, ..two_fold.clone() };
+        are_the_rows(&Sweep::new(run, axes(&["shift.x=1e-3*4"]), None).unwrap());
+    }
+}
+
+/// More intermediate results at a time than the interpreter has room for without asking for memory.
+#[test]
+fn long_equations_share_lanes() {
+    let terms: Vec<String> = (1..40).map(|k| format!("sin({k}*x)/{k} + (")).collect();
+    let long = format!("{} y {}", terms.concat(), ")".repeat(terms.len()));
+    let text = format!(
+        "states = [\"x\", \"y\"]\nh = \"y\"\nplus = [\"y\", \"-x - 0.1*({long})\"]\nminus = [\"y\", \"1 - x\"]\n"
+    );
+    let system = System::new(Definition::from_toml(&text, "long.toml").unwrap());
+    let run = RunSpec { start: vec![0.3, 0.2], ..run(system, 10.0) };
+    are_the_rows(&Sweep::new(run, axes(&["shift.x=1e-3*4"]), None).unwrap());
+}
+
 #[test]
 fn rows_that_lanes_do_not_take_are_computed_alone() {
     let mut wheel = run(System::builtin("wheel").unwrap(), 3.0);
     wheel.start = vec![0.69267, 0.0, 0.0];
-    are_the_rows(&Sweep::new(wheel, axes(&["shift.r=1e-6*5"]), None).unwrap());
+    are_the_rows(&Sweep::new(wheel, axes(&["method=lsoda", "shift.r=1e-6*5"]), None).unwrap());
+    let text = "states = [\"x\", \"y\", \"a\", \"b\", \"c\"]\nh = \"y\"\nplus = [\"y\", \"-x\", \"-a\", \"a - b\", \"-c\"]\nminus = [\"y\", \"1 - x\", \"-a\", \"a - b\", \"-c\"]\n";
+    let five = System::new(Definition::from_toml(text, "five.toml").unwrap());
+    let five = RunSpec { start: vec![0.3, 0.2, 1.0, 1.0, 1.0], ..run(five, 10.0) };
+    are_the_rows(&Sweep::new(five, axes(&["shift.x=1e-3*4"]), None).unwrap());
 }
 
 /// Stops after so many questions.

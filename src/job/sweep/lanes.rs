@@ -15,13 +15,13 @@ use crate::job::recording::{Data, Recording};
 use crate::job::spec::{Method, Observation, RunSpec, SwitchSpec};
 use crate::job::table::Entry;
 use crate::record::Hash;
-use crate::system::{Caricature, Compiled, Smoothed, VectorField};
+use crate::system::{Compiled, Field, Smoothed, VectorField};
 
 /// Fewer cells than this are computed one after the other.
 const FEWEST: usize = 3;
 
-/// States of the systems that run in lanes.
-const STATES: usize = 3;
+/// States of the systems that run in lanes: compiled once for each number of them, the usual ones.
+const STATES: std::ops::RangeInclusive<usize> = 2..=4;
 
 /// A row to be computed.
 struct Cell {
@@ -36,15 +36,14 @@ impl Cell {
         &self.question.0.run
     }
 
-    /// What its section is taken at, if lanes compute it sooner: a smoothed run by Dormand-Prince of the compiled caricature. Recorded equations are interpreted, which
-    /// in lanes was found to be slower than alone.
+    /// What its section is taken at, if lanes compute it: a smoothed run by Dormand-Prince.
     fn plane(&self) -> Option<Plane> {
         let run = self.run();
         let method = &run.method;
         let plain = method.name == Method::Dopri5 && method.precision.is_none() && method.order.is_none();
         match (run.switch, run.observe) {
             (SwitchSpec::Smoothed { .. }, Observation::Section { coordinate, value })
-                if plain && caricature(run).is_some() && run.validate().is_ok() =>
+                if plain && STATES.contains(&run.system.dimension()) && run.validate().is_ok() =>
             {
                 Some(Plane { coordinate, value })
             }
@@ -157,24 +156,25 @@ impl Sweep {
         take: &mut dyn FnMut(Row) -> bool,
     ) -> Result<bool, JobError> {
         let run = cells[0].run();
-        match (caricature(run), run.switch) {
-            (Some(system), SwitchSpec::Smoothed { eps, transition }) => {
-                let field = Smoothed { system, transition, eps };
-                side_by_side(set, &field, cells, progress, enough, take).map(|()| true)
-            }
-            _ => Ok(false),
+        let SwitchSpec::Smoothed { eps, transition } = run.switch else { return Ok(false) };
+        // The compiled equation where there is one: it gives the same bits sooner.
+        if let Some(Compiled::Caricature(system)) = run.system.compiled() {
+            let field = Smoothed { system, transition, eps };
+            side_by_side(set, &field, cells, progress, enough, take)?;
+            return Ok(true);
         }
+        let field = Field::smoothed(&run.system, transition, eps);
+        match run.system.dimension() {
+            2 => side_by_side(set, &field.bind::<2>()?, cells, progress, enough, take)?,
+            3 => side_by_side(set, &field.bind::<3>()?, cells, progress, enough, take)?,
+            4 => side_by_side(set, &field.bind::<4>()?, cells, progress, enough, take)?,
+            _ => return Ok(false),
+        }
+        Ok(true)
     }
 }
 
-fn caricature(run: &RunSpec) -> Option<Caricature> {
-    match run.system.compiled() {
-        Some(Compiled::Caricature(system)) => Some(system),
-        _ => None,
-    }
-}
-
-fn side_by_side<F: VectorField<STATES>>(
+fn side_by_side<F: VectorField<N>, const N: usize>(
     set: InstructionSet,
     field: &F,
     cells: &[Cell],
@@ -184,14 +184,15 @@ fn side_by_side<F: VectorField<STATES>>(
 ) -> Result<(), JobError> {
     let first = cells[0].run();
     let plane = cells[0].plane();
-    let runs: Vec<Run<STATES>> = cells.iter().map(|cell| course(cell.run())).collect();
-    let corner = far::corner(first).map(|c| SVector::from([f64::NEG_INFINITY, c, c]));
+    let runs: Vec<Run<N>> = cells.iter().map(|cell| course(cell.run())).collect();
+    // y and z, as `Fate` looks at them; systems that have such a corner have three states.
+    let corner = far::corner(first).map(|c| SVector::from_fn(|i, _| if i == 0 { f64::NEG_INFINITY } else { c }));
     let display = progress.begin("cells side by side", first.t_end);
     let watch = Both { display: &*display, enough };
     let common = Common { tolerance: first.method.tolerance, plane, corner, watch: &watch };
     let observer = |_| match plane {
-        Some(Plane { coordinate, value }) => SectionRecorder::<STATES>::new(coordinate, value),
-        None => SectionRecorder::<STATES>::new(0, 0.0),
+        Some(Plane { coordinate, value }) => SectionRecorder::<N>::new(coordinate, value),
+        None => SectionRecorder::<N>::new(0, 0.0),
     };
     let mut interrupted = false;
     let mut unfinished = cells.len();
@@ -225,20 +226,20 @@ fn side_by_side<F: VectorField<STATES>>(
     Ok(())
 }
 
-fn course(run: &RunSpec) -> Run<STATES> {
+fn course<const N: usize>(run: &RunSpec) -> Run<N> {
     let start = SVector::from_fn(|i, _| run.start.get(i).copied().unwrap_or(f64::NAN));
     let course = Course {
         t_end: run.t_end,
         schedule: run.schedule,
         step_cap: run.method.step_cap,
         max_steps: run.method.max_steps,
-        kicked_states: STATES,
+        kicked_states: N,
     };
     Run { start, course }
 }
 
 /// As [`simulate_until`](crate::job::simulate::simulate_until) has it.
-fn recorded(end: End<SectionRecorder<STATES>, STATES>) -> Result<Recording<STATES>, JobError> {
+fn recorded<const N: usize>(end: End<SectionRecorder<N>, N>) -> Result<Recording<N>, JobError> {
     let Summary { t, x, statistics, most_steps_in_segment, stop } = end.summary?.within_budget()?;
     let data = Data::Section(end.observer.into_crossings());
     if stop == StopReason::Observer && data.len() >= MOST_POINTS {

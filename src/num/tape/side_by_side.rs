@@ -94,3 +94,60 @@ impl Program {
         out
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::num::{Arithmetic, Tape};
+    use pulp::bytemuck::cast_slice;
+    use pulp::{Arch, Scalar, WithSimd};
+
+    /// Every kind of instruction, with variables and with numbers on either side.
+    fn everything() -> Program {
+        Program::new(&Tape::record(2, |v| {
+            let (x, y) = (v[0], v[1]);
+            let c = crate::num::tape::Recorded::from_f64(0.3);
+            let a = ((x + y) * (x - y) / (x * x + c) - c) * (c - x) + (c / (y * y + c) + x / c).tanh();
+            let b = (-x).exp() + (x * x + c).ln() - y.sin() * y.cos() + (y * y + c).sqrt();
+            vec![a + (x - c).atan(), b + y.erf() * (x * y).sign() + c * (x + c)]
+        }))
+    }
+
+    /// The program on `K` registers of whichever instruction set, against itself on single numbers.
+    struct Compared<'a, const K: usize>(&'a Program);
+
+    impl<const K: usize> WithSimd for Compared<'_, K> {
+        type Output = ();
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, set: S) {
+            let width = K * S::F64_LANES;
+            let value = |lane: usize, i: usize| (lane as f64 - 0.4 * width as f64) * 0.37 + i as f64 * 0.21;
+            let lanes = [0, 1].map(|i| (0..width).map(|lane| value(lane, i)).collect::<Vec<_>>());
+            let x = lanes.each_ref().map(|lanes| Registers::<S, K>::load(set, lanes).parts());
+            let found = self.0.evaluate_in_registers(set, x);
+            for lane in 0..width {
+                let mut alone = [0.0; 2];
+                self.0.evaluate(&[value(lane, 0), value(lane, 1)], &mut alone);
+                for i in 0..2 {
+                    assert_eq!(cast_slice::<_, f64>(&found[i])[lane].to_bits(), alone[i].to_bits(), "{lane} {i}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn lanes_have_the_bits_of_single_numbers() {
+        let program = everything();
+        Compared::<1>(&program).with_simd(Scalar);
+        Compared::<3>(&program).with_simd(Scalar);
+        Arch::new().dispatch(Compared::<1>(&program));
+        Arch::new().dispatch(Compared::<2>(&program));
+    }
+
+    #[test]
+    fn a_value_may_be_a_number() {
+        let program = Program::new(&Tape::record(2, |v| vec![v[1], crate::num::tape::Recorded::from_f64(2.5)]));
+        let found = program.evaluate_in_registers(Scalar, [[1.0], [3.0]]);
+        assert_eq!(found, [[3.0], [2.5]]);
+    }
+}
