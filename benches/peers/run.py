@@ -27,6 +27,9 @@ PEERS = [
     ("Boost.odeint dopri5", [BUILD / "boost_dopri5"], W1 + ["W2 B"]),
     ("CVODE Adams", [BUILD / "cvode_adams"], W1),
     ("SciPy LSODA, compiled field, no crossings", [PYTHON, HERE / "scipy_lsoda.py"], W1),
+    # Its Radau IIA replaces the tolerance by 0.1 tol^(2/3); so does our row "radau5-replaced".
+    ("differential-equations Radau5", [BUILD / "crates-units", "radau5"], W1),
+    ("differential-equations dopri5", [BUILD / "crates-units", "dopri5"], W1),
     ("heyoka Taylor, layer's edge as event", [PYTHON, HERE / "heyoka_taylor.py"], W1),
 ]
 METHODS = {
@@ -40,6 +43,7 @@ METHODS = {
     "dopri5-lanes-avx512": (["W2 B"], "Boost.odeint dopri5", 1 / 12),
     "lsoda": (W1, "CVODE Adams", 1 / 7),
     "radau5": (W1, None, None),
+    "radau5-replaced": (W1, "differential-equations Radau5", 1 / 1.5),
     "taylor": (W1, "heyoka Taylor, layer's edge as event", 1 / 1.2),
 }
 
@@ -58,7 +62,8 @@ def run(command):
 
 
 def main():
-    jobs = [(name, [*command, *unit.split(), "1"], unit, False) for name, command, units in PEERS for unit in units]
+    jobs = [(name, [command[0], *unit.split(), *command[1:], "1"] if command[0] != PYTHON else [*command, *unit.split(), "1"], unit, False)
+            for name, command, units in PEERS for unit in units]
     for method, (units, _, _) in METHODS.items():
         jobs += [(f"ours, {method}", [OURS, *unit.split(), method, "1"], unit, True) for unit in units]
     best, missing = {}, {}

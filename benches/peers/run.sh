@@ -16,6 +16,8 @@ if [ ! -x "$build/python/bin/python" ]; then
     python3 -m venv "$build/python"
     "$build/python/bin/python" -m pip install --quiet -r requirements.txt || echo "SciPy, heyoka: could not be installed" >&2
 fi
+cargo build --release --locked --quiet --manifest-path crates/Cargo.toml --target-dir "$build/crates" &&
+    cp "$build/crates/release/crates-units" "$build/crates-units" || echo "the Rust crate: could not be built" >&2
 cargo build --release --locked --quiet --manifest-path ours/Cargo.toml --target-dir "$build/.."
 cp "$build/../release/twofold-units" "$build/units"
 python3 run.py "$build" "${1:-3}"
