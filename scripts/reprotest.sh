@@ -3,7 +3,8 @@
 # processors, time, user, order of folders' entries, host name, home, locale, search path, time zone, umask), and compares every byte.
 #
 #   scripts/reprotest.sh [PROGRAM] [FIGURE...]      (make reprotest; figures of a program that is there; "all" are all of them)
-#   scripts/reprotest.sh sources [FIGURE...]        (the program is built twice as well, from this commit, in two places; it is compared too)
+#   scripts/reprotest.sh sources [FIGURE...]        (the program is built twice as well, from this commit, in two places; it is compared too;
+#                                                     CARGO_PROFILE_RELEASE_OPT_LEVEL=0 builds faster)
 #
 # Needs root, reprotest, disorderfs, faketime, sudo, fuse and a locale et_EE.UTF-8 (Debian: apt-get install reprotest disorderfs faketime sudo fuse locales;
 # localedef -i et_EE -f UTF-8 et_EE.UTF-8). VARIATIONS: as reprotest takes them, "+all" if nothing is said.
@@ -13,7 +14,7 @@ what=${1:-target/release/twofold}
 [ $# -gt 0 ] || set -- fig1 fig2 fig3 fig4 fig5 fig6
 figures=$*
 [ "$figures" != all ] || figures=
-log=$PWD/target/reprotest.log
+log=${LOG:-$PWD/target/reprotest.log}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 chmod 755 "$work"
@@ -46,5 +47,5 @@ reprotest --verbosity 1 --no-diffoscope --variations="${VARIATIONS:-+all}" $user
 found=$?
 grep -E 'variation:|variation;|IGNORING|differ|ERROR' "$log"
 if [ "$found" -eq 0 ]; then result="every byte the same"; else result="DIFFERENT OR FAILED (exit code $found)"; tail -n 20 "$log"; fi
-echo "$(date -u +%F) | reprotest $(dpkg-query -W -f '${Version}' reprotest 2> /dev/null) ${VARIATIONS:-+all} | $([ "$what" = sources ] && echo "program and figures" || echo figures) | ${figures:-all} | $result | $(($(date +%s) - begun)) s"
+echo "$(date -u +%F) | reprotest $(dpkg-query -W -f '${Version}' reprotest 2> /dev/null) ${VARIATIONS:-+all} | $([ "$what" = sources ] && echo "program (level ${CARGO_PROFILE_RELEASE_OPT_LEVEL:-3}) and figures" || echo figures) | ${figures:-all} | $result | $(($(date +%s) - begun)) s"
 exit "$found"

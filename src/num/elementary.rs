@@ -7,7 +7,8 @@
 //!
 //! Why not the correctly rounded `pxfm`? Because it chooses between code with and without fused multiply-add by
 //! looking at the CPU at run time; equal results are then a hope about rounding, not a property of the code. Ours and `libm`'s
-//! have one code path. Their last-bit error is a fact of the computation, the same everywhere.
+//! have one code path. Their last-bit error is a fact of the computation, the same everywhere; how large it is stands beside each function: the worst of 2^24 points, in
+//! units of the result's last place (`elementary/others.rs`, `make elementary`).
 
 pub(crate) mod kernels;
 
@@ -58,55 +59,55 @@ pub fn rough_exp2(x: f64) -> f64 {
     kernels::rough_exp2(x)
 }
 
-/// Natural logarithm.
+/// Natural logarithm. Largest error found: 0.811 units.
 #[inline]
 pub fn ln(x: f64) -> f64 {
     libm::log(x)
 }
 
-/// Arc tangent, in radians, in [-pi/2, pi/2].
+/// Arc tangent, in radians, in [-pi/2, pi/2]. Odd to the bit. Largest error found: ATAN units.
 #[inline]
 pub fn atan(x: f64) -> f64 {
     libm::atan(x)
 }
 
-/// Error function, 2/sqrt(pi) times the integral of exp(-s^2) from 0 to x.
+/// Error function, 2/sqrt(pi) times the integral of exp(-s^2) from 0 to x. Odd to the bit. Largest error found: ERF units.
 #[inline]
 pub fn erf(x: f64) -> f64 {
     libm::erf(x)
 }
 
-/// Base-2 logarithm.
+/// Base-2 logarithm; exact for powers of two. Largest error found: 0.780 units.
 #[inline]
 pub fn log2(x: f64) -> f64 {
     libm::log2(x)
 }
 
-/// Base-10 logarithm.
+/// Base-10 logarithm; exact for 1 to 10^22. Largest error found: 0.707 units.
 #[inline]
 pub fn log10(x: f64) -> f64 {
     libm::log10(x)
 }
 
-/// Sine of an angle in radians.
+/// Sine of an angle in radians. Odd to the bit. Largest error found: 0.781 units.
 #[inline]
 pub fn sin(x: f64) -> f64 {
     libm::sin(x)
 }
 
-/// Cosine of an angle in radians.
+/// Cosine of an angle in radians. Even to the bit. Largest error found: COS units.
 #[inline]
 pub fn cos(x: f64) -> f64 {
     libm::cos(x)
 }
 
-/// Angle of the point `(x, y)`, in radians, in (-pi, pi].
+/// Angle of the point `(x, y)`, in radians, in (-pi, pi]. Odd in y to the bit. Largest error found: 1.501 units.
 #[inline]
 pub fn atan2(y: f64, x: f64) -> f64 {
     libm::atan2(y, x)
 }
 
-/// `base` to the power `exponent`.
+/// `base` to the power `exponent`. Largest error found: 0.846 units for exponents below 2^31 in size; beyond, 145 units were seen (no computation here asks for that).
 #[inline]
 pub fn pow(base: f64, exponent: f64) -> f64 {
     libm::pow(base, exponent)
@@ -118,7 +119,7 @@ pub fn sqrt(x: f64) -> f64 {
     x.sqrt()
 }
 
-/// The point 10^x, for tolerances such as 10^-7.97727.
+/// The point 10^x, for tolerances such as 10^-7.97727; exact for whole numbers from 0 to 22. Largest error found: 3.757 units.
 #[inline]
 pub fn exp10(x: f64) -> f64 {
     libm::exp10(x)
