@@ -1,13 +1,14 @@
 #!/bin/sh
 # Builds the program for other architectures, runs it there under emulation, and says of each whether every byte is the committed one.
 #
-#   scripts/check-arch.sh [TARGET...]      (make check-arch; Debian or Ubuntu with qemu-user-static; wasm32 wants PyPI's package wasmtime)
+#   scripts/check-arch.sh [TARGET...]      (make check-arch; Debian or Ubuntu; wasm32 wants PyPI's package wasmtime)
 #
 # Targets: aarch64, s390x (big-endian), i686 (32 bits), riscv64, wasm32. i686 runs without emulation where the kernel takes it.
 #
-# COMPILER=rustup: the project's own compiler, the target's standard library from rustup and a cross linker from Debian (gcc-aarch64-linux-gnu libc6-dev-arm64-cross, ...).
+# COMPILER=rustup: the project's own compiler, the target's standard library from rustup, a cross linker from Debian (gcc-aarch64-linux-gnu libc6-dev-arm64-cross, ...) and
+# qemu-user-static. qemu 7.2 is too old for s390x: it draws wrong pixels (11.1 draws the right ones with the same program).
 # COMPILER=debian: another compiler, that of Debian's unstable suite, in a root of its own (ROOT, 5 GB; needs root and debootstrap; `scripts/check-arch.sh clean` removes
-# it). Crates are those of Cargo.lock (cargo vendor). Not said: rustup's where it can build for that target, Debian's where it cannot.
+# it), with the emulator of that suite. Crates are those of Cargo.lock (cargo vendor). Not said: rustup's where it can build for that target, Debian's where it cannot.
 #
 # RUN: what is run, "check fig1 fig2 fig3 fig4 fig5 fig6" if nothing is said; "check" is all figures (hours under emulation). LEVEL: optimisation (1). THREADS (1).
 # ONLY=build, ONLY=run: half of it. MIRROR: Debian's. PYTHON: one that has wasmtime. The results are added to target/arch/report.txt.
@@ -44,7 +45,7 @@ setup() {
     echo 'Acquire::Check-Valid-Until "false";' > "$root/etc/apt/apt.conf.d/00mirror"
     for a in arm64 s390x i386 riscv64; do inside dpkg --add-architecture $a; done
     {
-        inside apt-get update && inside apt-get install -y --no-install-recommends rustc cargo libstd-rust-dev-wasm32 lld gcc libc6-dev \
+        inside apt-get update && inside apt-get install -y --no-install-recommends rustc cargo qemu-user libstd-rust-dev-wasm32 lld gcc libc6-dev \
             gcc-aarch64-linux-gnu libc6-dev-arm64-cross gcc-s390x-linux-gnu libc6-dev-s390x-cross gcc-riscv64-linux-gnu libc6-dev-riscv64-cross \
             gcc-i686-linux-gnu libc6-dev-i386-cross &&
             mkdir -p "$root/debs" && inside sh -c 'cd /debs && for a in arm64 s390x i386 riscv64; do apt-get download libstd-rust-dev:$a; done' &&
@@ -96,18 +97,17 @@ on_it() {
     libraries=/usr/$cross
     [ "$compiler" = rustup ] || libraries=$root$libraries
     program=$work/$target-$compiler/twofold
-    case $target in
-        wasm32) "${PYTHON:-python3}" "$here/wasm.py" "$program.wasm" "$@" ;;
-        i686)
-            # A kernel that takes programs of 32 bits needs no emulation.
-            if "$libraries/lib/ld-linux.so.2" --library-path "$libraries/lib" "$program" --version > /dev/null 2>&1; then
-                "$libraries/lib/ld-linux.so.2" --library-path "$libraries/lib" "$program" "$@"
-            else
-                qemu-i386-static -L "$libraries" "$program" "$@"
-            fi
-            ;;
-        *) "qemu-$target-static" -L "$libraries" "$program" "$@" ;;
-    esac
+    if [ "$target" = wasm32 ]; then
+        "${PYTHON:-python3}" "$here/wasm.py" "$program.wasm" "$@"
+    elif [ "$target" = i686 ] && "$libraries/lib/ld-linux.so.2" --library-path "$libraries/lib" "$program" --version > /dev/null 2>&1; then
+        # A kernel that takes programs of 32 bits needs no emulation.
+        "$libraries/lib/ld-linux.so.2" --library-path "$libraries/lib" "$program" "$@"
+    elif [ "$compiler" = rustup ]; then
+        "qemu-$emulated-static" -L "$libraries" "$program" "$@"
+    else
+        cp "$program" "$root/src/twofold-$target"
+        inside "qemu-$emulated" -L "/usr/$cross" "/src/twofold-$target" "$@"
+    fi
 }
 
 bad=0
@@ -120,6 +120,8 @@ for target in "$@"; do
         wasm32) triple=wasm32-wasip1 cross= ;;
         *) echo "$target: not one of aarch64, s390x, i686, riscv64, wasm32"; exit 2 ;;
     esac
+    emulated=$target
+    [ "$target" != i686 ] || emulated=i386
     compiler=${COMPILER:-}
     [ -n "$compiler" ] || if by_rustup; then compiler=rustup; else compiler=debian; fi
     [ "$compiler" != rustup ] || by_rustup || { echo "$target: rustup has no standard library for it, or $cross-gcc is missing"; bad=1; continue; }

@@ -65,13 +65,13 @@ pub fn ln(x: f64) -> f64 {
     libm::log(x)
 }
 
-/// Arc tangent, in radians, in [-pi/2, pi/2]. Odd to the bit. Largest error found: ATAN units.
+/// Arc tangent, in radians, in [-pi/2, pi/2]. Odd to the bit. Largest error found: 0.850 units.
 #[inline]
 pub fn atan(x: f64) -> f64 {
     libm::atan(x)
 }
 
-/// Error function, 2/sqrt(pi) times the integral of exp(-s^2) from 0 to x. Odd to the bit. Largest error found: ERF units.
+/// Error function, 2/sqrt(pi) times the integral of exp(-s^2) from 0 to x. Odd to the bit. Largest error found: 0.977 units.
 #[inline]
 pub fn erf(x: f64) -> f64 {
     libm::erf(x)
@@ -95,7 +95,7 @@ pub fn sin(x: f64) -> f64 {
     libm::sin(x)
 }
 
-/// Cosine of an angle in radians. Even to the bit. Largest error found: COS units.
+/// Cosine of an angle in radians. Even to the bit. Largest error found: 0.785 units.
 #[inline]
 pub fn cos(x: f64) -> f64 {
     libm::cos(x)

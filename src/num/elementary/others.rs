@@ -204,7 +204,7 @@ const FUNCTIONS: [Function; 11] = [
         oracle: |x, _| relatively(x, x.cos(), |l| l.cos()),
         longer: |x, _| x.cos(),
         arguments: angle,
-        worst: 1.0,
+        worst: 0.79,
         bits: ["62e14a94c6a8aad9", "7c794e7ca19e3659"],
     },
     Function {
@@ -213,7 +213,7 @@ const FUNCTIONS: [Function; 11] = [
         oracle: |x, _| x.atan(),
         longer: |x, _| x.atan(),
         arguments: levelling,
-        worst: 1.0,
+        worst: 0.85,
         bits: ["3fb28c7f1ab6e3b4", "38d6682699ca0fd2"],
     },
     Function {
@@ -222,7 +222,7 @@ const FUNCTIONS: [Function; 11] = [
         oracle: |x, _| x.erf(),
         longer: |x, _| x.erf(),
         arguments: levelling,
-        worst: 1.0,
+        worst: 0.98,
         bits: ["d38de14e14da8cec", "e1ba18077ed5f10d"],
     },
     Function {
