@@ -205,9 +205,9 @@ fn one_file_holds_all_that_is_unsafe() {
     assert_eq!(lines, ["#![forbid(unsafe_code)]"]);
     // And every program of ours has it.
     let mut programs = 0;
-    // Neither the proofs, which ask for none, nor the peers of the benchmarks, which are other people's numerics.
-    let other = [root.join("proofs"), root.join("benches")];
-    for path in files.iter().filter(|path| path.ends_with("main.rs") && !other.iter().any(|o| path.starts_with(o))) {
+    // Not the proofs, which ask for none, nor the tools and peers beside the project.
+    let own = [root.join("src"), root.join("figures")];
+    for path in files.iter().filter(|path| path.ends_with("main.rs") && own.iter().any(|o| path.starts_with(o))) {
         let text = fs::read_to_string(path).unwrap();
         assert!(text.contains("mod mathematics;"), "{}", path.display());
         programs += 1;
