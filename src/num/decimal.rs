@@ -201,4 +201,29 @@ mod tests {
             prop_assert_eq!(number.to_string().parse::<Decimal>().unwrap(), number);
         }
     }
+
+    #[test]
+    fn the_same_number_written_otherwise_needs_no_digits() {
+        for text in ["100", "1e2", "1000e-1", "+100", "0100.00", "0.01e4"] {
+            assert_eq!(text.parse::<Decimal>().unwrap(), Decimal::from(100.0), "{text}");
+        }
+        // 2^53 + 1 is no f64.
+        let odd: Decimal = "9007199254740993".parse().unwrap();
+        assert_eq!((odd.value(), odd.to_string()), (9_007_199_254_740_992.0, "9007199254740993".into()));
+        let least: Decimal = "2.2250738585072014e-308".parse().unwrap();
+        assert_eq!(least.value(), f64::MIN_POSITIVE);
+        assert!("1".repeat(Decimal::MAX_DIGITS).parse::<Decimal>().is_ok());
+        assert_eq!(<f64 as FromDecimal>::from_decimal(&"0.25".parse().unwrap()), 0.25);
+    }
+
+    #[test]
+    fn numbers_are_written_as_people_write_them() {
+        for (value, text) in
+            [(0.0, "0"), (0.25, "0.25"), (1e-4, "0.0001"), (9e-5, "9e-5"), (1e15, "1e15"), (-1e20, "-1e20")]
+        {
+            assert_eq!(Decimal::from(value).to_string(), text);
+        }
+        let error = serde_json::from_str::<Decimal>("true").unwrap_err().to_string();
+        assert!(error.contains("a finite number, or its digits"), "{error}");
+    }
 }

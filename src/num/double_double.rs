@@ -588,4 +588,49 @@ mod tests {
             }
         }
     }
+
+    /// Where everything large cancels, the errors of the low parts are what is left.
+    #[test]
+    fn cancellation_leaves_every_bit() {
+        let (a, b) = (DoubleDouble::new(1.0, 2.0_f64.powi(-60)), DoubleDouble::new(-1.0, 2.0_f64.powi(-115)));
+        let sum = a + b;
+        assert_eq!((sum.high(), sum.low()), (2.0_f64.powi(-60), 2.0_f64.powi(-115)));
+        let mut difference = a;
+        difference -= -b;
+        assert_eq!(difference, sum);
+        assert_eq!((dd(1.0) / dd(3.0)).low(), 1.850_371_707_708_594e-17);
+    }
+
+    /// pi, to 106 bits, is not pi: its sine is what is missing, 2.99e-33, and a half, a quarter and so on.
+    #[test]
+    fn multiples_of_pi_miss_by_what_was_rounded_away() {
+        let close = |a: DoubleDouble, b: f64| assert!((a.high() / b - 1.0).abs() < 1e-9, "{a:?} is not {b:e}");
+        close(DoubleDouble::PI.sin(), -2.994_769_809_718_339_7e-33);
+        close(DoubleDouble::HALF_PI.cos(), -1.497_384_904_859_169_8e-33);
+        close((-DoubleDouble::PI).sin(), 2.994_769_809_718_339_7e-33);
+        close(DoubleDouble::PI.times_f64(4.0).sin(), 1.197_907_923_887_335_9e-32);
+    }
+
+    #[test]
+    fn texts_that_are_no_numbers() {
+        for text in ["", ".", "1.2.3", "1e", "1x", "--1", "e5"] {
+            assert_eq!(DoubleDouble::from_digits(text), None, "{text}");
+        }
+        assert_eq!(DoubleDouble::from_digits("-12.5E1"), Some(dd(-125.0)));
+        assert_eq!(DoubleDouble::from_digits("+.5"), Some(dd(0.5)));
+        assert!(dd(0.0).abs().high().is_sign_positive());
+    }
+
+    #[test]
+    fn ends_of_the_logarithm_and_the_arc_tangent() {
+        assert_eq!(dd(f64::INFINITY).ln().to_f64(), f64::INFINITY);
+        assert_eq!(dd(0.0).ln().to_f64(), f64::NEG_INFINITY);
+        assert!(dd(-1.0).ln().to_f64().is_nan() && dd(f64::NAN).atan().to_f64().is_nan());
+        assert_eq!((dd(1e40).atan(), dd(-1e40).atan()), (DoubleDouble::HALF_PI, -DoubleDouble::HALF_PI));
+        assert_eq!(dd(f64::NEG_INFINITY).atan(), -DoubleDouble::HALF_PI);
+        // Where the second term of a series is still within the digits: erf x = 2/sqrt(pi) (x - x^3/3).
+        let x = dd(1e-10);
+        let want = (x - x * x * x / dd(3.0)) * dd(2.0) / DoubleDouble::PI.sqrt();
+        assert!(gap(x.erf(), want) < 1e-30);
+    }
 }

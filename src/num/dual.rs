@@ -211,4 +211,44 @@ mod tests {
     fn elementary_tanh(x: f64) -> f64 {
         super::super::elementary::tanh(x)
     }
+
+    #[test]
+    fn values_are_those_without_derivatives() {
+        let (x, y) = (0.7, -1.3);
+        let d = sample(Dual::<f64, 2>::variable(x, 0), Dual::variable(y, 1));
+        assert_eq!(d.to_f64(), sample(x, y));
+        let (a, b) = (Dual::<f64, 2>::variable(x, 0), Dual::variable(y, 1));
+        let (mut sum, mut difference) = (a, a);
+        sum += b;
+        difference -= b;
+        assert_eq!((sum.value, sum.partials), (x + y, [1.0, 1.0]));
+        assert_eq!((difference.value, difference.partials), (x - y, [1.0, -1.0]));
+        assert_eq!(((-b).value, (-b).partials), (-y, [-0.0, -1.0]));
+        assert!(a > b && a == Dual::constant(x) && a != b);
+        assert_eq!((a.sign().value, b.sign().value, b.sign().partials), (1.0, -1.0, [0.0; 2]));
+        assert_eq!((Dual::<f64, 1>::pi().value, Dual::<f64, 1>::pi().partials), (std::f64::consts::PI, [0.0]));
+    }
+
+    /// Each function's slope is its derivative, written down.
+    #[test]
+    fn slopes_are_derivatives() {
+        type Function = (fn(Dual<f64, 1>) -> Dual<f64, 1>, f64);
+        let x = 0.7_f64;
+        let t = elementary_tanh(x);
+        let functions: [Function; 9] = [
+            (Elementary::tanh, 1.0 - t * t),
+            (Elementary::exp, x.exp()),
+            (Elementary::sin, x.cos()),
+            (Elementary::cos, -x.sin()),
+            (Elementary::sqrt, 0.5 / x.sqrt()),
+            (Elementary::ln, 1.0 / x),
+            (Elementary::atan, 1.0 / (1.0 + x * x)),
+            (Elementary::erf, std::f64::consts::FRAC_2_SQRT_PI * (-x * x).exp()),
+            (|v| Dual::constant(2.0) / v, -2.0 / (x * x)),
+        ];
+        for (n, (f, slope)) in functions.into_iter().enumerate() {
+            let got = f(Dual::variable(x, 0)).partials[0];
+            assert!((got - slope).abs() < 1e-15 * 8.0, "function {n}: {got} {slope}");
+        }
+    }
 }

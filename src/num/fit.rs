@@ -70,4 +70,23 @@ mod tests {
         let (m, e) = mean(&[1.0, 2.0, 3.0, 4.0]);
         assert!((m - 2.5).abs() < 1e-15 && (e - (5.0_f64 / 12.0).sqrt()).abs() < 1e-15);
     }
+
+    #[test]
+    fn a_line_through_scatter() {
+        let l = line(&[(0.0, 0.0), (1.0, 2.0), (2.0, 1.0)]).unwrap();
+        // Residuals -1/2, 1, -1/2 about y = 1/2 + x/2; one degree of freedom, sum of squares of x about its mean 2.
+        assert!((l.slope - 0.5).abs() < 1e-15 && (l.intercept - 0.5).abs() < 1e-15, "{l:?}");
+        assert!((l.slope_error - 0.75_f64.sqrt()).abs() < 1e-15, "{l:?}");
+        assert_eq!(line(&[(1.0, 5.0), (3.0, 9.0)]).unwrap(), Line { slope: 2.0, slope_error: 0.0, intercept: 3.0 });
+        assert!(line(&[(0.0, f64::INFINITY), (1.0, 0.0)]).is_none() && line(&[]).is_none());
+        assert!(line(&[(f64::INFINITY, 0.0), (1.0, 0.0)]).is_none());
+    }
+
+    #[test]
+    fn middles() {
+        assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(&mut [4.0, 1.0, 3.0, 2.0]), 3.0);
+        assert_eq!(mean(&[7.0]), (7.0, f64::INFINITY));
+        assert_eq!(mean(&[1.0, 3.0]), (2.0, 1.0));
+    }
 }

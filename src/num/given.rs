@@ -139,4 +139,36 @@ mod tests {
         // Zero is no different.
         assert_eq!((Given::new(5.0_f64, 0.0) + Given::one()).tanh().value(), 0.0);
     }
+
+    #[test]
+    fn everything_else_is_as_it_is() {
+        let x = Given::new(0.5_f64, 9.0);
+        type Function = (fn(Given) -> Given, fn(f64) -> f64);
+        let functions: [Function; 9] = [
+            (Elementary::exp, Elementary::exp),
+            (Elementary::sin, Elementary::sin),
+            (Elementary::cos, Elementary::cos),
+            (Elementary::sqrt, Elementary::sqrt),
+            (Elementary::ln, Elementary::ln),
+            (Elementary::atan, Elementary::atan),
+            (Elementary::erf, Elementary::erf),
+            (Elementary::sign, Elementary::sign),
+            (|v| -v, |v| -v),
+        ];
+        for (f, plain) in functions {
+            assert_eq!(f(x).value(), plain(0.5));
+            // And what tanh is goes along.
+            assert_eq!(f(x).tanh().value(), 9.0);
+        }
+        let (mut sum, mut difference) = (Given::from_f64(2.0), Given::from_f64(2.0));
+        sum += x;
+        difference -= x;
+        assert_eq!((sum.value(), difference.value()), (2.5, 1.5));
+        assert_eq!((sum.tanh().value(), difference.tanh().value()), (9.0, 9.0));
+        // A constant has been told nothing.
+        assert_eq!(Given::<f64>::pi().tanh().value(), Elementary::tanh(std::f64::consts::PI));
+        assert_eq!((Given::<f64>::pi() + x).tanh().value(), 9.0);
+        assert_eq!((x * Given::pi()).tanh().value(), 9.0);
+        assert!(x == Given::from_f64(0.5) && x != Given::from_f64(0.25));
+    }
 }

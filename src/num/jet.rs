@@ -216,4 +216,41 @@ mod tests {
             assert!((value(&j, s) - f(0.3 + s)).abs() < 1e-12, "{s}");
         }
     }
+
+    /// Each function along a curved line, where every coefficient of the argument counts; summed, it is the function there.
+    #[test]
+    fn every_function_along_a_curve() {
+        type Function = (fn(Jet<16>) -> Jet<16>, fn(f64) -> f64);
+        let functions: [Function; 10] = [
+            (Elementary::tanh, Elementary::tanh),
+            (Elementary::exp, Elementary::exp),
+            (Elementary::sin, Elementary::sin),
+            (Elementary::cos, Elementary::cos),
+            (Elementary::ln, Elementary::ln),
+            (Elementary::atan, Elementary::atan),
+            (Elementary::erf, Elementary::erf),
+            (Elementary::sqrt, Elementary::sqrt),
+            (|v| Jet::one() / v, |v| 1.0 / v),
+            (|v| v.power(3) - v * Jet::pi(), |v| v * v * v - v * std::f64::consts::PI),
+        ];
+        let mut x = Jet::<16>::constant(1.3);
+        (x.c[1], x.c[2], x.c[3]) = (0.5, -0.75, 0.25);
+        for (n, (f, plain)) in functions.into_iter().enumerate() {
+            let series = f(x);
+            for s in [-0.08, 0.05, 0.1] {
+                let want = plain(1.3 + 0.5 * s - 0.75 * s * s + 0.25 * s * s * s);
+                assert!((value(&series, s) - want).abs() < 1e-13, "function {n} at {s}: {} {want}", value(&series, s));
+            }
+        }
+    }
+
+    #[test]
+    fn comparisons_and_signs_look_at_the_value_only() {
+        let (mut a, mut b) = (Jet::<3>::constant(-2.0), Jet::<3>::constant(-2.0));
+        (a.c[1], b.c[1]) = (1.0, 5.0);
+        assert!(a == b && a < Jet::zero() && a.partial_cmp(&b) == Some(Ordering::Equal));
+        assert_eq!((a.sign().c, Jet::<3>::one().sign().c), ([-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]));
+        assert_eq!(((a - b).c, (a + b).c, (-a).c), ([0.0, -4.0, 0.0], [-4.0, 6.0, 0.0], [2.0, -1.0, 0.0]));
+        assert_eq!((a.to_f64(), Jet::<2>::pi().c), (-2.0, [std::f64::consts::PI, 0.0]));
+    }
 }

@@ -299,4 +299,101 @@ mod tests {
         assert!(solve(matrix![1.0, 0.0; 0.0, 1e-20], vector![1.0, 1.0], 1e-14).is_none());
         assert!(solve(matrix![f64::NAN, 2.0; 2.0, 4.0], vector![1.0, 1.0], 0.0).is_none());
     }
+
+    /// Whole numbers that look random.
+    fn digits(seed: u64) -> impl Iterator<Item = f64> {
+        let mut state = seed;
+        std::iter::repeat_with(move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 33) % 7) as f64 - 3.0
+        })
+    }
+
+    /// Both eliminations do the same operations in the same order.
+    #[test]
+    fn the_two_eliminations_agree_bit_for_bit() {
+        let mut solved = 0;
+        for seed in 0..200 {
+            let numbers: Vec<f64> = digits(seed).take(30).collect();
+            let (a, b) = numbers.split_at(25);
+            let fixed = solve(SMatrix::<f64, 5, 5>::from_row_slice(a), SVector::<f64, 5>::from_column_slice(b), 1e-9);
+            let any = solve_any(a, b, 1e-9);
+            let bits = |x: &[f64]| x.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+            assert_eq!(fixed.as_ref().map(|x| bits(x.as_slice())), any.as_ref().map(|x| bits(x)));
+            let Some(x) = any else { continue };
+            solved += 1;
+            for (row, b) in a.chunks(5).zip(b) {
+                let sum: f64 = row.iter().zip(&x).map(|(a, x)| a * x).sum();
+                assert!((sum - b).abs() < 1e-9, "{sum} {b}");
+            }
+        }
+        assert!(solved > 150);
+        assert!(solve_any(&[f64::NAN, 1.0, 1.0, f64::NAN], &[1.0, 1.0], 0.0).is_none());
+        assert!(solve_any(&[1e-200, 0.0, 0.0, 1.0], &[1e200, 1.0], 0.0).is_none(), "the solution is infinite");
+    }
+
+    /// Full matrices, similar to ones whose eigenvalues are seen.
+    #[test]
+    fn eigenvalues_survive_a_change_of_coordinates() {
+        // Reals, then pairs a +- ib.
+        let (reals, pairs) = ([5.0, -3.0, 1.0, 0.5], [(2.0, 1.0), (-1.0, 3.0)]);
+        for (seed, (reals, pairs)) in [
+            (&reals[..0], &pairs[..1]),
+            (&reals[..3], &pairs[..0]),
+            (&reals[..1], &pairs[..1]),
+            (&reals[..2], &pairs[..1]),
+            (&reals[..1], &pairs[..2]),
+            (&reals[..], &pairs[..0]),
+            (&reals[..], &pairs[..]),
+        ]
+        .into_iter()
+        .enumerate()
+        .flat_map(|(i, case)| (0..8).map(move |j| (8 * i + j, case)))
+        {
+            let n = reals.len() + 2 * pairs.len();
+            let mut a = vec![0.0; n * n];
+            let mut want = Vec::new();
+            for (i, v) in reals.iter().enumerate() {
+                a[i * n + i] = *v;
+                want.push([*v, 0.0]);
+            }
+            for (i, (re, im)) in pairs.iter().enumerate() {
+                let k = reals.len() + 2 * i;
+                (a[k * n + k], a[(k + 1) * n + k + 1], a[k * n + k + 1], a[(k + 1) * n + k]) = (*re, *re, *im, -im);
+                want.extend([[*re, -im], [*re, *im]]);
+            }
+            // Row i plus c times row j, column j minus c times column i: the eigenvalues stay, and all numbers are exact.
+            let mut c = digits(seed as u64).filter(|c| c.abs() == 1.0);
+            for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).filter(|(i, j)| i != j) {
+                let c = c.next().unwrap();
+                (0..n).for_each(|k| a[i * n + k] += c * a[j * n + k]);
+                (0..n).for_each(|k| a[k * n + j] -= c * a[k * n + i]);
+            }
+            let mut found = eigenvalues(&a, n).unwrap();
+            for e in [&mut found, &mut want] {
+                e.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+            }
+            // Pairs have the same real part to the last bit, so sorting by it and then by the other is safe.
+            let size = a.iter().fold(1.0_f64, |m, v| m.max(v.abs()));
+            for (f, w) in found.iter().zip(&want) {
+                let error = (f[0] - w[0]).abs().max((f[1] - w[1]).abs());
+                assert!(error < 1e-11 * size * size, "case {seed}, entries up to {size}: {found:?}, not {want:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn roots_of_one() {
+        for n in [3, 4, 5, 7, 8] {
+            let cycle: Vec<f64> = (0..n * n).map(|k| if (k / n + 1) % n == k % n { 1.0 } else { 0.0 }).collect();
+            let found = eigenvalues(&cycle, n).unwrap();
+            for k in 0..n {
+                let angle = std::f64::consts::TAU * k as f64 / n as f64;
+                let near = |e: &&[f64; 2]| (e[0] - angle.cos()).hypot(e[1] - angle.sin()) < 1e-10;
+                assert_eq!(found.iter().filter(near).count(), 1, "root {k} of {n}: {found:?}");
+            }
+        }
+        assert_eq!(eigenvalues(&[], 0), Some(vec![]));
+        assert_eq!(eigenvalues(&[1.0, 2.0], 1), None);
+    }
 }

@@ -828,4 +828,99 @@ mod tests {
             prop_assert!(text(Long::atan, M::atan, y) < 64.0);
         }
     }
+
+    /// Whole numbers of 64 bits in one limb: sums are rounded as integers are, half away from zero, differences are exact.
+    #[test]
+    fn one_limb_is_rounded_like_an_integer() {
+        let integer = |x: MultiFloat<1>| {
+            assert!(x.kind != Kind::NotANumber);
+            let shift = x.exponent - 64;
+            let size = u128::from(x.limbs[0]);
+            let size = if shift >= 0 { size << shift } else { size >> -shift } as i128;
+            if x.kind == Kind::Zero {
+                0
+            } else if x.negative {
+                -size
+            } else {
+                size
+            }
+        };
+        let numbers =
+            [1, 2, 3, 5, 1 << 40, 1 << 63, (1 << 63) + 1, u64::MAX, u64::MAX - 1, u64::MAX / 3, 0x0123_4567_89ab_cdef];
+        for a in numbers {
+            for b in numbers {
+                let [x, y] = [a, b].map(MultiFloat::<1>::whole);
+                let sum = i128::from(a) + i128::from(b);
+                let rounded = if sum >= 1 << 64 { (sum + 1) / 2 * 2 } else { sum };
+                assert_eq!(integer(x + y), rounded, "{a} + {b}");
+                assert_eq!(integer(-x - y), -rounded, "-{a} - {b}");
+                assert_eq!(integer(x - y), i128::from(a) - i128::from(b), "{a} - {b}");
+                assert_eq!(x.partial_cmp(&y), Some(a.cmp(&b)));
+                assert_eq!((-x).partial_cmp(&-y), Some(b.cmp(&a)));
+                assert_eq!((-x).partial_cmp(&y), Some(Ordering::Less));
+                // Two limbs hold the sum whole.
+                let [x, y] = [a, b].map(MultiFloat::<2>::whole);
+                assert_eq!((x + y - x).partial_cmp(&y), Some(Ordering::Equal), "{a} + {b} - {a}");
+            }
+        }
+        let zero = MultiFloat::<1>::ZERO;
+        assert_eq!(zero.partial_cmp(&-zero), Some(Ordering::Equal));
+        assert!(zero < MultiFloat::whole(1) && -MultiFloat::<1>::whole(1) < zero);
+        assert_eq!(zero.partial_cmp(&MultiFloat::NAN), None);
+    }
+
+    #[test]
+    fn functions_are_those_of_f64_in_every_quadrant() {
+        for i in -40..=40 {
+            let x = f64::from(i) * 0.3;
+            let long = MultiFloat::<3>::from_f64(x);
+            assert!((long.sin().to_f64() - Elementary::sin(x)).abs() < 4e-16, "sin {x}");
+            assert!((long.cos().to_f64() - Elementary::cos(x)).abs() < 4e-16, "cos {x}");
+            if x != 0.0 {
+                assert!((long.log2() - Elementary::ln(x.abs()) * std::f64::consts::LOG2_E).abs() < 4e-15, "log2 {x}");
+            }
+        }
+        let large = MultiFloat::<2>::whole(1).times_power_of_two(5000);
+        assert_eq!((large.log2(), MultiFloat::<2>::ZERO.log2()), (5000.0, f64::NEG_INFINITY));
+        assert!(MultiFloat::<2>::NAN.log2().is_nan() && MultiFloat::<2>::from_f64(1e16).sin().to_f64().is_nan());
+    }
+
+    #[test]
+    fn edges() {
+        type X = MultiFloat<2>;
+        let (one, zero, nan) = (X::whole(1), X::ZERO, X::NAN);
+        let not = |x: X| x.to_f64().is_nan();
+        for x in [one, zero, nan, -one] {
+            assert!(not(x + nan) && not(nan - x) && not(x * nan) && not(nan * x) && not(x / nan) && not(nan / x));
+            assert!(not(x / zero));
+            assert!(not(x) || (x + zero == x && zero + x == x && (x * zero).kind == Kind::Zero));
+        }
+        assert_eq!((zero / one).to_f64(), 0.0);
+        let mut difference = one;
+        difference -= X::whole(3);
+        assert_eq!(difference.to_f64(), -2.0);
+        // The ends of f64.
+        let power = |k: i64| one.times_power_of_two(k);
+        assert_eq!((power(1024).to_f64(), (-power(1024)).to_f64()), (f64::INFINITY, f64::NEG_INFINITY));
+        assert_eq!((power(1023).to_f64(), (-power(-1022)).to_f64()), (2.0_f64.powi(1023), -f64::MIN_POSITIVE));
+        assert_eq!(power(-1023).to_f64(), 0.0);
+        assert_eq!(X::from_f64(-5e-324).times_power_of_two(1074), -one);
+        // Signs, and where functions end.
+        let signs = [X::whole(2), -X::whole(2), zero, -zero].map(|x| x.sign().to_f64());
+        assert_eq!(signs, [1.0, -1.0, 1.0, 1.0]);
+        assert!(not(nan.sign()) && not((-one).sqrt()) && not((-one).ln()) && not(zero.ln()));
+        assert_eq!((zero.sqrt().to_f64(), zero.tanh().to_f64()), (0.0, 0.0));
+        for (x, tanh, erf) in [(1e5, 1.0, 1.0), (-1e5, -1.0, -1.0)] {
+            let x = X::from_f64(x);
+            assert_eq!((x.tanh().to_f64(), x.erf().to_f64()), (tanh, erf));
+        }
+        for x in [-3.0, -0.1, 0.1, 3.0] {
+            assert!((X::from_f64(x).tanh().to_f64() - Elementary::tanh(x)).abs() < 2e-16, "{x}");
+        }
+        assert_eq!(power(5000).atan(), X::pi().times_power_of_two(-1));
+        assert_eq!((-power(5000)).atan(), -X::pi().times_power_of_two(-1));
+        assert_eq!(power(-5000).atan(), power(-5000));
+        assert_eq!(X::from_f64(-1e30).exp().to_f64(), 0.0);
+        assert!(not(X::from_f64(1e30).exp()) && X::from_digits("1.2.3").is_none());
+    }
 }

@@ -182,4 +182,11 @@ mod tests {
             assert_eq!(Elementary::power(x, -n).to_bits(), (1.0 / want).to_bits(), "-{n}");
         }
     }
+
+    #[test]
+    fn zero_counts_as_positive() {
+        let signs = [-2.0, -0.0, 0.0, 3.0_f64].map(Elementary::sign);
+        assert_eq!(signs, [-1.0, 1.0, 1.0, 1.0]);
+        assert_eq!([-2.0, 0.0, 3.0_f64].map(|x| Elementary::abs(x).to_f64()), [2.0, 0.0, 3.0]);
+    }
 }

@@ -1,6 +1,6 @@
 //! Mutation testing with every mutant in one build: mutant schemata (Untch, Offutt, Harrold 1993). See docs/mutants.md.
 //!
-//! `mutants --rooms record,compare --scratch DIR [--jobs 1] [--slow 5] [--user 65534] [--only TEXT] [--tests units|all] [--keep ROOMS]`, from the package's root.
+//! `mutants --rooms record,compare --scratch DIR [--jobs 1] [--slow 5] [--user 65534] [--only TEXT] [--tests units,NAME,...] [--keep ROOMS]`, from the package's root.
 
 mod schema;
 
@@ -30,8 +30,8 @@ struct Options {
     user: Option<u32>,
     /// Only mutants whose name contains this.
     only: String,
-    /// Only the library's own unit tests: a first look, for half of the build.
-    units: bool,
+    /// The library's own unit tests and these programs of `tests`; `None`: all tests.
+    programs: Option<Vec<String>>,
     /// With only these rooms in the library, if any are named: what stands above them is not built, and its tests are not run.
     keep: Vec<String>,
 }
@@ -44,7 +44,7 @@ fn options() -> Result<Options, Failure> {
         slow: 5.0,
         user: None,
         only: String::new(),
-        units: false,
+        programs: None,
         keep: Vec::new(),
     };
     let list =
@@ -60,7 +60,10 @@ fn options() -> Result<Options, Failure> {
             "--slow" => options.slow = value.parse()?,
             "--user" => options.user = Some(value.parse()?),
             "--only" => options.only = value,
-            "--tests" => options.units = value == "units",
+            "--tests" => {
+                options.programs =
+                    (value != "all").then(|| list(&value).into_iter().filter(|p| p != "units").collect());
+            }
             _ => return Err(format!("unknown flag {flag}").into()),
         }
     }
@@ -101,16 +104,24 @@ fn main() -> Result<(), Failure> {
     fs::create_dir_all(&state)?;
 
     let mut files: Vec<(String, File)> = Vec::new();
-    for path in copy(&tree)? {
+    for path in copy(&tree, &options.keep)? {
         let inside =
             options.rooms.iter().any(|r| path.starts_with(&format!("src/{r}/")) || path == format!("src/{r}.rs"));
-        if inside && path.ends_with(".rs") && !path.ends_with("/tests.rs") {
+        if inside && path.ends_with(".rs") {
             files.push((
                 path.clone(),
                 File::scan(&path, fs::read_to_string(&path)?).map_err(|e| format!("{path}: {e}"))?,
             ));
         }
     }
+    let tests: BTreeSet<String> = files
+        .iter()
+        .flat_map(|(path, file)| {
+            let folder = path.trim_end_matches("/mod.rs").trim_end_matches(".rs");
+            file.tests.iter().map(move |name| format!("{folder}/{name}.rs"))
+        })
+        .collect();
+    files.retain(|(path, _)| !tests.contains(path));
     let mut offsets = Vec::new();
     let mut mutants: Vec<Mutant> = Vec::new();
     for (_, file) in &files {
@@ -128,14 +139,24 @@ fn main() -> Result<(), Failure> {
 }
 
 /// Copies every tracked file that changed; returns their paths.
-fn copy(tree: &Path) -> Result<Vec<String>, Failure> {
+fn copy(tree: &Path, keep: &[String]) -> Result<Vec<String>, Failure> {
     let listed = Command::new("git").args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"]).output()?;
     let paths: Vec<String> =
         String::from_utf8(listed.stdout)?.split('\0').filter(|p| !p.is_empty()).map(str::to_owned).collect();
     for path in &paths {
         // Mutated files are written by `write` alone, so that unchanged ones keep their times.
         if !path.starts_with("src/") {
-            place(&tree.join(path), &fs::read(path).unwrap_or_default())?;
+            let mut bytes = fs::read(path).unwrap_or_default();
+            // The programs need all rooms; and tests in `tests` would have them built.
+            if path == "Cargo.toml" && !keep.is_empty() {
+                let text = String::from_utf8(bytes)?;
+                let parts = text.split("\n[[bin]]\n").enumerate();
+                bytes = parts
+                    .map(|(i, p)| if i == 0 { p } else { p.find("\n[").map_or("", |at| &p[at..]) })
+                    .collect::<String>()
+                    .into();
+            }
+            place(&tree.join(path), &bytes)?;
         }
     }
     Ok(paths)
@@ -323,12 +344,12 @@ fn enclosing(text: &str, start: usize, end: usize, letter: char) -> Option<usize
 /// Builds all tests; returns the programs by target.
 fn build(options: &Options, tree: &Path) -> Result<BTreeMap<String, PathBuf>, Failure> {
     let started = Instant::now();
-    let targets: &[&str] = if options.units {
-        &["test", "--no-run", "--lib"]
-    } else {
-        &["test", "--no-run", "--lib", "--bins", "--tests"]
-    };
-    let messages = cargo(options, tree, targets)?;
+    let mut arguments = vec!["test", "--no-run", "--lib"];
+    match &options.programs {
+        Some(programs) => programs.iter().for_each(|p| arguments.extend(["--test", p])),
+        None => arguments.extend(["--bins", "--tests"]),
+    }
+    let messages = cargo(options, tree, &arguments)?;
     let mut programs = BTreeMap::new();
     for message in &messages {
         if let (Some(path), true) = (message["executable"].as_str(), message["profile"]["test"] == true) {

@@ -75,6 +75,8 @@ pub struct File {
     text: String,
     sites: Vec<Site>,
     pub mutants: Vec<Mutant>,
+    /// Modules in files of their own that are only built for tests.
+    pub tests: Vec<String>,
 }
 
 impl File {
@@ -91,7 +93,14 @@ impl File {
         };
         finder.visit_file(&tree);
         let Finder { sites, mutants, .. } = finder;
-        Ok(Self { text, sites, mutants })
+        let tests = tree.items.iter().filter_map(|item| match item {
+            syn::Item::Mod(module) if module.content.is_none() && skipped(&module.attrs) => {
+                Some(module.ident.to_string())
+            }
+            _ => None,
+        });
+        let tests = tests.collect();
+        Ok(Self { text, sites, mutants, tests })
     }
 
     /// The text with its mutants; the first has the number `offset`. Those whose place in `mutants` is in `dropped` are left out.
