@@ -105,7 +105,7 @@ on_it() {
     elif [ "$compiler" = rustup ]; then
         "qemu-$emulated-static" -L "$libraries" "$program" "$@"
     else
-        cp "$program" "$root/src/twofold-$target"
+        cp --remove-destination "$program" "$root/src/twofold-$target"
         inside "qemu-$emulated" -L "/usr/$cross" "/src/twofold-$target" "$@"
     fi
 }
