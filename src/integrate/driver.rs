@@ -286,4 +286,38 @@ mod tests {
         assert_eq!(just.stop, StopReason::EndTime);
         assert_eq!(just.x, whole.x);
     }
+
+    /// Van der Pol's oscillator; counts how often it is asked.
+    struct Counted(std::sync::atomic::AtomicU64);
+    impl VectorField<2> for Counted {
+        fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+            self.0.fetch_add(1, Ordering::Relaxed);
+            SVector::from([x[1], ((S::one() - x[0] * x[0]) * x[1]).scale(20.0) - x[0]])
+        }
+    }
+
+    #[test]
+    fn what_is_counted_was_done() {
+        let field = Counted(Default::default());
+        let mut stepper = Dopri5::new(Tolerance { rtol: 1e-6, atol: 1e-6 });
+        let course = Course { schedule: Schedule { restart_every: Some(30.0), kick: None }, ..Course::to(100.0) };
+        let mut seen = Lengths::default();
+        let end = drive(&field, vector![2.0, 0.0], &course, &mut stepper, &mut seen, &()).unwrap();
+        let s = &end.statistics;
+        assert_eq!((s.restarts, s.highest_order), (4, 5));
+        assert!(s.rejected > 20, "the orbit has fast parts: {} rejected", s.rejected);
+        assert_eq!(s.steps, seen.0.len() as u64);
+        // A restart asks twice, a trial six times, whether it is accepted or not.
+        assert_eq!(s.evaluations, field.0.into_inner());
+        assert_eq!(s.evaluations, 2 * s.restarts + 6 * (s.steps + s.rejected));
+    }
+
+    #[derive(Default)]
+    struct Lengths(Vec<f64>);
+    impl Observer<2> for Lengths {
+        fn step(&mut self, step: &Step<'_, 2>) -> Flow {
+            self.0.push(step.t1 - step.t0);
+            Flow::Continue
+        }
+    }
 }
