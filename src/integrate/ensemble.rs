@@ -20,7 +20,7 @@ use super::schedule::{Kicker, Segment};
 use super::step::{Failure, Flow, Statistics, Step, Stepper, StopReason, Tolerance};
 use crate::num::elementary::kernels::{rough_exp2, rough_log2};
 use crate::num::{Arithmetic, Mask, Registers};
-use crate::system::VectorField;
+use crate::system::{VectorField, WithRegisters};
 
 /// A start and what is to happen from there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -150,19 +150,32 @@ pub fn ensemble_watched<F, O, const N: usize>(
     let all = All::<_, _, _, N, 1> { field, runs, common, observer, finished };
     match set {
         InstructionSet::Portable => all.with_simd(Scalar),
-        // Two registers side by side: while one waits for a quotient, the other goes on.
-        #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx2 => match pulp::x86::V3::try_new() {
-            Some(set) => Simd::vectorize(set, all.in_registers::<2>()),
-            None => all.with_simd(Scalar),
-        },
-        #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx512 => match pulp::x86::V4::try_new() {
-            Some(set) => Simd::vectorize(set, all.in_registers::<2>()),
-            None => all.with_simd(Scalar),
-        },
-        #[cfg(not(target_arch = "x86_64"))]
-        InstructionSet::Avx2 | InstructionSet::Avx512 => all.with_simd(Scalar),
+        InstructionSet::Avx2 | InstructionSet::Avx512 => field.with_registers(InVectors { set, all }),
+    }
+}
+
+/// The whole task, in vector registers of the instruction set `set`, which is here.
+struct InVectors<'a, F, O, M: Fn(usize) -> O, const N: usize> {
+    set: InstructionSet,
+    all: All<'a, F, O, M, N, 1>,
+}
+
+impl<F: VectorField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> WithRegisters for InVectors<'_, F, O, M, N> {
+    fn with<const K: usize>(self) {
+        let Self { set, all } = self;
+        match set {
+            #[cfg(target_arch = "x86_64")]
+            InstructionSet::Avx2 => match pulp::x86::V3::try_new() {
+                Some(set) => Simd::vectorize(set, all.in_registers::<K>()),
+                None => all.with_simd(Scalar),
+            },
+            #[cfg(target_arch = "x86_64")]
+            InstructionSet::Avx512 => match pulp::x86::V4::try_new() {
+                Some(set) => Simd::vectorize(set, all.in_registers::<K>()),
+                None => all.with_simd(Scalar),
+            },
+            _ => all.with_simd(Scalar),
+        }
     }
 }
 

@@ -10,7 +10,7 @@ use nalgebra::SVector;
 use pulp::Simd;
 
 use super::instance::{BindError, run};
-use super::{Relaxation, System, Transition, VectorField};
+use super::{Relaxation, System, Transition, VectorField, WithRegisters};
 use crate::num::tape::{Program, Recorded, Replay, Tape};
 use crate::num::{Arithmetic, Elementary};
 
@@ -296,6 +296,10 @@ impl<const N: usize> VectorField<N> for BoundField<N> {
     #[inline]
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
         run(&self.program, x)
+    }
+    /// Looking up what an instruction does costs the same for four registers as for two.
+    fn with_registers<W: WithRegisters>(&self, work: W) {
+        work.with::<4>();
     }
     #[inline(always)]
     fn eval_in_registers<S: Simd, const K: usize>(&self, set: S, x: [[S::f64s; K]; N]) -> [[S::f64s; K]; N] {

@@ -49,10 +49,22 @@ pub use smoothed::Smoothed;
 pub use transition::Transition;
 pub use wheel::Wheel;
 
+/// Work that is done with `K` vector registers side by side.
+#[doc(hidden)]
+pub trait WithRegisters {
+    /// Does it.
+    fn with<const K: usize>(self);
+}
+
 /// An autonomous ordinary differential equation x' = f(x) in `N` dimensions.
 pub trait VectorField<const N: usize>: Sync {
     /// The right-hand side f(x).
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
+    /// Does `work` with as many registers as suit this equation: with two, one goes on while the other waits for a quotient.
+    #[doc(hidden)]
+    fn with_registers<W: WithRegisters>(&self, work: W) {
+        work.with::<2>();
+    }
     /// The right-hand side at several states side by side, in the registers of an instruction set: in every lane the bits of [`VectorField::eval`].
     #[doc(hidden)]
     #[inline(always)]

@@ -47,11 +47,12 @@ impl Program {
     ) -> [Bundle<S, K>; N] {
         // The mask changes nothing and spares the way to a panic.
         let last = results.len() - 1;
+        // Most instructions use the result of the one before: it is at hand sooner than it could be written and read again.
+        let (mut value, mut written) = (x[0], u16::MAX);
         for i in &self.code {
-            let a = results[usize::from(i.a) & last];
-            let b = results[usize::from(i.b) & last];
+            let a = if i.a == written { value } else { results[usize::from(i.a) & last] };
+            let b = if i.b == written { value } else { results[usize::from(i.b) & last] };
             let fixed = set.splat_f64s(i.fixed);
-            let mut value = a;
             let number = Registers::<S, K>::new(set, a);
             macro_rules! each {
                 ($k:ident => $result:expr) => {
@@ -83,6 +84,7 @@ impl Program {
                 Code::Sign => value = number.sign().parts(),
             }
             results[usize::from(i.to) & last] = value;
+            written = i.to;
         }
         let mut out = x;
         for i in 0..N {
