@@ -32,6 +32,8 @@ pub use interval::{Enclosure, Interval};
 pub use interval_extended::Ball;
 pub use lanes::Lanes;
 pub use multi::MultiFloat;
+/// An instruction set, for rooms that hand numbers on in registers and compute nothing with them.
+pub use pulp::Simd;
 pub use registers::{Mask, Registers};
 pub use scalar::{Arithmetic, Elementary, Scalar};
 pub use tape::Tape;

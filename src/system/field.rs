@@ -7,12 +7,11 @@ use std::fmt;
 use std::sync::Arc;
 
 use nalgebra::SVector;
-use pulp::Simd;
 
 use super::instance::{BindError, run};
 use super::{Relaxation, System, Transition, VectorField, WithRegisters};
 use crate::num::tape::{Program, Recorded, Replay, Tape};
-use crate::num::{Arithmetic, Elementary};
+use crate::num::{Arithmetic, Elementary, Simd};
 
 /// An autonomous ordinary differential equation x' = f(x) as data.
 ///

@@ -30,11 +30,10 @@ pub mod wheel;
 
 use std::sync::Arc;
 
-use crate::num::tape::Recorded;
 use nalgebra::{SMatrix, SVector};
-use pulp::Simd;
 
-use crate::num::{Dual, Elementary, Registers, Tape};
+use crate::num::tape::Recorded;
+use crate::num::{Dual, Elementary, Registers, Simd, Tape};
 
 pub use caricature::Caricature;
 pub use definition::Definition;
