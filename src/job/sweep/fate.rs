@@ -125,7 +125,8 @@ impl Question for Fate {
     }
 
     fn cost(&self) -> f64 {
-        self.0.cost()
+        // The run is a part of it, and no question of its own.
+        Run(self.0.run.clone()).cost() + self.0.cost()
     }
 
     fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
