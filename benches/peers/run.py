@@ -115,7 +115,7 @@ def draw(rows):
     width, left, line = 900, 330, 18
     low, high = 0.05, max(float(row[2]) for row in rows) * 1.5
     scale = (width - left - 70) / math.log10(high / low)
-    parts, y, unit = [], 10, None
+    parts, y, unit = [f'<text x="{left}" y="16" fill="#606060">processor seconds, logarithmic scale</text>'], 10, None
     for row in rows:
         if row[0] != unit:
             unit, y = row[0], y + 24
