@@ -31,7 +31,7 @@ impl Program {
             results[..N].copy_from_slice(&x);
             self.run_in_registers(set, x, &mut results)
         } else {
-            let mut results = vec![zero; self.registers.next_power_of_two().max(N)];
+            let mut results = vec![zero; self.registers.max(N).next_power_of_two()];
             results[..N].copy_from_slice(&x);
             self.run_in_registers(set, x, &mut results)
         }
