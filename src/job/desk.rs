@@ -184,6 +184,20 @@ mod tests {
     }
 
     #[test]
+    fn what_is_asked_in_passing_is_not_kept() {
+        static COUNT: AtomicUsize = AtomicUsize::new(0);
+        let (desk, question) = (Desk::quiet(), Fibonacci(1, &COUNT));
+        for times in 1..=2 {
+            assert_eq!(desk.ask_in_passing(&question).unwrap().fact::<u64>("value"), Ok(1));
+            assert_eq!(COUNT.load(Ordering::Relaxed), times);
+        }
+        // What is there already is taken.
+        desk.ask(&question).unwrap();
+        desk.ask_in_passing(&question).unwrap();
+        assert_eq!(COUNT.load(Ordering::Relaxed), 3);
+    }
+
+    #[test]
     fn an_error_reaches_whoever_asks() {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let desk = Desk::quiet();
