@@ -159,6 +159,10 @@ package: ## the crate, packed, unpacked and built as the registry would have it;
 deny: ## licences, duplicates, sources and known defects of every dependency (needs cargo-deny: cargo install --locked cargo-deny)
 	@$(CARGO) deny --workspace check
 
+.PHONY: sbom
+sbom: ## what the program links, with versions, licences and checksums (CycloneDX), into target/sbom (needs cargo-cyclonedx; scripts/sbom.sh)
+	@sh scripts/sbom.sh
+
 lint: ## formatting, clippy and documentation, warnings denied
 	@$(CARGO) fmt --check
 	@$(CARGO) clippy --workspace --exclude twofold-python --locked --all-targets -- -D warnings
@@ -179,6 +183,10 @@ mutants: ## mutation testing, all mutants in one build (docs/mutants.md): make m
 .PHONY: fuzz
 fuzz: ## every reader of foreign bytes against inputs made by chance: make fuzz FUZZ_SECONDS=600 FUZZ="spec png"
 	@FUZZ_SECONDS=$(or $(FUZZ_SECONDS),60) FUZZ="$(FUZZ)" $(CARGO) test --locked --quiet --test fuzz -- --nocapture every_reader
+
+.PHONY: fuzz-coverage
+fuzz-coverage: ## the same readers against libFuzzer, which sees coverage: make fuzz-coverage FUZZ_SECONDS=600 FUZZ="spec png" (needs a C++ compiler)
+	@sh scripts/fuzz-coverage.sh $(or $(FUZZ_SECONDS),60) $(FUZZ)
 
 .PHONY: symbols
 # Every program of the workspace and the Python module, as cargo leaves them; and other files: make symbols PROGRAMS="path ..."

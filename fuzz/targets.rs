@@ -1,5 +1,5 @@
 //! What is fuzzed: every reader of foreign bytes. A reader may refuse; it must not panic, hang, or take memory that its input does not pay for. Where something is read that can be written
-//! again, it must come back the same. Part of tests/fuzz.rs, which makes the inputs.
+//! again, it must come back the same. Two drivers make the inputs: tests/fuzz.rs, which needs no tool, and libFuzzer (fuzz/Cargo.toml), which sees what an input runs through.
 
 use twofold::job::spec::{FunnelSpec, Observation, RunSpec, SwitchSpec};
 use twofold::job::sweep::Rows;
@@ -39,7 +39,7 @@ fn text(bytes: &[u8]) -> Option<&str> {
 }
 
 /// A spec: read, checked, written and read again; a sound one is also run, briefly.
-fn spec(bytes: &[u8]) -> String {
+pub fn spec(bytes: &[u8]) -> String {
     let mut spec = match serde_json::from_slice::<RunSpec>(bytes) {
         Ok(spec) => spec,
         Err(error) => return error.to_string(),
@@ -69,7 +69,7 @@ fn spec(bytes: &[u8]) -> String {
 }
 
 /// A system's file: read, written and read again, and asked for its field.
-fn system(bytes: &[u8]) -> String {
+pub fn system(bytes: &[u8]) -> String {
     let Some(text) = text(bytes) else { return "no text".into() };
     let definition = match Definition::from_toml(text, "a file") {
         Ok(definition) => definition,
@@ -86,7 +86,7 @@ fn system(bytes: &[u8]) -> String {
 }
 
 /// A manifest, and a file of checkpoints.
-fn manifest(bytes: &[u8]) -> String {
+pub fn manifest(bytes: &[u8]) -> String {
     let Some(text) = text(bytes) else { return "no text".into() };
     let found = Manifest::parse(text, "a file");
     if let Ok(manifest) = &found {
@@ -103,7 +103,7 @@ fn manifest(bytes: &[u8]) -> String {
 }
 
 /// A table as CSV, the rows of a sweep, and a sweep's journal.
-fn csv(bytes: &[u8]) -> String {
+pub fn csv(bytes: &[u8]) -> String {
     let table = encode::from_csv(bytes);
     if let Ok((heading, table)) = &table {
         let (_, again) = encode::from_csv(&encode::csv(table, &heading.about)).expect("what is written can be read");
@@ -114,7 +114,7 @@ fn csv(bytes: &[u8]) -> String {
 }
 
 /// A table as Parquet.
-fn parquet(bytes: &[u8]) -> String {
+pub fn parquet(bytes: &[u8]) -> String {
     let table = parquet::from_parquet(bytes);
     if let Ok((heading, table)) = &table {
         let written = parquet::parquet(table, &heading.about);
@@ -125,12 +125,13 @@ fn parquet(bytes: &[u8]) -> String {
 }
 
 /// A picture: what it says of itself.
-fn picture(bytes: &[u8]) -> String {
+pub fn picture(bytes: &[u8]) -> String {
     let found = read_provenance(bytes);
     format!("{} {}", said(&found), found.is_ok_and(|provenance| provenance.intact))
 }
 
-fn png(bytes: &[u8]) -> String {
+/// A PNG picture: what it says of itself, and its pixels.
+pub fn png(bytes: &[u8]) -> String {
     // Memory is taken for pixels: not for more than a small machine has, while fuzzing.
     let small = png_size(bytes).is_some_and(|(w, h)| u64::from(w) * u64::from(h) < 1 << 22);
     let pixels = if small { said(&decode_png(bytes)) } else { "large".into() };
@@ -138,7 +139,7 @@ fn png(bytes: &[u8]) -> String {
 }
 
 /// An entry of a store, and the tables in it. Its digest is made to fit, so that what lies behind it is reached.
-fn store(bytes: &[u8]) -> String {
+pub fn store(bytes: &[u8]) -> String {
     let found = store::answer_in(bytes);
     let content = &bytes[..bytes.len().saturating_sub(64)];
     let sealed = store::answer_in(&[content, Hash::of(content).as_str().as_bytes()].concat());
@@ -155,7 +156,7 @@ fn store(bytes: &[u8]) -> String {
 }
 
 /// A theorem's certificate.
-fn certificate(bytes: &[u8]) -> String {
+pub fn certificate(bytes: &[u8]) -> String {
     match text(bytes) {
         Some(text) => said(&twofold::verify::verify(text)),
         None => "no text".into(),

@@ -11,7 +11,7 @@
 # it), with the emulator of that suite. Crates are those of Cargo.lock (cargo vendor). Not said: rustup's where it can build for that target, Debian's where it cannot.
 #
 # RUN: what is run, "check fig1 fig2 fig3 fig4 fig5 fig6" if nothing is said; "check" is all figures (hours under emulation). LEVEL: optimisation (1). THREADS (1).
-# ONLY=build, ONLY=run: half of it. MIRROR: Debian's. PYTHON: one that has wasmtime. The results are added to target/arch/report.txt.
+# ONLY=build, ONLY=run: half of it (to run what was built needs a root of 0.5 GB only). MIRROR: Debian's. PYTHON: one that has wasmtime. The results are added to target/arch/report.txt.
 set -u
 work=${WORK:-$PWD/target/arch}
 root=${ROOT:-$work/root}
@@ -36,21 +36,33 @@ fi
 [ $# -gt 0 ] || set -- aarch64 s390x i686 riscv64 wasm32
 mkdir -p "$work"
 
-# The root: a compiler, cross linkers, and the standard libraries of the other targets. Those packages are unpacked, not installed: what they depend on (the compiler's own
-# libraries for that machine) is not needed to build for it.
-setup() {
-    [ -e "$root/.ready" ] && return
+# The root, with an emulator and the C libraries of the other machines: what it takes to run what was built before.
+emulator() {
+    [ ! -e "$root/.emulates" ] || return 0
     [ -e "$root/etc/debian_version" ] || debootstrap --variant=minbase sid "$root" "$mirror" > "$work/debootstrap.log" 2>&1 || return 1
     # A mirror may be a picture of some past day.
     echo 'Acquire::Check-Valid-Until "false";' > "$root/etc/apt/apt.conf.d/00mirror"
+    {
+        inside apt-get update && inside apt-get install -y --no-install-recommends qemu-user libc6-arm64-cross libgcc-s1-arm64-cross libc6-s390x-cross libgcc-s1-s390x-cross \
+            libc6-riscv64-cross libgcc-s1-riscv64-cross libc6-i386-cross libgcc-s1-i386-cross
+    } > "$work/apt.log" 2>&1 || return 1
+    mkdir -p "$root/src"
+    touch "$root/.emulates"
+}
+
+# And a compiler, cross linkers, and the standard libraries of the other targets. Those packages are unpacked, not installed: what they depend on (the compiler's own
+# libraries for that machine) is not needed to build for it.
+setup() {
+    [ ! -e "$root/.ready" ] || return 0
+    emulator || return 1
     for a in arm64 s390x i386 riscv64; do inside dpkg --add-architecture $a; done
     {
-        inside apt-get update && inside apt-get install -y --no-install-recommends rustc cargo qemu-user libstd-rust-dev-wasm32 lld gcc libc6-dev \
+        inside apt-get update && inside apt-get install -y --no-install-recommends rustc cargo libstd-rust-dev-wasm32 lld gcc libc6-dev \
             gcc-aarch64-linux-gnu libc6-dev-arm64-cross gcc-s390x-linux-gnu libc6-dev-s390x-cross gcc-riscv64-linux-gnu libc6-dev-riscv64-cross \
             gcc-i686-linux-gnu libc6-dev-i386-cross &&
             mkdir -p "$root/debs" && inside sh -c 'cd /debs && for a in arm64 s390x i386 riscv64; do apt-get download libstd-rust-dev:$a; done' &&
             for deb in "$root"/debs/*.deb; do dpkg-deb -x "$deb" "$root"; done
-    } > "$work/apt.log" 2>&1 || return 1
+    } >> "$work/apt.log" 2>&1 || return 1
     rm -rf "$root/debs" "$root"/var/cache/apt/archives/*.deb
     touch "$root/.ready"
 }
@@ -95,7 +107,10 @@ build() {
 # The program on its own kind of machine. The C library is that of the cross compiler.
 on_it() {
     libraries=/usr/$cross
-    [ "$compiler" = rustup ] || libraries=$root$libraries
+    if [ "$compiler" != rustup ] && [ "$target" != wasm32 ]; then
+        emulator || { echo "the root could not be made: see $work/*.log" >&2; return 2; }
+        libraries=$root$libraries
+    fi
     program=$work/$target-$compiler/twofold
     if [ "$target" = wasm32 ]; then
         "${PYTHON:-python3}" "$here/wasm.py" "$program.wasm" "$@"

@@ -28,7 +28,7 @@ if [ "$what" = sources ]; then
     printf '[source.crates-io]\nreplace-with = "vendored"\n[source.vendored]\ndirectory = "vendor"\n' > "$work/tree/.cargo/config.toml"
     # The toolchain by its own path, since the home is changed as well.
     tools=$(rustc --print sysroot)
-    make="export PATH=$tools/bin:\$PATH CARGO_HOME=\$PWD/.cargo-home RUSTFLAGS=--remap-path-prefix=\$PWD=/twofold && cargo build --release --locked --offline --quiet --bin twofold && target/release/twofold $make && cp target/release/twofold made"
+    make="export PATH=$tools/bin:\$PATH && sh scripts/release-build.sh --offline --quiet && target/release/twofold $make && cp target/release/twofold made"
 else
     cp "$what" "$work/tree/twofold" || exit 2
     make="./twofold $make"

@@ -4,7 +4,7 @@
 # around a program: disks that are full or become read-only, limits of file size, handles, memory and threads, several processes in one place, clocks
 # that jump, signals. Prints counts; exit code 1 if anything was lost.
 #
-#   scripts/torture.sh [KILLS] [PROGRAM]      (make torture KILLS=100)
+#   scripts/torture.sh [KILLS] [PROGRAM]      (make torture KILLS=100; ONLY=limits: nothing but runs of too many points)
 set -u
 kills=${1:-100}
 program=${2:-target/release/twofold}
@@ -13,6 +13,19 @@ trap 'umount "$work/disk" 2> /dev/null; rm -rf "$work"' EXIT
 figures="fig1 fig3 fig5"
 bad=0
 complain() { echo "LOST: $1"; bad=$((bad + 1)); }
+
+# Limits that take seconds to reach. Each ends with code 3 and a line that says what to do.
+limits() {
+    for flags in "--chord 1e-300 --t-end 1000 --format json" "--switch filippov --exit all --funnel-times 100000" "--restart 2e-9 --t-end 1"; do
+        rm -f "$work/none.csv"
+        "$program" run $flags --quiet --out "$work/none.csv" 2> "$work/said"
+        found=$?
+        [ "$found" -eq 3 ] && [ "$(wc -l < "$work/said")" -eq 1 ] && [ ! -e "$work/none.csv" ] || complain "run $flags: $found"
+        echo "run $flags: $found, $(cut -c 1-100 "$work/said") ..."
+    done
+}
+verdict() { if [ "$bad" -eq 0 ]; then echo "nothing was lost"; else echo "$bad losses"; exit 1; fi; }
+if [ "${ONLY:-}" = limits ]; then limits; verdict; exit; fi
 
 # What an undisturbed run makes.
 "$program" figure $figures --fresh --quiet --out "$work/reference" || exit 2
@@ -227,13 +240,5 @@ while [ "$k" -lt $((kills / 5)) ]; do
 done
 echo "SIGINT and SIGTERM while computing: $k sent, gone after $worst ms at most"
 
-# Limits that take seconds to reach. Each ends with code 3 and a line that says what to do.
-for flags in "--chord 1e-300 --t-end 1000 --format json" "--switch filippov --exit all --funnel-times 100000" "--restart 2e-9 --t-end 1"; do
-    rm -f "$work/none.csv"
-    "$program" run $flags --quiet --out "$work/none.csv" 2> "$work/said"
-    found=$?
-    [ "$found" -eq 3 ] && [ "$(wc -l < "$work/said")" -eq 1 ] && [ ! -e "$work/none.csv" ] || complain "run $flags: $found"
-    echo "run $flags: $found, $(cut -c 1-100 "$work/said") ..."
-done
-
-[ "$bad" -eq 0 ] && echo "nothing was lost" || { echo "$bad losses"; exit 1; }
+limits
+verdict
