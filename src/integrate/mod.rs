@@ -29,6 +29,8 @@ pub mod dopri5;
 pub mod driver;
 pub mod ensemble;
 pub mod filippov;
+#[cfg(test)]
+mod frozen;
 pub mod layered;
 mod linear;
 pub mod lsoda;

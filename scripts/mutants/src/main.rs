@@ -1,6 +1,6 @@
 //! Mutation testing with every mutant in one build: mutant schemata (Untch, Offutt, Harrold 1993). See docs/mutants.md.
 //!
-//! `mutants --rooms record,compare --scratch DIR [--jobs 1] [--slow 5] [--user 65534] [--only TEXT] [--tests units,NAME,...] [--keep ROOMS]`, from the package's root.
+//! `mutants --rooms record,compare --scratch DIR [--jobs 1] [--slow 5] [--user 65534] [--only TEXT] [--tests units,NAME,...] [--keep ROOMS] [--units ROOMS]`, from the package's root.
 
 mod schema;
 
@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs;
 use std::hash::{Hash, Hasher};
 use std::io::{Read, Write};
-use std::os::unix::process::CommandExt;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Mutex;
@@ -34,6 +34,8 @@ struct Options {
     programs: Option<Vec<String>>,
     /// With only these rooms in the library, if any are named: what stands above them is not built, and its tests are not run.
     keep: Vec<String>,
+    /// Of the library's unit tests only those of these rooms, if any are named.
+    units: Vec<String>,
 }
 
 fn options() -> Result<Options, Failure> {
@@ -46,6 +48,7 @@ fn options() -> Result<Options, Failure> {
         only: String::new(),
         programs: None,
         keep: Vec::new(),
+        units: Vec::new(),
     };
     let list =
         |text: &str| text.split([',', ' ']).filter(|r| !r.is_empty()).map(str::to_owned).collect::<Vec<String>>();
@@ -55,6 +58,7 @@ fn options() -> Result<Options, Failure> {
         match flag.as_str() {
             "--rooms" => options.rooms = list(&value),
             "--keep" => options.keep = list(&value),
+            "--units" => options.units = list(&value),
             "--scratch" => options.scratch = value.into(),
             "--jobs" => options.jobs = value.parse()?,
             "--slow" => options.slow = value.parse()?,
@@ -390,6 +394,10 @@ fn tests_of(
     let sink = fs::File::create(&out)?;
     let mut command = Command::new("prlimit");
     command.args(["--as=6000000000", "--fsize=1000000000", "--core=0"]);
+    // The time is the processor's, so that a busy machine takes no mutant for one that never ends; what waits for ever is killed by the clock.
+    let seconds = limit.as_secs_f64().ceil() as u64;
+    command.arg(format!("--cpu={seconds}:{seconds}"));
+    let limit = 10 * limit;
     if let Some(user) = options.user {
         std::os::unix::fs::chown(&temporary, Some(user), Some(user))?;
         command.arg("setpriv").args([format!("--reuid={user}"), format!("--regid={user}"), "--clear-groups".into()]);
@@ -443,6 +451,7 @@ fn tests_of(
         .map_or(String::new(), |n| (*n).to_owned());
     Ok(match status {
         Some(status) if status.success() => Ended::Passed,
+        Some(status) if matches!(status.signal(), Some(9 | 24)) => Ended::Timeout(failed),
         Some(_) => Ended::Failed(failed),
         None => Ended::Timeout(failed),
     })
@@ -474,7 +483,14 @@ fn reach(
             Ok(text.lines().filter_map(|l| l.strip_suffix(": test")).map(str::to_owned).collect())
         };
         let ignored = list(&["--ignored"])?;
-        wanted.extend(list(&[])?.difference(&ignored).map(|n| (program.clone(), n.clone())));
+        let asked = |name: &str| {
+            program != "lib"
+                || options.units.is_empty()
+                || options.units.iter().any(|u| name.starts_with(&format!("{}::", u.replace('/', "::"))))
+        };
+        wanted.extend(
+            list(&[])?.difference(&ignored).filter(|n| asked(n)).map(|n| (program.clone(), n.clone())),
+        );
     }
     let mut entries = serde_json::Map::new();
     let mut tests = Vec::new();
@@ -607,8 +623,10 @@ fn run(
     let kills: Mutex<HashMap<(String, usize), usize>> = Mutex::new(HashMap::new());
     let done = Mutex::new(results);
     let next = AtomicUsize::new(0);
-    let queue: Vec<usize> =
+    let mut queue: Vec<usize> =
         (0..mutants.len()).filter(|m| !dropped.contains(m) && keys[*m].contains(&options.only)).collect();
+    // In an order by chance, always the same: wherever a run is stopped, those that it tried are a fair sample of all.
+    queue.sort_by_cached_key(|m| chance(&keys[*m]));
     let started = Instant::now();
     let worker = |slot: usize| -> Result<(), String> {
         loop {
@@ -670,7 +688,7 @@ fn run(
                     for (program, group) in groups {
                         let all: Vec<&str> = group.iter().map(|t| tests[*t].name.as_str()).collect();
                         let seconds: f64 = group.iter().map(|t| tests[*t].seconds).sum();
-                        let limit = Duration::from_secs_f64(4.0 + 8.0 * seconds);
+                        let limit = Duration::from_secs_f64(2.0 + 8.0 * seconds);
                         let variable = ("MUTANT", m.to_string());
                         let ended =
                             tests_of(options, tree, &programs[program], &all, (variable.0, &variable.1), limit, slot)
@@ -698,6 +716,8 @@ fn run(
             done.lock().map_err(|e| e.to_string())?.insert(keys[m].clone(), outcome);
             if at.is_multiple_of(100) {
                 println!("{at} of {} after {:.0} s", queue.len(), started.elapsed().as_secs_f64());
+                let results = done.lock().map_err(|e| e.to_string())?.clone();
+                summary(state, mutants, keys, dropped, &results).map_err(|e| e.to_string())?;
             }
         }
     };
@@ -712,7 +732,17 @@ fn run(
         fs::write(&tried, names.iter().map(|n| format!("{n}\n")).collect::<String>())?;
     }
     let results = done.into_inner()?;
-    summary(state, mutants, keys, dropped, &results)
+    summary(state, mutants, keys, dropped, &results)?;
+    println!("{}\nthose left: {}", fs::read_to_string(state.join("table.md"))?, state.join("left.txt").display());
+    Ok(())
+}
+
+/// A number made of a name alone: 64-bit FNV-1a (Fowler, Noll & Vo), its bits mixed once more as in SplitMix64 (Steele, Lea & Flood 2014).
+fn chance(name: &str) -> u64 {
+    let z = name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3));
+    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
 }
 
 /// Counts by file, and every mutant that was not caught.
@@ -747,6 +777,5 @@ fn summary(
     table += &format!("| all | {} |\n", total.map(|n| n.to_string()).join(" | "));
     fs::write(state.join("table.md"), &table)?;
     fs::write(state.join("left.txt"), &left)?;
-    println!("{table}\nthose left: {}", state.join("left.txt").display());
     Ok(())
 }
