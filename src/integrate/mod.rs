@@ -29,8 +29,6 @@ pub mod dopri5;
 pub mod driver;
 pub mod ensemble;
 pub mod filippov;
-#[cfg(test)]
-mod frozen;
 pub mod layered;
 mod linear;
 pub mod lsoda;
@@ -41,6 +39,8 @@ pub mod schedule;
 mod starting_step;
 pub mod step;
 pub mod taylor;
+#[cfg(test)]
+mod tests;
 
 pub use dopri5::Dopri5;
 pub use driver::{Course, Ignore, Observer, Part, Summary, Watch, drive, drive_part};
