@@ -279,12 +279,16 @@ mod tests {
         let refuses = Refuses(AtomicBool::new(false));
         let cut = run(Course { step_cap: StepCap::Absolute(1e-3), ..Course::to(10.0) }, &mut Ignore, &refuses);
         assert_eq!((cut.stop, cut.statistics.steps), (StopReason::Watch, 4096));
-        assert!(cut.within_budget().is_ok(), "only the budget is an error");
+        assert!(cut.clone().within_budget().is_ok(), "only the budget is an error");
 
         // A budget that is just enough is enough, and a watch that refuses at the very end has cut nothing short.
         let just = run(Course { max_steps: whole.statistics.steps, ..Course::to(10.0) }, &mut Ignore, &refuses);
         assert_eq!(just.stop, StopReason::EndTime);
         assert_eq!(just.x, whole.x);
+
+        // Neither has one that is asked when the last step is the 4096th.
+        let last = run(Course { step_cap: StepCap::Absolute(1e-3), ..Course::to(cut.t) }, &mut Ignore, &refuses);
+        assert_eq!((last.stop, last.statistics.steps, last.t), (StopReason::EndTime, 4096, cut.t));
     }
 
     /// Van der Pol's oscillator; counts how often it is asked.

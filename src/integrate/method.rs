@@ -136,4 +136,30 @@ mod tests {
             assert!(found[..i].iter().all(|b| a.1 != b.1 || a.0 != b.0), "two names do the same work: {found:?}");
         }
     }
+
+    struct ToItsName;
+    impl WithStepper<1> for ToItsName {
+        type Answer = (String, u64);
+        fn with<M: Stepper<1>>(self, stepper: M) -> Self::Answer {
+            let name = std::any::type_name::<M>();
+            (name.rsplit(['<', ':']).next().unwrap_or(name).to_owned(), stepper.statistics().highest_order)
+        }
+    }
+
+    #[test]
+    fn so_many_bits_are_so_many() {
+        let tolerance = Tolerance { rtol: 1e-30, atol: 1e-30 };
+        let number = |bits| {
+            let name = with_extended(bits, Some(17), tolerance, ToItsName).0;
+            let parts = name.trim_end_matches('>').to_owned();
+            if parts == "DoubleDouble" { 106 } else { 64 * parts.parse::<u16>().unwrap() }
+        };
+        assert_eq!(PRECISIONS.map(number), PRECISIONS);
+        // The next that there is, at most the last.
+        assert_eq!([1, 105, 107, 193, 257, 385, 5000].map(number), [106, 106, 192, 256, 384, 512, 512]);
+        for bits in PRECISIONS {
+            assert_eq!(with_extended(bits, Some(17), tolerance, ToItsName).1, 17);
+            assert_eq!(with_extended(bits, None, tolerance, ToItsName).1, 36);
+        }
+    }
 }

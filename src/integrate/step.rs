@@ -279,3 +279,75 @@ impl Failure {
 pub(crate) fn finite<const N: usize>(x: &SVector<f64, N>) -> bool {
     x.iter().all(|v| v.is_finite())
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::vector;
+
+    use super::*;
+
+    #[test]
+    fn work_adds_up() {
+        let work = |first: u64| Statistics {
+            steps: first,
+            rejected: first + 1,
+            evaluations: first + 2,
+            jacobians: first + 3,
+            factorisations: first + 4,
+            convergence_failures: first + 5,
+            method_switches: first + 6,
+            stiff_steps: first + 7,
+            restarts: first + 8,
+            highest_order: first % 7,
+        };
+        for (a, b) in [(100, 20), (20, 100)] {
+            let mut sum = work(a);
+            sum += &work(b);
+            let all = Statistics {
+                steps: 120,
+                rejected: 122,
+                evaluations: 124,
+                jacobians: 126,
+                factorisations: 128,
+                convergence_failures: 130,
+                method_switches: 132,
+                stiff_steps: 134,
+                restarts: 136,
+                highest_order: 6,
+            };
+            assert_eq!(sum, all);
+        }
+    }
+
+    /// t^2 and -t over [0, 1]; wrong at both ends, which a step knows better.
+    struct Wrong;
+    impl Interpolant<2> for Wrong {
+        fn at(&self, theta: f64) -> SVector<f64, 2> {
+            vector![theta * theta + 0.125, -theta]
+        }
+        fn degree(&self) -> usize {
+            2
+        }
+    }
+
+    #[test]
+    fn a_step_has_its_own_ends() {
+        let step = Step { t0: 3.0, t1: 5.0, x0: vector![0.0, 0.0], x1: vector![1.0, -1.0], interpolant: &Wrong };
+        assert_eq!((step.length(), step.time(0.0), step.time(0.25), step.time(1.0)), (2.0, 3.0, 3.5, 5.0));
+        for (theta, want) in
+            [(-0.5, [0.0, 0.0]), (0.0, [0.0, 0.0]), (0.5, [0.375, -0.5]), (1.0, [1.0, -1.0]), (1.5, [1.0, -1.0])]
+        {
+            assert_eq!(step.at(theta), SVector::from(want));
+            assert_eq!([0, 1].map(|i| step.coordinate(theta, i)), want);
+        }
+        // 0.1 + 1 (0.3 - 0.1) is not 0.3.
+        let step = Step { t0: 0.1, t1: 0.3, ..step };
+        assert_eq!(step.time(1.0), 0.3);
+        // An interpolant that says nothing of itself is not thought to be near, nor to be monotone.
+        assert!(Wrong.reach(0) == f64::INFINITY && !Wrong.is_monotone(0));
+        assert!(
+            finite(&vector![1.0, -2.0]) && !finite(&vector![1.0, f64::NAN]) && !finite(&vector![f64::INFINITY, 0.0])
+        );
+        assert_eq!(Failure::state(&vector![1.0, 2.0]), [1.0, 2.0]);
+    }
+}

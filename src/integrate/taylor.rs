@@ -462,4 +462,52 @@ mod tests {
         }
         assert_eq!(stride_time(&[5.0, 0.1], 1.0), 1.0);
     }
+
+    #[test]
+    fn the_order_is_jorba_and_zous() {
+        let order = |size: f64| order_for(Tolerance { rtol: size, atol: 1.0 }, f64::EPSILON);
+        // 1 - ln(tolerance)/2, rounded up; not above what 1e-2 asks for nor below a sixteenth of the spacing of numbers.
+        assert_eq!([1.0, 1e-2, 1e-3, 1e-8, 1e-15].map(order), [4, 4, 5, 11, 19]);
+        assert_eq!([1e-17, 1e-40, 0.0].map(order), [21, 21, 21]);
+        assert_eq!(order_for(Tolerance { rtol: 1.0, atol: 1e-30 }, 1e-33), 36);
+        assert_eq!(Taylor::<1>::new(Tolerance { rtol: 1e-8, atol: 1e-3 }).order(), 11);
+        assert_eq!(Taylor::<1>::new(Tolerance { rtol: 1e-8, atol: 1e-3 }).with_order(1).order(), 2);
+    }
+
+    /// x' = x, t' = 1.
+    struct Growing;
+    impl VectorField<2> for Growing {
+        fn eval<S: crate::num::Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+            SVector::from([x[0], S::one()])
+        }
+    }
+
+    #[test]
+    fn a_step_is_known_in_full_precision() {
+        fn looks<S: Precision>(mut taylor: Taylor<2, S>, tolerance: f64) {
+            let start = SVector::from([S::from_f64(1.0), S::from_f64(0.25)]);
+            taylor.restart_from(&Growing, S::from_f64(0.25), start, 7.0, 0.5).unwrap();
+            for _ in 0..3 {
+                let (t0, x0) = taylor.state();
+                let length = taylor.step(&Growing).unwrap().length();
+                let (t1, x1) = taylor.state();
+                assert!(((t1 - t0).to_f64() - length).abs() < 1e-15);
+                for part in [0.0, 0.25, 0.75, 1.0] {
+                    let (t, x) = taylor.at(S::from_f64(part));
+                    let want = t0 + (t1 - t0) * S::from_f64(part);
+                    assert!((t - want).to_f64().abs() < tolerance && (x[1] - want).to_f64().abs() < tolerance);
+                    // x = exp(t - 1/4), the exponential of this arithmetic.
+                    assert!((x[0] - (want - S::from_f64(0.25)).exp()).to_f64().abs() < tolerance);
+                }
+                let gap = |a: SVector<S, 2>, b: SVector<S, 2>| {
+                    (0..2).map(|i| (a[i] - b[i]).to_f64().abs()).fold(0.0, f64::max)
+                };
+                assert!(gap(taylor.at(S::zero()).1, x0) < tolerance && gap(taylor.at(S::one()).1, x1) < tolerance);
+            }
+        }
+        let tolerance = |size: f64| Tolerance { rtol: size, atol: size };
+        looks(Taylor::new(tolerance(1e-16)), 1e-14);
+        looks(Taylor::extended(tolerance(1e-31)), 1e-29);
+        looks(Taylor::<2, MultiFloat<4>>::multi(tolerance(1e-60)), 1e-56);
+    }
 }

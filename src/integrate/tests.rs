@@ -505,6 +505,61 @@ fn two_surfaces<const N: usize, const M: usize>(
     }
 }
 
+/// A lane tells of those steps, and of no others, of which a run alone cannot say by the interpolant's reach that they miss the plane.
+#[test]
+fn lanes_tell_of_the_steps_that_may_meet_the_plane() {
+    struct Heard(Vec<u64>);
+    impl Observer<3> for Heard {
+        fn step(&mut self, step: &Step<'_, 3>) -> Flow {
+            self.0.push(step.t0.to_bits());
+            Flow::Continue
+        }
+    }
+    struct May(Plane, Vec<u64>, u64);
+    impl Observer<3> for May {
+        fn step(&mut self, step: &Step<'_, 3>) -> Flow {
+            let Plane { coordinate, value } = self.0;
+            let (h0, h1) = (step.x0[coordinate] - value, step.x1[coordinate] - value);
+            let reach = step.interpolant.reach(coordinate);
+            let margin = 1e-12 * (h0.abs() + h1.abs() + value.abs() + reach);
+            let clear = h0 * h1 > 0.0 && h0.abs().min(h1.abs()) > reach + margin;
+            self.2 += 1;
+            if !clear {
+                self.1.push(step.t0.to_bits());
+            }
+            Flow::Continue
+        }
+    }
+    let field = Smoothed { system: Caricature::with_reinjection(1e-1, 1e-4), transition: Transition::Tanh, eps: 1e-1 };
+    let runs: Vec<Run<3>> = (0..8_u32)
+        .map(|k| Run { start: vector![0.1 + 0.05 * f64::from(k), 0.02, -1.0], course: Course::to(12.0) })
+        .collect();
+    let size = tolerance(1e-4);
+    let (mut told, mut all) = (0, 0);
+    for coordinate in 0..3 {
+        for value in [-1.3, -0.6, -0.05, 0.0, 0.02, 0.3, 0.9, 1e13] {
+            let plane = Plane { coordinate, value };
+            let wanted: Vec<_> = runs
+                .iter()
+                .map(|run| {
+                    let mut may = May(plane, Vec::new(), 0);
+                    drive(&field, run.start, &run.course, &mut Dopri5::new(size), &mut may, &()).unwrap().t;
+                    all += may.2;
+                    may.1
+                })
+                .collect();
+            told += wanted.iter().map(Vec::len).sum::<usize>() as u64;
+            for set in InstructionSet::ALL.into_iter().filter(|set| set.is_here()) {
+                let found =
+                    super::ensemble::ensemble_with(set, &field, &runs, size, Some(plane), |_| Heard(Vec::new()));
+                let found: Vec<_> = found.into_iter().map(|end| end.observer.0).collect();
+                assert_eq!(found, wanted, "{plane:?}, {set:?}");
+            }
+        }
+    }
+    assert!(told > all / 50 && told < all / 2, "{told} of {all}");
+}
+
 /// Asks to stop at the first question.
 struct Refuses;
 impl Watch for Refuses {

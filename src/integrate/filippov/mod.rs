@@ -338,3 +338,6 @@ pub enum FilippovError {
         limit: u64,
     },
 }
+
+#[cfg(test)]
+mod tests;
