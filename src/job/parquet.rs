@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use parquet::basic::{Encoding, LogicalType, Repetition, Type as Physical};
+use parquet::column::page::{Page, PageReader};
 use parquet::column::reader::ColumnReader;
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
@@ -26,6 +27,8 @@ use crate::record::hash::canonical_json;
 const KEY: &str = "twofold";
 /// Rows of a row group: fixed, because it is part of the bytes.
 const GROUP: usize = 1 << 20;
+/// Most rows that are read of a table of words alone: a page of equal words has hardly any bytes, however many they are. Numbers pay for their rows.
+const WORDS: usize = 20_000_000;
 
 /// The table as a Parquet file; `about` is whatever its maker wants to say.
 pub fn parquet(table: &Table, about: &Value) -> Vec<u8> {
@@ -83,6 +86,36 @@ fn write(table: &Table, about: &Value, bytes: &mut Vec<u8>) -> Result<(), Parque
     Ok(())
 }
 
+/// Whether a column's pages are such as [`parquet()`] writes. The decoders, unlike what reads the pages, take a page's word for how many values it has, and for a dictionary
+/// that came before it: a file that lies would end the process.
+fn sound(pages: Box<dyn PageReader>, kind: Kind, rows: usize) -> Result<bool, ParquetError> {
+    let (mut values, mut dictionary) = (0, false);
+    for page in pages {
+        // A number has eight bytes, a word has four that say its length.
+        let held =
+            match page? {
+                Page::DictionaryPage { buf, num_values, encoding, .. }
+                    if kind == Kind::Word && !dictionary && values == 0 && num_values as usize <= buf.len() / 4 =>
+                {
+                    dictionary = matches!(encoding, Encoding::PLAIN | Encoding::PLAIN_DICTIONARY);
+                    0
+                }
+                Page::DataPage { buf, num_values, encoding: Encoding::PLAIN, .. }
+                    if (kind == Kind::Word && num_values as usize <= buf.len() / 4)
+                        || (kind != Kind::Word && u64::from(num_values) * 8 == buf.len() as u64) =>
+                {
+                    num_values
+                }
+                Page::DataPage {
+                    num_values, encoding: Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY, ..
+                } if dictionary => num_values,
+                _ => return Ok(false),
+            };
+        values += u64::from(held);
+    }
+    Ok(values == rows as u64)
+}
+
 /// The table of which [`parquet()`] made this file, and what it says about itself.
 ///
 /// # Errors
@@ -101,9 +134,33 @@ pub fn from_parquet(bytes: &[u8]) -> Result<(Heading, Table), Malformed> {
     if metadata.schema_descr().num_columns() != table.columns.len() {
         return Err(Malformed("its columns are not those of its metadata".into()));
     }
+    // Columns may say that they stand at the same place, and all be read from there.
+    let mut held = 0_u64;
+    for chunk in reader.metadata().row_groups().iter().flat_map(|group| group.columns()) {
+        let places = [Some(chunk.compressed_size()), Some(chunk.data_page_offset()), chunk.dictionary_page_offset()];
+        if places.iter().flatten().any(|place| *place < 0) {
+            return Err(Malformed("a column at a negative place".into()));
+        }
+        held = held.saturating_add(chunk.compressed_size() as u64);
+    }
+    if held > bytes.len() as u64 {
+        return Err(Malformed("its columns are longer than the file".into()));
+    }
+    let words_alone = heading.columns.iter().all(|c| c.kind == Kind::Word);
     for group in 0..reader.num_row_groups() {
         let group = reader.get_row_group(group).map_err(wrong)?;
         let rows = usize::try_from(group.metadata().num_rows()).map_err(|_| Malformed("a negative length".into()))?;
+        if rows > GROUP || (words_alone && table.len() + rows > WORDS) {
+            return Err(Malformed(format!("a group of {rows} rows")));
+        }
+        for (i, column) in table.columns.iter().enumerate() {
+            let description = metadata.schema_descr().column(i);
+            let required = description.max_def_level() == 0 && description.max_rep_level() == 0;
+            let pages = group.get_column_page_reader(i).map_err(wrong)?;
+            if !required || !sound(pages, column.kind(), rows).map_err(wrong)? {
+                return Err(Malformed(format!("column {} is not laid out as it is here", column.name)));
+            }
+        }
         for (i, column) in table.columns.iter_mut().enumerate() {
             let read = match (&mut column.cells, group.get_column_reader(i).map_err(wrong)?) {
                 (Cells::Numbers(v), ColumnReader::DoubleColumnReader(mut r)) => r.read_records(rows, None, None, v),
@@ -154,6 +211,26 @@ mod tests {
             let (heading, back) = from_parquet(&bytes).unwrap();
             assert_eq!(heading.about, about);
             assert_eq!(bits(&[back]), bits(&[t]), "{rows} rows");
+        }
+    }
+
+    /// A dictionary that is passed over, and one that claims more words than it has bytes for.
+    #[test]
+    fn pages_that_lie_are_refused() {
+        let bytes = parquet(&table(100), &Value::Null);
+        let reader = SerializedFileReader::new(Bytes::from(bytes.clone())).unwrap();
+        let at = reader.metadata().row_group(0).column(1).dictionary_page_offset().unwrap() as usize;
+        // The page's header (Thrift's compact protocol): field 1, its type, is 2: a dictionary; fields 2 and 3 are its lengths; field 7 begins with the number of words.
+        assert_eq!(bytes[at..at + 2], [0x15, 2 << 1]);
+        assert_eq!(
+            (bytes[at + 2], bytes[at + 4], bytes[at + 6..at + 9].to_vec()),
+            (0x15, 0x15, vec![0x4c, 0x15, 3 << 1])
+        );
+        for (place, value) in [(1, 1 << 1), (8, 60 << 1)] {
+            let mut lies = bytes.clone();
+            lies[at + place] = value;
+            let said = from_parquet(&lies).unwrap_err().to_string();
+            assert!(said.contains("column mode is not laid out as it is here"), "{said}");
         }
     }
 
