@@ -16,7 +16,7 @@ complain() { echo "LOST: $1"; bad=$((bad + 1)); }
 
 # Limits that take seconds to reach. Each ends with code 3 and a line that says what to do.
 limits() {
-    for flags in "--chord 1e-300 --t-end 1000 --format json" "--switch filippov --exit all --funnel-times 100000" "--restart 2e-9 --t-end 1"; do
+    for flags in "--chord 1e-300 --t-end 1000 --format json" "--switch filippov --exit all --funnel-times 100000" "--restart 2e-9 --t-end 1 --format json"; do
         rm -f "$work/none.csv"
         "$program" run $flags --quiet --out "$work/none.csv" 2> "$work/said"
         found=$?
