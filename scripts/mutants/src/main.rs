@@ -36,6 +36,8 @@ struct Options {
     keep: Vec<String>,
     /// Of the library's unit tests only those of these rooms, if any are named.
     units: Vec<String>,
+    /// The library's unit tests as an earlier call built them, to go on without building: nothing that is mutated may have changed since.
+    built: Option<PathBuf>,
 }
 
 fn options() -> Result<Options, Failure> {
@@ -49,6 +51,7 @@ fn options() -> Result<Options, Failure> {
         programs: None,
         keep: Vec::new(),
         units: Vec::new(),
+        built: None,
     };
     let list =
         |text: &str| text.split([',', ' ']).filter(|r| !r.is_empty()).map(str::to_owned).collect::<Vec<String>>();
@@ -59,6 +62,7 @@ fn options() -> Result<Options, Failure> {
             "--rooms" => options.rooms = list(&value),
             "--keep" => options.keep = list(&value),
             "--units" => options.units = list(&value),
+            "--built" => options.built = Some(PathBuf::from(value).canonicalize()?),
             "--scratch" => options.scratch = value.into(),
             "--jobs" => options.jobs = value.parse()?,
             "--slow" => options.slow = value.parse()?,
@@ -108,7 +112,7 @@ fn main() -> Result<(), Failure> {
     fs::create_dir_all(&state)?;
 
     let mut files: Vec<(String, File)> = Vec::new();
-    for path in copy(&tree, &options.keep)? {
+    for path in copy(&tree, &options)? {
         let inside =
             options.rooms.iter().any(|r| path.starts_with(&format!("src/{r}/")) || path == format!("src/{r}.rs"));
         if inside && path.ends_with(".rs") {
@@ -135,21 +139,24 @@ fn main() -> Result<(), Failure> {
     let keys: Vec<String> = mutants.iter().map(Mutant::key).collect();
     println!("{} mutants in {} files", mutants.len(), files.len());
 
-    let dropped = compile(&options, &tree, &state, &files, &offsets, &keys)?;
+    let (dropped, programs) = match &options.built {
+        Some(program) => (known(&state, &keys), BTreeMap::from([("lib".to_owned(), program.clone())])),
+        None => (compile(&options, &tree, &state, &files, &offsets, &keys)?, build(&options, &tree)?),
+    };
     println!("{} do not compile", dropped.len());
-    let programs = build(&options, &tree)?;
     let tests = reach(&options, &tree, &state, &programs, &keys, &dropped)?;
     run(&options, &tree, &state, &mutants, &keys, &dropped, &programs, &tests)
 }
 
 /// Copies every tracked file that changed; returns their paths.
-fn copy(tree: &Path, keep: &[String]) -> Result<Vec<String>, Failure> {
+fn copy(tree: &Path, options: &Options) -> Result<Vec<String>, Failure> {
+    let keep = &options.keep;
     let listed = Command::new("git").args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"]).output()?;
     let paths: Vec<String> =
         String::from_utf8(listed.stdout)?.split('\0').filter(|p| !p.is_empty()).map(str::to_owned).collect();
     for path in &paths {
         // Mutated files are written by `write` alone, so that unchanged ones keep their times.
-        if !path.starts_with("src/") {
+        if !path.starts_with("src/") && options.built.is_none() {
             let mut bytes = fs::read(path).unwrap_or_default();
             // The programs need all rooms; and tests in `tests` would have them built.
             if path == "Cargo.toml" && !keep.is_empty() {
@@ -240,6 +247,13 @@ fn cargo(options: &Options, tree: &Path, arguments: &[&str]) -> Result<Vec<Value
     Ok(String::from_utf8_lossy(&out.stdout).lines().filter_map(|l| serde_json::from_str(l).ok()).collect())
 }
 
+/// The mutants that did not compile in an earlier call.
+fn known(state: &Path, keys: &[String]) -> BTreeSet<usize> {
+    let text = fs::read_to_string(state.join("not-viable.txt")).unwrap_or_default();
+    let known: BTreeSet<&str> = text.lines().collect();
+    (0..keys.len()).filter(|m| known.contains(keys[*m].as_str())).collect()
+}
+
 /// Compiles, leaves out the mutants that rustc complains about, and compiles again until it is content.
 fn compile(
     options: &Options,
@@ -250,8 +264,7 @@ fn compile(
     keys: &[String],
 ) -> Result<BTreeSet<usize>, Failure> {
     let kept = state.join("not-viable.txt");
-    let known: BTreeSet<String> = fs::read_to_string(&kept).unwrap_or_default().lines().map(str::to_owned).collect();
-    let mut dropped: BTreeSet<usize> = (0..keys.len()).filter(|m| known.contains(&keys[*m])).collect();
+    let mut dropped = known(state, keys);
     for round in 0.. {
         write(tree, &options.keep, files, offsets, &dropped)?;
         let messages = cargo(options, tree, &["check", "--lib"])?;
