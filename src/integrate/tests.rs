@@ -505,6 +505,71 @@ fn two_surfaces<const N: usize, const M: usize>(
     }
 }
 
+#[test]
+fn a_layered_series_has_the_degree_that_the_tolerance_asks_for() {
+    let degree = |rtol: f64, atol: f64| Layered::<1>::new(Tolerance { rtol, atol }).statistics().highest_order;
+    // -0.85 ln of the smaller tolerance, which is taken between a sixteenth of the spacing of numbers and 1e-2; at least 8, at most what a series holds.
+    assert_eq!([degree(1e-8, 1.0), degree(1.0, 1e-8), degree(1e-12, 1e-3)], [16, 16, 24]);
+    assert_eq!([degree(1.0, 1.0), degree(1e-2, 1e-2), degree(1e-17, 1.0), degree(0.0, 0.0)], [8, 8, 31, 31]);
+}
+
+#[test]
+fn a_crossing_that_a_cap_interrupts_is_the_same_crossing() {
+    let field = caricature(Transition::Tanh, 1e-3);
+    let end = |cap| {
+        let course = Course { step_cap: cap, ..Course::to(3.0) };
+        drive(&field, START.into(), &course, &mut Layered::new(tolerance(1e-10)), &mut Ignore, &()).unwrap()
+    };
+    let (whole, pieces) = (end(StepCap::None), end(StepCap::Absolute(3e-4)));
+    assert!(pieces.statistics.steps > 20 * whole.statistics.steps);
+    assert!((pieces.x - whole.x).amax() < 1e-8, "{} {}", pieces.x, whole.x);
+}
+
+/// x'' = -x with time as a state; notes the latest time that it is asked about.
+struct Clocked(std::sync::atomic::AtomicU64);
+
+impl VectorField<3> for Clocked {
+    fn eval<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+        // Times are not negative, so that their bits have their order. Of a number with more to it (a derivative) the value is unknown here.
+        if let Some(t) = (&x[2] as &dyn std::any::Any).downcast_ref::<f64>() {
+            self.0.fetch_max(t.to_bits(), std::sync::atomic::Ordering::Relaxed);
+        }
+        vector![x[1], -x[0], S::one()]
+    }
+}
+
+/// The end of a run is a wall: the equation may not hold beyond it.
+#[test]
+fn nothing_is_asked_beyond_the_end() {
+    fn latest(mut method: impl Stepper<3>, t0: f64, t_end: f64, cap: f64) -> f64 {
+        let field = Clocked(Default::default());
+        method.restart(&field, t0, vector![1.0, 0.5, t0], t_end, cap).unwrap();
+        loop {
+            let step = method.step(&field).unwrap();
+            assert!(step.t1 <= t_end && step.length() <= cap * (1.0 + 1e-12));
+            if step.t1 == t_end {
+                break;
+            }
+        }
+        f64::from_bits(field.0.into_inner())
+    }
+    for t0 in [0.0, 50.0] {
+        for length in [1e-9, 1e-4, 0.3, 4.0] {
+            for cap in [f64::INFINITY, 0.07] {
+                let t_end = t0 + length;
+                for latest in [
+                    latest(Dopri5::new(tolerance(1e-4)), t0, t_end, cap),
+                    latest(Lsoda::new(tolerance(1e-4)), t0, t_end, cap),
+                    latest(Radau5::new(tolerance(1e-4)), t0, t_end, cap),
+                ] {
+                    let beyond = (latest - t_end) / (length + 1e-5 * t0);
+                    assert!((-1e-6..1e-6).contains(&beyond), "{latest} from {t0} to {t_end}");
+                }
+            }
+        }
+    }
+}
+
 /// A lane tells of those steps, and of no others, of which a run alone cannot say by the interpolant's reach that they miss the plane.
 #[test]
 fn lanes_tell_of_the_steps_that_may_meet_the_plane() {
@@ -543,7 +608,7 @@ fn lanes_tell_of_the_steps_that_may_meet_the_plane() {
                 .iter()
                 .map(|run| {
                     let mut may = May(plane, Vec::new(), 0);
-                    drive(&field, run.start, &run.course, &mut Dopri5::new(size), &mut may, &()).unwrap().t;
+                    let _ = drive(&field, run.start, &run.course, &mut Dopri5::new(size), &mut may, &()).unwrap();
                     all += may.2;
                     may.1
                 })

@@ -89,4 +89,12 @@ mod tests {
         assert_eq!(mean(&[7.0]), (7.0, f64::INFINITY));
         assert_eq!(mean(&[1.0, 3.0]), (2.0, 1.0));
     }
+
+    #[test]
+    fn two_degrees_of_freedom() {
+        // y = 0.3 + 0.8 x leaves -0.3, 0.9, -0.9, 0.3; sum of squares of x about its mean 5.
+        let l = line(&[(0.0, 0.0), (1.0, 2.0), (2.0, 1.0), (3.0, 3.0)]).unwrap();
+        assert!((l.slope - 0.8).abs() < 1e-15 && (l.intercept - 0.3).abs() < 1e-15, "{l:?}");
+        assert!((l.slope_error - 0.18_f64.sqrt()).abs() < 1e-15, "{l:?}");
+    }
 }

@@ -253,4 +253,17 @@ mod tests {
         assert_eq!(((a - b).c, (a + b).c, (-a).c), ([0.0, -4.0, 0.0], [-4.0, 6.0, 0.0], [2.0, -1.0, 0.0]));
         assert_eq!((a.to_f64(), Jet::<2>::pi().c), (-2.0, [std::f64::consts::PI, 0.0]));
     }
+
+    #[test]
+    fn jets_compare_by_their_values() {
+        let jet = |value: f64, slope: f64| {
+            let mut c = [0.0; 16];
+            (c[0], c[1]) = (value, slope);
+            Jet { c }
+        };
+        assert!(jet(1.0, 2.0) == jet(1.0, 3.0) && jet(1.0, 2.0) != jet(1.5, 2.0));
+        assert!(jet(1.0, 2.0) < jet(1.5, 0.0) && jet(2.0, 0.0) > jet(1.5, 3.0));
+        assert_eq!(jet(1.0, 0.0).partial_cmp(&jet(f64::NAN, 0.0)), None);
+        assert_eq!(crate::num::Scalar::to_f64(jet(0.7, 5.0)), 0.7);
+    }
 }

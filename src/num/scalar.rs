@@ -189,4 +189,13 @@ mod tests {
         assert_eq!(signs, [-1.0, 1.0, 1.0, 1.0]);
         assert_eq!([-2.0, 0.0, 3.0_f64].map(|x| Elementary::abs(x).to_f64()), [2.0, 0.0, 3.0]);
     }
+
+    #[test]
+    fn a_number_is_its_own_value() {
+        for x in [0.7, -3.0, 0.0] {
+            assert_eq!(Scalar::to_f64(x), x);
+            assert_eq!(Elementary::abs(x), if x < 0.0 { -x } else { x });
+        }
+        assert_eq!([2.5, -0.1, 0.0].map(Elementary::sign), [1.0, -1.0, 1.0]);
+    }
 }

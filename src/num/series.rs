@@ -514,4 +514,55 @@ mod tests {
             first_is(&s, |j| start * (if j % 2 == 0 { 1.0 } else { sign }) / factorial(j));
         }
     }
+
+    /// Whatever the equation: the series, put into it, satisfies it up to terms that were left out.
+    #[test]
+    fn the_series_satisfies_its_equation() {
+        fn f<S: Elementary>(x: &[S]) -> Vec<S> {
+            let c = S::from_f64;
+            vec![
+                x[1].ln() * x[0].atan() + x[2] / (x[0] + c(2.0)),
+                (x[0] * x[1]).sin() + x[2].cos() - x[1].sin() / c(3.0),
+                x[0].erf() - (x[1] + x[2]).tanh() + x[2].squared().scale(0.25) - x[0].squared() * x[0],
+                (-x[3]).exp() * (x[0] + c(1.5)).sqrt() - c(0.5) / x[1] + c(2.0) - x[3].abs() + (x[2] * x[3]).cos(),
+            ]
+        }
+        for start in [[0.4, 1.3, -0.2, 0.7], [-0.7, 2.1, 0.9, 1.1], [0.0, 0.8, 0.0, 0.6]] {
+            let s = expand(24, start, f);
+            let at = |c: &[DoubleDouble], t: f64| {
+                c.iter().rev().fold(DoubleDouble::zero(), |sum, c| sum * DoubleDouble::from_f64(t) + *c)
+            };
+            let t = 1.0 / 256.0;
+            let x: Vec<_> = (0..4).map(|i| at(s.component(i), t)).collect();
+            for (i, want) in f(&x).into_iter().enumerate() {
+                let slopes: Vec<_> = s
+                    .component(i)
+                    .iter()
+                    .enumerate()
+                    .skip(1)
+                    .map(|(k, c)| *c * DoubleDouble::from_f64(k as f64))
+                    .collect();
+                let gap = (at(&slopes, t) - want).to_f64().abs();
+                assert!(gap < 1e-27, "{start:?}, {i}: {gap:e}");
+            }
+            // The arguments of the layers, as far as they are known: those of the error function and of tanh.
+            let layers: Vec<_> = s.layer_arguments().collect();
+            assert_eq!(layers.len(), 2);
+            for (layer, of) in layers.iter().zip([&x[..1], &x[1..3]]) {
+                assert_eq!(layer.len(), 24);
+                let gap = (at(layer, t) - of.iter().fold(DoubleDouble::zero(), |sum, x| sum + *x)).to_f64().abs();
+                assert!(gap < 1e-27, "{start:?}: {gap:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_square_is_a_product_to_the_last_bits() {
+        let c: Vec<f64> = (0..12).map(|i| 1.0 / f64::from(i + 3)).collect();
+        for k in 0..12 {
+            assert!((square(&c, k) - convolution(&c, &c, 0, k)).abs() < 1e-15, "{k}");
+        }
+        assert_eq!(convolution(&c, &c, 3, 2), 0.0);
+        assert_eq!(square(&[1.0, 2.0, 3.0], 2), 10.0);
+    }
 }

@@ -877,4 +877,61 @@ mod tests {
         assert_eq!(out[0], 3.0 * 0.1 + 3.0);
         assert_eq!(t.parameters()[0].name, "p");
     }
+
+    /// The order in which an instruction takes its number and its register, for every operation and both sides.
+    #[test]
+    fn a_number_may_stand_on_either_side() {
+        fn all<S: Elementary>(x: S) -> Vec<S> {
+            let c = S::from_f64(2.5);
+            vec![c + x, x + c, c - x, x - c, c * x, x * c, c / x, x / c, -(c / (x * x))]
+        }
+        let t = Tape::record(1, |v| all(v[0]));
+        let slopes = Tape::record(1, |v| {
+            let d = Replay::new(&t, v).derivatives(&[Some(Recorded::one())]);
+            d.into_iter().map(|d| d.unwrap_or(Recorded::zero())).collect()
+        });
+        for x in [0.7, -3.0] {
+            let mut out = [0.0; 9];
+            Program::new(&t).evaluate(&[x], &mut out);
+            assert_eq!(out.as_slice(), all(x));
+            assert_eq!(t.evaluate_decimal(&[DoubleDouble::from_f64(x)]).len(), 9);
+            for (d, v) in t.evaluate_decimal(&[DoubleDouble::from_f64(x)]).iter().zip(out) {
+                assert!((d.to_f64() - v).abs() < 1e-15 * (1.0 + v.abs()));
+            }
+            Program::new(&slopes).evaluate(&[x], &mut out);
+            let (one, square) = (1.0, x * x);
+            let want = [one, one, -one, one, 2.5, 2.5, -2.5 / square, 0.4, 5.0 / (square * x)];
+            for (got, want) in out.iter().zip(want) {
+                assert!((got - want).abs() < 1e-14 * (1.0 + want.abs()), "{x}: {out:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_the_same_is_written_once_and_nothing_else() {
+        let t = Tape::record(1, |v| {
+            let number = |text: &str| Recorded::constant(&text.parse().unwrap());
+            // 0 and -0 are two numbers; parameters of one name or of one value alone are two.
+            let parameter = |name: &str, value: f64| Recorded::parameter(name, &value.into());
+            let mut sum = v[0] * number("0.1");
+            sum += number("0.1") * number("0.2");
+            sum -= number("0") * number("-0");
+            vec![
+                sum,
+                parameter("a", 1.0) * parameter("a", 2.0) * parameter("b", 1.0) * parameter("a", 1.0),
+                sum.tanh() + v[0].tanh(),
+            ]
+        });
+        let constants: Vec<f64> = t.constants().iter().map(Decimal::value).collect();
+        assert_eq!(
+            constants.iter().map(|c| c.to_bits()).collect::<Vec<_>>(),
+            [0.1, 0.2, 0.0, -0.0_f64].map(f64::to_bits)
+        );
+        let parameters: Vec<_> = t.parameters().iter().map(|p| (p.name.as_str(), p.value.value())).collect();
+        assert_eq!(parameters, [("a", 1.0), ("a", 2.0), ("b", 1.0)]);
+        assert_eq!((t.tanh_count(), t.variables()), (2, 1));
+        let mut out = [0.0; 3];
+        Program::new(&t).evaluate(&[3.0], &mut out);
+        assert_eq!(out[..2], [3.0 * 0.1 + 0.1 * 0.2 - 0.0, 2.0]);
+    }
 }

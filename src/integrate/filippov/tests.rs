@@ -343,6 +343,22 @@ fn futures_and_pasts_meet_at_a_two_fold_anywhere() {
 }
 
 #[test]
+fn a_start_on_a_visible_fold_flies_off_along_it() {
+    // f+ = (y, 1, 0) and f- = (-z, 0, 1): from a fold of one side, where the other points to the same side.
+    let system = fold(-1.0, -1.0, 0.0, 0.0);
+    for (start, side, end) in
+        [([0.0, 0.0, -0.5], Side::Plus, [0.5, 1.0, -0.5]), ([0.0, -0.5, 0.0], Side::Minus, [-0.5, -0.5, 1.0])]
+    {
+        let mut seen = Trajectory::new(1);
+        let rule = ExitRule::AtOnce { side: Side::Plus };
+        let summary = run(&system, start.into(), 1.0, &Settings::default(), rule, &mut seen).unwrap();
+        assert_eq!(seen.events.len(), 1, "{:?}", seen.events);
+        assert_eq!((seen.events[0].kind, seen.events[0].to), (EventKind::StartedOnSurface, Some(side.into())));
+        assert!((summary.x - SVector::from(end)).amax() < 1e-11, "{}", summary.x);
+    }
+}
+
+#[test]
 fn a_budget_is_an_error_where_it_is_asked_to_be() {
     let summary = |stop| FilippovSummary {
         t: 1.5,

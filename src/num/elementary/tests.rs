@@ -284,3 +284,29 @@ fn rough_functions_are_good_enough_for_step_control() {
     assert!(rough_pow(0.0, 0.5) < 1e-160 && rough_pow(0.0, 0.07) > 0.0);
     assert!(rough_pow(f64::INFINITY, 0.5) > 1e300 && rough_pow(f64::NAN, 0.5).is_nan());
 }
+
+#[test]
+fn rough_functions_at_their_ends() {
+    // Powers of two are exact, and what is beyond the normal numbers is kept at their ends.
+    for k in [-1022, -1021, -54, -1, 1, 52, 1023] {
+        let power = if k == -1022 { f64::MIN_POSITIVE } else { f64::from_bits(((1023 + k) as u64) << 52) };
+        assert_eq!(rough_exp2(f64::from(k)), power, "2^{k}");
+        assert_eq!(rough_log2(power), f64::from(k), "log2 of 2^{k}");
+    }
+    for x in [-1022.5, -1e4, f64::NEG_INFINITY] {
+        assert_eq!(rough_exp2(x), f64::MIN_POSITIVE, "{x}");
+    }
+    for x in [1023.25, 1e4, f64::INFINITY] {
+        assert_eq!(rough_exp2(x), 2.0 * f64::from_bits(2045 << 52), "{x}");
+    }
+    // Below the normal numbers the logarithm goes on, one unit a halving, and nothing jumps where they begin.
+    for k in 1..=52 {
+        assert_eq!(rough_log2(f64::from_bits(1 << (52 - k))), -1022.0 - f64::from(k), "{k}");
+    }
+    let (below, above) = (rough_log2(f64::MIN_POSITIVE.next_down()), rough_log2(f64::MIN_POSITIVE.next_up()));
+    assert!((below + 1022.0).abs() < 1e-12 && (above + 1022.0).abs() < 1e-12 && below <= above, "{below} {above}");
+    assert!(
+        rough_exp2(f64::NAN).is_nan() && rough_log2(f64::NAN).is_nan() && rough_log2(f64::INFINITY) == f64::INFINITY
+    );
+    assert!((rough_log2(0.0) + 1077.0).abs() < 1.0, "{}", rough_log2(0.0));
+}
