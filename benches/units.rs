@@ -1,4 +1,4 @@
-//! The units of work W1 and W2 (benches/README.md), by our methods: `cargo bench --bench units -- W1 A dopri5 5`.
+//! The units of work W1, W2 and W3 (benches/README.md), by our methods: `cargo bench --bench units -- W1 A dopri5 5`.
 //!
 //! Prints one line, as the programs in benches/peers do: program, unit, set, the least seconds of the given number of
 //! runs, steps, crossings, final state of the last run.
@@ -79,6 +79,14 @@ fn w2_in_lanes<F: VectorField<3>>(field: &F, set: InstructionSet) -> Done {
     })
 }
 
+/// W3: ordinary stretches of the orbit in double-double arithmetic.
+fn w3<F: VectorField<3>>(field: &F) -> Done {
+    let tolerance = Tolerance { rtol: 1e-30, atol: 1e-30 };
+    let course = Course { step_cap: StepCap::Absolute(10.0), ..Course::to(300.0) };
+    let end = drive(field, vector![0.2, 0.0, -1.0], &course, &mut Taylor::extended(tolerance), &mut Ignore, &())?;
+    Ok((end.statistics.steps, 0, end.x))
+}
+
 fn once(unit: &str, set: &str, method: &str) -> Option<Done> {
     let field = field(set);
     Some(match (unit, method) {
@@ -87,6 +95,7 @@ fn once(unit: &str, set: &str, method: &str) -> Option<Done> {
         ("W1", "radau5") => w1(&field, Radau5::new(TOLERANCE)),
         ("W1", "radau5-replaced") => w1(&field, Radau5::new(REPLACED)),
         ("W1", "taylor") => w1(&field, Taylor::new(TOLERANCE)),
+        ("W3", "taylor-extended") => w3(&field),
         ("W1", "layered") => w1(&field, Layered::new(TOLERANCE)),
         ("W2", "layered") => w2(&field, || Layered::new(TOLERANCE)),
         ("W2", "dopri5") => w2(&field, || Dopri5::new(TOLERANCE)),
@@ -105,7 +114,7 @@ fn once(unit: &str, set: &str, method: &str) -> Option<Done> {
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     let [unit, set, method, repeats] = words.iter().map(String::as_str).collect::<Vec<_>>()[..] else {
-        println!("usage: cargo bench --bench units -- W1|W2 A|B METHOD REPEATS");
+        println!("usage: cargo bench --bench units -- W1|W2|W3 A|B METHOD REPEATS");
         return;
     };
     let mut best = f64::INFINITY;

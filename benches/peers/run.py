@@ -23,6 +23,7 @@ OURS = BUILD / "units"
 
 # What is asked of whom: name, command, units of work, the row that it is measured against and the most that the ratio should be.
 W1 = ["W1 A", "W1 B"]
+W3 = ["W3 A", "W3 B"]
 PEERS = [
     ("Boost.odeint dopri5", [BUILD / "boost_dopri5"], W1 + ["W2 B"]),
     ("CVODE Adams", [BUILD / "cvode_adams"], W1),
@@ -30,7 +31,10 @@ PEERS = [
     # Its Radau IIA replaces the tolerance by 0.1 tol^(2/3); so does our row "radau5-replaced".
     ("differential-equations Radau5", [BUILD / "crates-units", "radau5"], W1),
     ("differential-equations dopri5", [BUILD / "crates-units", "dopri5"], W1),
+    # Its steps do not see the layer (heyoka_taylor.py): the second row has as many events as make its error what was asked for.
     ("heyoka Taylor, layer's edge as event", [PYTHON, HERE / "heyoka_taylor.py"], W1),
+    ("heyoka Taylor, layer resolved by events", [PYTHON, HERE / "heyoka_taylor.py", "resolved"], W1),
+    ("__float128 Taylor", [BUILD / "quad_taylor"], W3),
 ]
 METHODS = {
     "dopri5": (W1 + ["W2 B"], "Boost.odeint dopri5", 0.8),
@@ -44,7 +48,8 @@ METHODS = {
     "lsoda": (W1, "CVODE Adams", 1 / 7),
     "radau5": (W1, None, None),
     "radau5-replaced": (W1, "differential-equations Radau5", 1 / 1.5),
-    "taylor": (W1, "heyoka Taylor, layer's edge as event", 1 / 1.2),
+    "taylor": (W1, "heyoka Taylor, layer resolved by events", 1 / 1.2),
+    "taylor-extended": (W3, "__float128 Taylor", 1 / 10),
 }
 
 

@@ -12,6 +12,7 @@ cd "$here"
 g++ -O3 -march=native -std=c++17 boost_dopri5.cpp -o "$build/boost_dopri5" || echo "Boost: could not be built" >&2
 g++ -O3 -march=native -std=c++17 cvode_adams.cpp -o "$build/cvode_adams" \
     -lsundials_cvode -lsundials_nvecserial -lsundials_sunnonlinsolfixedpoint || echo "CVODE: could not be built" >&2
+g++ -O3 -march=native -std=gnu++17 quad_taylor.cpp -o "$build/quad_taylor" -lquadmath || echo "__float128: could not be built" >&2
 if [ ! -x "$build/python/bin/python" ]; then
     python3 -m venv "$build/python"
     "$build/python/bin/python" -m pip install --quiet -r requirements.txt || echo "SciPy, heyoka: could not be installed" >&2

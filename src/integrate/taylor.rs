@@ -7,18 +7,23 @@
 //! estimate sees nothing (erf(h/eps) is constant sooner; it is treated alike). (Adaptive Taylor methods without a cure get even a first crossing wrong at
 //! every tolerance.) This one knows the arguments of every tanh in the equation, because it computes their series:
 //! outside a layer, a step ends before the argument has come nearer than the layer's edge, with certainty (a bound on
-//! the argument's speed over the step, not a sample); inside, a step may change the argument by at most
-//! [`LAYER_STRIDE`], half of eps.
+//! the argument's speed over the step, not a sample). Inside, what the series of tanh leaves out has a bound, however small its last
+//! terms are (Cauchy's estimate, below), and a step is as long as keeps that below the tolerance, or as changes the argument by
+//! [`LAYER_STRIDE`], half of eps, where the series shows all that there is.
+//!
+//! **The bound.** Beyond w > 0, |tanh(w + c) - 1| = 2/|exp(2 w + 2 c) + 1| is at most M = 2/(exp(2 (w - r)) - 1) for complex |c| <= r < w. If the
+//! argument's terms allow it to move by r at most in a (complex) time R, the coefficient k of tanh's series is at most M/R^k, and what follows degree p at
+//! most M q^(p+1)/(1 - q) in a step q R (Cauchy's estimate; Henrici 1974, sec. 2.2). The edge is where tanh differs from 1 by the tolerance.
 
 use nalgebra::SVector;
 
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
 use crate::num::elementary::{exp, ln, rough_pow};
-use crate::num::series::{Constants, Solution};
+use crate::num::series::{Constants, LayerKind, Solution};
 use crate::num::{DoubleDouble, FromDecimal, MultiFloat, Scalar, Tape};
 use crate::system::VectorField;
 
-/// How far a step inside a layer may move the argument of its tanh.
+/// How far a step inside a layer may always move the argument of its tanh.
 pub const LAYER_STRIDE: f64 = 0.5;
 
 /// Jorba & Zou (2005), sec. 3: the step is shortened by exp(-0.7/(p - 1)) for safety.
@@ -92,6 +97,7 @@ pub struct Taylor<const N: usize, S = f64> {
     h: S,
     /// exp([`SAFETY_EXPONENT`]/(p - 1)).
     safety: f64,
+    layers: Layers,
     /// A layer's argument, rounded.
     argument: Vec<f64>,
     /// The last step's series, rounded.
@@ -146,6 +152,7 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
     pub fn with_order(mut self, order: usize) -> Self {
         self.order = order.max(2);
         self.safety = exp(SAFETY_EXPONENT / (self.order - 1) as f64);
+        self.layers = Layers::new::<S>(self.tolerance, self.order);
         self.statistics.highest_order = self.order as u64;
         self.solution = Solution::new(self.order, &Tape::default(), Constants::Binary);
         self
@@ -174,6 +181,7 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
             max_step: f64::INFINITY,
             h: S::zero(),
             safety: exp(SAFETY_EXPONENT / (order - 1) as f64),
+            layers: Layers::new::<S>(tolerance, order),
             argument: Vec::with_capacity(order),
             rounded: Polynomial { coefficients: vec![SVector::zeros()] },
         }
@@ -282,19 +290,14 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
     /// [`Taylor::resolved_step`] with the series in fractions of `h`, whose coefficients are of ordinary size.
     fn resolved_step_beyond_f64(&self, mut h: f64) -> f64 {
         let mut series = Vec::with_capacity(self.order);
-        for w in self.solution.layer_arguments() {
+        for (kind, w) in self.solution.layer_arguments() {
             series.clear();
             let (step, mut power) = (S::from_f64(h), S::one());
             for c in w {
                 series.push((*c * power).to_f64());
                 power = power * step;
             }
-            let fraction = if series[0].abs() >= S::TANH_SATURATION + EDGE_MARGIN {
-                free_time(&series, S::TANH_SATURATION, 1.0)
-            } else {
-                stride_time(&series, 1.0)
-            };
-            h *= fraction;
+            h *= self.layers.longest(kind, &series, 1.0);
         }
         h
     }
@@ -305,18 +308,68 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
             return self.resolved_step_beyond_f64(h);
         }
         let series = &mut self.argument;
-        for w in self.solution.layer_arguments() {
+        for (kind, w) in self.solution.layer_arguments() {
             series.clear();
             series.extend(w.iter().map(|c| c.to_f64()));
-            h = if series[0].abs() >= S::TANH_SATURATION + EDGE_MARGIN {
-                free_time(series, S::TANH_SATURATION, h)
-            } else {
-                stride_time(series, h)
-            };
+            h = self.layers.longest(kind, series, h);
         }
         h
     }
 }
+
+/// What a step may do near a layer.
+#[derive(Clone, Copy, Debug)]
+struct Layers {
+    /// erf(w), and tanh with it, is exactly +-1 beyond.
+    saturation: f64,
+    /// ln of the largest error of tanh that its series may have.
+    log_tolerance: f64,
+    /// 1 - tanh w is that error.
+    edge: f64,
+    /// p + 1.
+    terms: f64,
+}
+
+impl Layers {
+    fn new<S: Precision>(tolerance: Tolerance, order: usize) -> Self {
+        let log_tolerance = ln(tolerance.rtol.min(tolerance.atol).clamp(S::EPSILON / 16.0, 1e-2));
+        let edge = 0.5 * (std::f64::consts::LN_2 - log_tolerance);
+        Self { saturation: S::TANH_SATURATION, log_tolerance, edge, terms: (order + 1) as f64 }
+    }
+
+    /// The longest step up to `h` over which the series of the transition function with the argument `w` can be trusted.
+    fn longest(&self, kind: LayerKind, w: &[f64], h: f64) -> f64 {
+        let edge = match kind {
+            LayerKind::Tanh => self.edge,
+            LayerKind::Erf => self.saturation,
+        };
+        let distance = w[0].abs();
+        if distance >= edge + EDGE_MARGIN {
+            return free_time(w, edge, h);
+        }
+        let always = stride_time(w, LAYER_STRIDE, h);
+        match kind {
+            LayerKind::Tanh if always < h => always.max(self.estimated(distance, w, h)),
+            _ => always,
+        }
+    }
+
+    /// The longest step up to `h` that Cauchy's estimate allows, the argument of tanh being `distance` away from 0 at its start.
+    fn estimated(&self, distance: f64, w: &[f64], h: f64) -> f64 {
+        // Nearly the best radius r: exp(-2 r/(p + 1)) r is largest.
+        let r = (0.5 * self.terms).min(distance - 0.5);
+        if r <= LAYER_STRIDE {
+            return 0.0;
+        }
+        // M is below 2/(1 - 1/e) exp(-2 (distance - r)), and 1/(1 - q) at most 2.
+        let log = (self.log_tolerance - BOUND + 2.0 * (distance - r)) / self.terms;
+        let q = exp(log).min(0.5);
+        q * stride_time(w, r, h / q)
+    }
+}
+
+/// ln(4/(1 - 1/e)).
+const BOUND: f64 = 1.844_969_5;
 
 fn log2(x: f64) -> f64 {
     ln(x) * std::f64::consts::LOG2_E
@@ -356,17 +409,17 @@ fn free_time(w: &[f64], edge: f64, h: f64) -> f64 {
     s
 }
 
-/// A time in [0, h] during which the polynomial `w` certainly moves by LAYER_STRIDE at most; not much shorter than need
+/// A time in [0, h] during which the polynomial `w` certainly moves by `stride` (and a thousandth) at most; not much shorter than need
 /// be.
-fn stride_time(w: &[f64], h: f64) -> f64 {
-    if travel(w, h) <= LAYER_STRIDE {
+fn stride_time(w: &[f64], stride: f64, h: f64) -> f64 {
+    if travel(w, h) <= stride {
         return h;
     }
     // The travel is increasing and convex, so that Newton's method from the right converges from the right.
-    let mut s = h.min(LAYER_STRIDE / w[1].abs());
+    let mut s = h.min(stride / w[1].abs());
     for _ in 0..50 {
-        let excess = travel(w, s) - LAYER_STRIDE;
-        if excess <= 1e-3 * LAYER_STRIDE {
+        let excess = travel(w, s) - stride;
+        if excess <= 1e-3 * stride {
             break;
         }
         s -= excess / speed(w, s);
@@ -435,6 +488,8 @@ impl<const N: usize, S: Precision> Stepper<N> for Taylor<N, S> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::num::tape::Recorded;
+    use crate::num::{Arithmetic, Elementary};
 
     #[test]
     fn free_time_stops_before_the_layer() {
@@ -456,11 +511,49 @@ mod tests {
     #[test]
     fn stride_time_bounds_the_travel() {
         for w in [vec![3.0, 1000.0, -1e5, 3e7], vec![3.0, 0.0, 1e4], vec![0.0, -2.0]] {
-            let s = stride_time(&w, 1.0);
+            let s = stride_time(&w, LAYER_STRIDE, 1.0);
             let travelled = travel(&w, s);
             assert!((0.99..=1.001).contains(&(travelled / LAYER_STRIDE)), "{travelled}");
         }
-        assert_eq!(stride_time(&[5.0, 0.1], 1.0), 1.0);
+        assert_eq!(stride_time(&[5.0, 0.1], LAYER_STRIDE, 1.0), 1.0);
+    }
+
+    /// What the series of tanh w leaves out at the end of the longest step that is trusted, w = distance - s + bend s^2 being the argument.
+    #[track_caller]
+    fn left_out(distance: f64, bend: f64, tolerance: f64) -> (f64, f64) {
+        let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
+        let order = usize::from(order_for(tolerance, DoubleDouble::EPSILON));
+        let w = [distance, -1.0, bend];
+        let h = Layers::new::<DoubleDouble>(tolerance, order).longest(LayerKind::Tanh, &w, 1e3);
+        // x' = tanh w, w' = v, v' = 2 bend: the series of x is the integral of that of tanh w.
+        let tape = Tape::record(3, |x| vec![x[1].tanh(), x[2], Recorded::from_f64(2.0 * bend)]);
+        let mut solution = Solution::<DoubleDouble>::new(order + 1, &tape, Constants::Binary);
+        solution.expand(&[DoubleDouble::ZERO, DoubleDouble::from_f64(distance), DoubleDouble::from_f64(-1.0)]);
+        let x = solution.component(0);
+        let series = (0..=order)
+            .rev()
+            .fold(DoubleDouble::ZERO, |sum, k| sum * DoubleDouble::from_f64(h) + x[k + 1].scale((k + 1) as f64));
+        let exact = DoubleDouble::from_f64(distance) - DoubleDouble::from_f64(h)
+            + DoubleDouble::from_f64(bend) * DoubleDouble::from_f64(h).squared();
+        (h, (series - exact.tanh()).to_f64().abs())
+    }
+
+    #[test]
+    fn what_the_series_of_tanh_leaves_out_is_below_the_tolerance() {
+        for tolerance in [1e-6, 1e-8, 1e-12, 1e-20, 1e-28] {
+            let edge = 0.5 * ln(2.0 / tolerance);
+            let mut distance = 3.0;
+            while distance < edge + 4.0 {
+                for bend in [0.0, 0.05, -0.3] {
+                    let (h, error) = left_out(distance, bend, tolerance);
+                    assert!(error <= tolerance, "{distance}, {bend}, {tolerance:e}: {error:e} in a step of {h}");
+                    // Straight on, the layer is gone through in long steps: the estimate is worth its name.
+                    let long = if distance > 0.8 * edge { 2.0 * LAYER_STRIDE } else { 0.0 };
+                    assert!(bend != 0.0 || h > long, "{distance}, {tolerance:e}: a step of only {h}");
+                }
+                distance += 0.37;
+            }
+        }
     }
 
     #[test]

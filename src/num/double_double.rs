@@ -8,6 +8,8 @@
 //! The range is that of `f64`, less a margin: Dekker's splitting overflows beyond about 1e300, and products below about
 //! 1e-290 lose their low parts.
 
+mod products;
+
 use std::cmp::Ordering;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -35,10 +37,12 @@ fn quick_two_sum(a: f64, b: f64) -> (f64, f64) {
     (s, b - (s - a))
 }
 
+/// 2^27 + 1.
+const SPLITTER: f64 = 134_217_729.0;
+
 /// a = high + low, each of at most 26 bits (Dekker 1971, after Veltkamp).
 #[inline]
 fn split(a: f64) -> (f64, f64) {
-    const SPLITTER: f64 = 134_217_729.0; // 2^27 + 1
     let t = SPLITTER * a;
     let high = t - (t - a);
     (high, a - high)
@@ -259,9 +263,12 @@ impl Mul for DoubleDouble {
 
 impl Div for DoubleDouble {
     type Output = Self;
-    /// Long division: three quotients.
+    /// Long division: three quotients; two by an `f64`.
     #[inline]
     fn div(self, other: Self) -> Self {
+        if other.low == 0.0 {
+            return self.over(other.high);
+        }
         let q1 = self.high / other.high;
         let r = self - other.times_f64(q1);
         let q2 = r.high / other.high;
@@ -294,6 +301,19 @@ impl Arithmetic for DoubleDouble {
     #[inline]
     fn scale(self, factor: f64) -> Self {
         self.times_f64(factor)
+    }
+    /// Two quotients: the remainder of the first is known exactly.
+    #[inline]
+    fn over(self, divisor: f64) -> Self {
+        let quotient = self.high / divisor;
+        let (product, error) = two_product(quotient, divisor);
+        let remainder = ((self.high - product) - error) + self.low;
+        let (high, low) = quick_two_sum(quotient, remainder / divisor);
+        Self { high, low }
+    }
+    #[inline]
+    fn sum_of_products(a: &[Self], b: &[Self]) -> Self {
+        products::sum_of_products(a, b)
     }
 }
 
@@ -609,6 +629,17 @@ mod tests {
         close(DoubleDouble::HALF_PI.cos(), -1.497_384_904_859_169_8e-33);
         close((-DoubleDouble::PI).sin(), 2.994_769_809_718_339_7e-33);
         close(DoubleDouble::PI.times_f64(4.0).sin(), 1.197_907_923_887_335_9e-32);
+    }
+
+    proptest! {
+        #[test]
+        fn a_quotient_by_a_small_number(a in any(), n in 1_u32..2000) {
+            let divisor = f64::from(n);
+            let quotient = a.over(divisor);
+            let error = (quotient.times_f64(divisor) - a).to_f64().abs();
+            prop_assert!(error <= 3.0 * DoubleDouble::EPSILON * a.high.abs(), "{a:?} / {n}: {error:e}");
+            prop_assert!(gap(quotient, a / DoubleDouble::from_f64(divisor)) <= 3.0 * DoubleDouble::EPSILON);
+        }
     }
 
     #[test]

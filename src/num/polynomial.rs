@@ -522,7 +522,7 @@ mod tests {
                 assert!((got - want).abs() <= 1e-13 * (1.0 + want.abs()), "{i} {k}: {got} {want}");
             }
         }
-        let w = solution.layer_arguments().next().unwrap();
+        let (_, w) = solution.layer_arguments().next().unwrap();
         for (k, want) in w.iter().enumerate() {
             let got = flow.argument(k, &found);
             assert!((got - want).abs() <= 1e-13 * (1.0 + want.abs()), "{k}: {got} {want}");

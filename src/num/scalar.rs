@@ -41,10 +41,24 @@ pub trait Arithmetic:
     fn scale(self, factor: f64) -> Self {
         self * Self::from_f64(factor)
     }
+    /// The quotient by an `f64` constant.
+    #[inline]
+    fn over(self, divisor: f64) -> Self {
+        self / Self::from_f64(divisor)
+    }
     /// The square, by one multiplication.
     #[inline]
     fn squared(self) -> Self {
         self * self
+    }
+    /// The sum of a_i b_(n-1-i) over the n terms, as products of series need it; the slices are of one length.
+    #[inline]
+    fn sum_of_products(a: &[Self], b: &[Self]) -> Self {
+        let mut sum = Self::zero();
+        for (a, b) in a.iter().zip(b.iter().rev()) {
+            sum += *a * *b;
+        }
+        sum
     }
 }
 

@@ -14,8 +14,11 @@ use super::decimal::{Decimal, FromDecimal};
 use super::tape::{Operation, Tape};
 use super::{Arithmetic, Elementary};
 
-/// Index of a series.
+/// A series: where its coefficients begin.
 type Series = usize;
+
+/// A series of [`Recurrence::Weighted`].
+type Weights = usize;
 
 /// How the coefficients of one series come from others.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,32 +27,39 @@ enum Recurrence<S> {
     Add(Series, Series),
     Sub(Series, Series),
     Neg(Series),
+    /// Sum with a constant.
+    Shift(Series, S),
+    /// A constant less a series.
+    Minus(S, Series),
     /// Product with a constant.
     Scale(Series, S),
     /// Quotient by a constant.
     Over(Series, S),
     Mul(Series, Series),
     Div(Series, Series),
-    Exp(Series),
-    /// u = ln a: u' = a'/a.
+    /// Of the first series, whose weights are the second.
+    Exp(Series, Weights),
+    /// u = ln a: u' = a'/a. Its own weights are the next series.
     Ln(Series),
     Sqrt(Series),
     /// -1 or +1, by the value at the start of the series.
     Sign(Series),
+    /// The coefficients j a_j, those of t a'(t).
+    Weighted(Series),
     /// tanh; its companion 1 - tanh^2 is the next series.
-    Tanh(Series),
+    Tanh(Series, Weights),
     /// 1 - u^2 of the tanh u before it.
     TanhSlope(Series),
     /// Sine; the cosine is the next series.
-    Sin(Series),
+    Sin(Series, Weights),
     /// Cosine; the sine is the series before.
-    Cos(Series),
+    Cos(Series, Weights),
     /// 1 + a^2, for the arc tangent.
     OnePlusSquare(Series),
-    /// u = atan a: u' = a'/w, the series w = 1 + a^2 being the one before.
+    /// u = atan a: u' = a'/w, the series w = 1 + a^2 being the one before. Its own weights are the next series.
     Atan(Series),
     /// u = erf a: u' = a' g, the series g = 2/sqrt(pi) exp(-a^2) being the one before.
-    Erf(Series),
+    Erf(Series, Weights),
 }
 
 /// What an equation's constants and parameters, given in decimal, stand for.
@@ -63,6 +73,15 @@ pub enum Constants {
     Decimal,
 }
 
+/// A transition function that is constant, to working precision, far from the zero of its argument.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LayerKind {
+    /// tanh.
+    Tanh,
+    /// The error function.
+    Erf,
+}
+
 /// Power series in t, of the solution of x' = f(x) and of everything computed on the way.
 #[derive(Clone, Debug)]
 pub struct Solution<S> {
@@ -73,7 +92,7 @@ pub struct Solution<S> {
     recurrences: Vec<Recurrence<S>>,
     /// The series of the components' derivatives.
     outputs: Vec<Series>,
-    layer_arguments: Vec<Series>,
+    layer_arguments: Vec<(LayerKind, Series)>,
 }
 
 impl<S: Elementary + FromDecimal> Solution<S> {
@@ -106,6 +125,7 @@ impl<S: Elementary + FromDecimal> Solution<S> {
         };
         let mut compiler = Compiler {
             dimension: tape.variables(),
+            width: self.degree + 1,
             recurrences: std::mem::take(&mut self.recurrences),
             series: vec![None; tape.operations().len()],
             fixed,
@@ -115,12 +135,14 @@ impl<S: Elementary + FromDecimal> Solution<S> {
         let needed = tape.needed();
         for (node, operation) in tape.operations().iter().enumerate() {
             if let Operation::Variable(i) = operation {
-                compiler.series[node] = Some(*i);
+                compiler.series[node] = Some(*i * compiler.width);
             } else if needed[node] && compiler.fixed[node].is_none() {
                 let series = compiler.compile(*operation);
                 compiler.series[node] = Some(series);
-                if let Operation::Tanh(argument) | Operation::Erf(argument) = operation {
-                    self.layer_arguments.push(compiler.of(*argument));
+                match operation {
+                    Operation::Tanh(a) => self.layer_arguments.push((LayerKind::Tanh, compiler.of(*a))),
+                    Operation::Erf(a) => self.layer_arguments.push((LayerKind::Erf, compiler.of(*a))),
+                    _ => {}
                 }
             }
         }
@@ -133,19 +155,19 @@ impl<S: Elementary + FromDecimal> Solution<S> {
     }
 
     fn range(&self, series: Series) -> Range<usize> {
-        series * (self.degree + 1)..(series + 1) * (self.degree + 1)
+        series..series + self.degree + 1
     }
 
     /// The series of the `i`-th component of the state: coefficient j belongs to t^j.
     pub fn component(&self, i: usize) -> &[S] {
-        &self.coefficients[self.range(i)]
+        &self.coefficients[self.range(i * (self.degree + 1))]
     }
 
     /// The series of the arguments of every tanh and every erf in the equation, up to degree `degree - 1`.
-    pub fn layer_arguments(&self) -> impl Iterator<Item = &[S]> {
-        self.layer_arguments.iter().map(|series| {
+    pub fn layer_arguments(&self) -> impl Iterator<Item = (LayerKind, &[S])> {
+        self.layer_arguments.iter().map(|(kind, series)| {
             let range = self.range(*series);
-            &self.coefficients[range.start..range.end - 1]
+            (*kind, &self.coefficients[range.start..range.end - 1])
         })
     }
 
@@ -162,14 +184,13 @@ impl<S: Elementary + FromDecimal> Solution<S> {
             self.coefficients[i * width] = *value;
         }
         for k in 0..self.degree {
+            let mut series = self.dimension * width;
             for i in 0..self.recurrences.len() {
-                let series = self.dimension + i;
-                self.coefficients[series * width + k] = self.coefficient(&self.recurrences[i], series, k);
+                self.coefficients[series + k] = self.coefficient(&self.recurrences[i], series, k);
+                series += width;
             }
             for i in 0..self.dimension {
-                let output = self.outputs[i];
-                self.coefficients[i * width + k + 1] =
-                    self.coefficients[output * width + k] / S::from_f64((k + 1) as f64);
+                self.coefficients[i * width + k + 1] = self.coefficients[self.outputs[i] + k].over((k + 1) as f64);
             }
         }
     }
@@ -177,27 +198,36 @@ impl<S: Elementary + FromDecimal> Solution<S> {
     /// Coefficient `k` of a series, those below `k` of itself and up to `k` of its arguments being known.
     #[inline]
     fn coefficient(&self, recurrence: &Recurrence<S>, this: Series, k: usize) -> S {
-        let series = |n: Series| &self.coefficients[self.range(n)];
-        let one_over = |sum: S| sum / S::from_f64(k as f64);
+        let width = self.degree + 1;
+        let series = |n: Series| &self.coefficients[n..n + width];
+        let at = |n: Series| self.coefficients[n + k];
+        // Coefficient k of the integral of a' b.
+        let integral = |weights: Weights, b: &[S]| weighted(series(weights), b, k).over(k as f64);
         match *recurrence {
             Recurrence::Constant(c) if k == 0 => c,
             Recurrence::Constant(_) => S::zero(),
-            Recurrence::Add(a, b) => series(a)[k] + series(b)[k],
-            Recurrence::Sub(a, b) => series(a)[k] - series(b)[k],
-            Recurrence::Neg(a) => -series(a)[k],
-            Recurrence::Scale(a, c) => series(a)[k] * c,
-            Recurrence::Over(a, c) => series(a)[k] / c,
+            Recurrence::Add(a, b) => at(a) + at(b),
+            Recurrence::Sub(a, b) => at(a) - at(b),
+            Recurrence::Neg(a) => -at(a),
+            Recurrence::Shift(a, c) if k == 0 => at(a) + c,
+            Recurrence::Shift(a, _) => at(a),
+            Recurrence::Minus(c, a) if k == 0 => c - at(a),
+            Recurrence::Minus(_, a) => -at(a),
+            Recurrence::Scale(a, c) => at(a) * c,
+            Recurrence::Over(a, c) => at(a) / c,
             Recurrence::Mul(a, b) if a == b => square(series(a), k),
             Recurrence::Mul(a, b) => convolution(series(a), series(b), 0, k),
             Recurrence::Div(a, b) => {
                 let (a, b) = (series(a), series(b));
                 (a[k] - tail(series(this), b, k)) / b[0]
             }
-            Recurrence::Exp(a) if k == 0 => series(a)[0].exp(),
-            Recurrence::Exp(a) => one_over(weighted(series(a), series(this), k)),
+            Recurrence::Weighted(_) if k == 0 => S::zero(),
+            Recurrence::Weighted(a) => at(a).scale(k as f64),
+            Recurrence::Exp(a, _) if k == 0 => series(a)[0].exp(),
+            Recurrence::Exp(_, weights) => integral(weights, series(this)),
             Recurrence::Ln(a) if k == 0 => series(a)[0].ln(),
             // The coefficient asked for is still zero, so that the sum lacks exactly its term.
-            Recurrence::Ln(a) => (series(a)[k] - one_over(weighted(series(this), series(a), k))) / series(a)[0],
+            Recurrence::Ln(a) => (series(a)[k] - integral(this + width, series(a))) / series(a)[0],
             Recurrence::Sqrt(a) if k == 0 => series(a)[0].sqrt(),
             Recurrence::Sqrt(a) => {
                 let r = series(this);
@@ -206,31 +236,31 @@ impl<S: Elementary + FromDecimal> Solution<S> {
             }
             Recurrence::Sign(a) if k == 0 => series(a)[0].sign(),
             Recurrence::Sign(_) => S::zero(),
-            Recurrence::Tanh(a) if k == 0 => series(a)[0].tanh(),
+            Recurrence::Tanh(a, _) if k == 0 => series(a)[0].tanh(),
             // u' = a' (1 - u^2)
-            Recurrence::Tanh(a) => one_over(weighted(series(a), series(this + 1), k)),
+            Recurrence::Tanh(_, weights) => integral(weights, series(this + width)),
             Recurrence::TanhSlope(u) if k == 0 => {
-                let known = match self.recurrences[u - self.dimension] {
-                    Recurrence::Tanh(a) => series(a)[0].sech_squared(),
+                let known = match self.recurrences[u / width - self.dimension] {
+                    Recurrence::Tanh(a, _) => series(a)[0].sech_squared(),
                     _ => None,
                 };
                 // As (1 - u)(1 + u): exactly zero where tanh is saturated, and accurate near it.
                 known.unwrap_or_else(|| (S::one() - series(u)[0]) * (S::one() + series(u)[0]))
             }
             Recurrence::TanhSlope(u) => -square(series(u), k),
-            Recurrence::Sin(a) if k == 0 => series(a)[0].sin(),
-            Recurrence::Sin(a) => one_over(weighted(series(a), series(this + 1), k)),
-            Recurrence::Cos(a) if k == 0 => series(a)[0].cos(),
-            Recurrence::Cos(a) => -one_over(weighted(series(a), series(this - 1), k)),
+            Recurrence::Sin(a, _) if k == 0 => series(a)[0].sin(),
+            Recurrence::Sin(_, weights) => integral(weights, series(this + width)),
+            Recurrence::Cos(a, _) if k == 0 => series(a)[0].cos(),
+            Recurrence::Cos(_, weights) => -integral(weights, series(this - width)),
             Recurrence::OnePlusSquare(a) if k == 0 => S::one() + series(a)[0].squared(),
             Recurrence::OnePlusSquare(a) => square(series(a), k),
             Recurrence::Atan(a) if k == 0 => series(a)[0].atan(),
             Recurrence::Atan(a) => {
-                let w = series(this - 1);
-                (series(a)[k] - one_over(weighted(series(this), w, k))) / w[0]
+                let w = series(this - width);
+                (series(a)[k] - integral(this + width, w)) / w[0]
             }
-            Recurrence::Erf(a) if k == 0 => series(a)[0].erf(),
-            Recurrence::Erf(a) => one_over(weighted(series(a), series(this - 1), k)),
+            Recurrence::Erf(a, _) if k == 0 => series(a)[0].erf(),
+            Recurrence::Erf(_, weights) => integral(weights, series(this - width)),
         }
     }
 }
@@ -238,6 +268,8 @@ impl<S: Elementary + FromDecimal> Solution<S> {
 /// From a tape's operations to recurrences: terms without variables become numbers, and some functions get companions.
 struct Compiler<S> {
     dimension: usize,
+    /// Coefficients of a series.
+    width: usize,
     recurrences: Vec<Recurrence<S>>,
     /// The series of each operation, if it has one.
     series: Vec<Option<Series>>,
@@ -247,7 +279,12 @@ struct Compiler<S> {
 impl<S: Elementary> Compiler<S> {
     fn push(&mut self, recurrence: Recurrence<S>) -> Series {
         self.recurrences.push(recurrence);
-        self.dimension + self.recurrences.len() - 1
+        self.at(self.recurrences.len() - 1)
+    }
+
+    /// The series of a recurrence.
+    fn at(&self, recurrence: usize) -> Series {
+        (self.dimension + recurrence) * self.width
     }
 
     /// The series of an operation. A term without variables gets one where it is needed as such.
@@ -265,8 +302,16 @@ impl<S: Elementary> Compiler<S> {
 
     fn compile(&mut self, operation: Operation) -> Series {
         let recurrence = match operation {
-            Operation::Add(a, b) => Recurrence::Add(self.of(a), self.of(b)),
-            Operation::Sub(a, b) => Recurrence::Sub(self.of(a), self.of(b)),
+            Operation::Add(a, b) => match (self.fixed[a], self.fixed[b]) {
+                (Some(c), _) => Recurrence::Shift(self.of(b), c),
+                (None, Some(c)) => Recurrence::Shift(self.of(a), c),
+                (None, None) => Recurrence::Add(self.of(a), self.of(b)),
+            },
+            Operation::Sub(a, b) => match (self.fixed[a], self.fixed[b]) {
+                (Some(c), _) => Recurrence::Minus(c, self.of(b)),
+                (None, Some(c)) => Recurrence::Shift(self.of(a), -c),
+                (None, None) => Recurrence::Sub(self.of(a), self.of(b)),
+            },
             Operation::Mul(a, b) => match (self.fixed[a], self.fixed[b]) {
                 (_, Some(c)) => Recurrence::Scale(self.of(a), c),
                 (Some(c), None) => Recurrence::Scale(self.of(b), c),
@@ -277,30 +322,37 @@ impl<S: Elementary> Compiler<S> {
                 None => Recurrence::Div(self.of(a), self.of(b)),
             },
             Operation::Neg(a) => Recurrence::Neg(self.of(a)),
-            Operation::Exp(a) => Recurrence::Exp(self.of(a)),
-            Operation::Ln(a) => Recurrence::Ln(self.of(a)),
+            Operation::Exp(a) => {
+                let (a, weights) = self.weighted(a);
+                Recurrence::Exp(a, weights)
+            }
+            Operation::Ln(a) => {
+                let ln = Recurrence::Ln(self.of(a));
+                return self.push_with_weights(ln);
+            }
             Operation::Sqrt(a) => Recurrence::Sqrt(self.of(a)),
             Operation::Sign(a) => Recurrence::Sign(self.of(a)),
             Operation::Tanh(a) => {
-                let tanh = Recurrence::Tanh(self.of(a));
-                let tanh = self.push(tanh);
+                let (a, weights) = self.weighted(a);
+                let tanh = self.push(Recurrence::Tanh(a, weights));
                 self.push(Recurrence::TanhSlope(tanh));
                 return tanh;
             }
             Operation::Sin(a) => return self.sine(a),
-            Operation::Cos(a) => return self.sine(a) + 1,
+            Operation::Cos(a) => return self.sine(a) + self.width,
             Operation::Atan(a) => {
                 let a = self.of(a);
                 self.push(Recurrence::OnePlusSquare(a));
-                Recurrence::Atan(a)
+                return self.push_with_weights(Recurrence::Atan(a));
             }
             Operation::Erf(a) => {
-                let a = self.of(a);
+                let (a, weights) = self.weighted(a);
                 let square = self.push(Recurrence::Mul(a, a));
                 let minus = self.push(Recurrence::Neg(square));
-                let bell = self.push(Recurrence::Exp(minus));
+                let minus_weights = self.push(Recurrence::Weighted(minus));
+                let bell = self.push(Recurrence::Exp(minus, minus_weights));
                 self.push(Recurrence::Scale(bell, S::from_f64(2.0) / S::pi().sqrt()));
-                Recurrence::Erf(a)
+                Recurrence::Erf(a, weights)
             }
             Operation::Variable(_) | Operation::Constant(_) | Operation::Parameter(_) | Operation::Pi => {
                 unreachable!("variables have series from the start, terms without variables are numbers")
@@ -309,14 +361,31 @@ impl<S: Elementary> Compiler<S> {
         self.push(recurrence)
     }
 
+    /// The series of an operation, and that of its weights.
+    fn weighted(&mut self, node: usize) -> (Series, Weights) {
+        let a = self.of(node);
+        let weights = match self.recurrences.iter().position(|r| *r == Recurrence::Weighted(a)) {
+            Some(known) => self.at(known),
+            None => self.push(Recurrence::Weighted(a)),
+        };
+        (a, weights)
+    }
+
+    /// A recurrence that asks for its own weights, which follow it.
+    fn push_with_weights(&mut self, recurrence: Recurrence<S>) -> Series {
+        let series = self.push(recurrence);
+        self.push(Recurrence::Weighted(series));
+        series
+    }
+
     /// The sine of an operation, followed by its cosine; both from one pair.
     fn sine(&mut self, node: usize) -> Series {
-        let a = self.of(node);
-        if let Some(i) = self.recurrences.iter().position(|r| *r == Recurrence::Sin(a)) {
-            return self.dimension + i;
+        let (a, weights) = self.weighted(node);
+        if let Some(i) = self.recurrences.iter().position(|r| *r == Recurrence::Sin(a, weights)) {
+            return self.at(i);
         }
-        let sine = self.push(Recurrence::Sin(a));
-        self.push(Recurrence::Cos(a));
+        let sine = self.push(Recurrence::Sin(a, weights));
+        self.push(Recurrence::Cos(a, weights));
         sine
     }
 }
@@ -324,15 +393,10 @@ impl<S: Elementary> Compiler<S> {
 /// sum over j from `first` to k of a_j b_(k-j).
 #[inline]
 fn convolution<S: Arithmetic>(a: &[S], b: &[S], first: usize, k: usize) -> S {
-    let mut sum = S::zero();
     if k < first {
-        return sum;
+        return S::zero();
     }
-    // As slices of one length, so that nothing is checked term by term.
-    for (a, b) in a[first..=k].iter().zip(b[..=k - first].iter().rev()) {
-        sum += *a * *b;
-    }
-    sum
+    S::sum_of_products(&a[first..=k], &b[..=k - first])
 }
 
 /// sum over j from 1 to k of c_(k-j) b_j: what the known part of a quotient c = a/b contributes to a.
@@ -344,11 +408,8 @@ fn tail<S: Arithmetic>(c: &[S], b: &[S], k: usize) -> S {
 /// Coefficient k of a^2, each product once.
 #[inline]
 fn square<S: Arithmetic>(a: &[S], k: usize) -> S {
-    let mut sum = S::zero();
     let half = k.div_ceil(2);
-    for (left, right) in a[..half].iter().zip(a[k + 1 - half..=k].iter().rev()) {
-        sum += *left * *right;
-    }
+    let mut sum = S::sum_of_products(&a[..half], &a[k + 1 - half..=k]);
     sum += sum;
     if k.is_multiple_of(2) {
         sum += a[k / 2].squared();
@@ -356,14 +417,10 @@ fn square<S: Arithmetic>(a: &[S], k: usize) -> S {
     sum
 }
 
-/// sum over j from 1 to k of j a_j b_(k-j): k times the coefficient k of the integral of a' b.
+/// sum over j from 1 to k of j a_j b_(k-j), from the `weights` j a_j: k times the coefficient k of the integral of a' b.
 #[inline]
-fn weighted<S: Arithmetic>(a: &[S], b: &[S], k: usize) -> S {
-    let mut sum = S::zero();
-    for ((j, a), b) in (1..).zip(&a[1..=k]).zip(b[..k].iter().rev()) {
-        sum += a.scale(f64::from(j)) * *b;
-    }
-    sum
+fn weighted<S: Arithmetic>(weights: &[S], b: &[S], k: usize) -> S {
+    S::sum_of_products(&weights[1..=k], &b[..k])
 }
 
 #[cfg(test)]
@@ -450,7 +507,7 @@ mod tests {
         let s = expand(10, [0.0, 0.0], |x| vec![x[1].tanh(), Recorded::one()]);
         first_is(&s, |j| want[j]);
         assert_eq!(s.layer_arguments().count(), 1);
-        assert_eq!(s.layer_arguments().next().unwrap()[1], DoubleDouble::one());
+        assert_eq!(s.layer_arguments().next().unwrap().1[1], DoubleDouble::one());
     }
 
     #[test]
@@ -503,7 +560,8 @@ mod tests {
     #[test]
     fn sine_and_cosine_share_a_pair() {
         let s = expand(3, [0.3, 0.4], |x| vec![x[1].cos(), x[1].sin() + x[1].cos()]);
-        assert_eq!(s.recurrences.len(), 3);
+        // Weights, sine, cosine, their sum.
+        assert_eq!(s.recurrences.len(), 4);
     }
 
     #[test]
