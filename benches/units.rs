@@ -1,4 +1,4 @@
-//! The units of work W1, W2 and W3 (benches/README.md), by our methods: `cargo bench --bench units -- W1 A dopri5 5`.
+//! The units of work W0 to W3 (benches/README.md), by our methods: `cargo bench --bench units -- W1 A dopri5 5`.
 //!
 //! Prints one line, as the programs in benches/peers do: program, unit, set, the least seconds of the given number of
 //! runs, steps, crossings, final state of the last run.
@@ -18,6 +18,12 @@ const TOLERANCE: Tolerance = Tolerance { rtol: 1.0536712e-8, atol: 1.0536712e-8 
 
 /// What Hairer & Wanner's program, and others after it, make of [`TOLERANCE`]: 0.1 rtol^(2/3).
 const REPLACED: Tolerance = Tolerance { rtol: 4.806217345097476e-07, atol: 4.806217345097476e-07 };
+
+/// With which Radau IIA's error at the end of W0 is below that of the crate `differential-equations` in both sets.
+const MATCHED: Tolerance = Tolerance { rtol: 1e-5, atol: 1e-5 };
+
+/// For double-double arithmetic.
+const EXACT: Tolerance = Tolerance { rtol: 1e-30, atol: 1e-30 };
 
 type Field = Smoothed<Caricature>;
 
@@ -79,21 +85,36 @@ fn w2_in_lanes<F: VectorField<3>>(field: &F, set: InstructionSet) -> Done {
     })
 }
 
+/// W0: the short stretch on which the error is known.
+fn w0<F: VectorField<3>, M: Stepper<3>>(field: &F, mut stepper: M) -> Done {
+    let course = Course { step_cap: StepCap::Absolute(10.0), ..Course::to(10.0) };
+    let end = drive(field, vector![0.2, 0.0, -1.0], &course, &mut stepper, &mut Ignore, &())?;
+    Ok((end.statistics.steps, 0, end.x))
+}
+
 /// W3: ordinary stretches of the orbit in double-double arithmetic.
 fn w3<F: VectorField<3>>(field: &F) -> Done {
-    let tolerance = Tolerance { rtol: 1e-30, atol: 1e-30 };
     let course = Course { step_cap: StepCap::Absolute(10.0), ..Course::to(300.0) };
-    let end = drive(field, vector![0.2, 0.0, -1.0], &course, &mut Taylor::extended(tolerance), &mut Ignore, &())?;
+    let end = drive(field, vector![0.2, 0.0, -1.0], &course, &mut Taylor::extended(EXACT), &mut Ignore, &())?;
     Ok((end.statistics.steps, 0, end.x))
 }
 
 fn once(unit: &str, set: &str, method: &str) -> Option<Done> {
     let field = field(set);
     Some(match (unit, method) {
+        ("W0", "dopri5") => w0(&field, Dopri5::new(TOLERANCE)),
+        ("W0", "lsoda") => w0(&field, Lsoda::new(TOLERANCE)),
+        ("W0", "radau5") => w0(&field, Radau5::new(TOLERANCE)),
+        ("W0", "radau5-replaced") => w0(&field, Radau5::new(REPLACED)),
+        ("W0", "radau5-matched") => w0(&field, Radau5::new(MATCHED)),
+        ("W0", "taylor") => w0(&field, Taylor::new(TOLERANCE)),
+        ("W0", "layered") => w0(&field, Layered::new(TOLERANCE)),
+        ("W0", "taylor-extended") => w0(&field, Taylor::extended(EXACT)),
         ("W1", "dopri5") => w1(&field, Dopri5::new(TOLERANCE)),
         ("W1", "lsoda") => w1(&field, Lsoda::new(TOLERANCE)),
         ("W1", "radau5") => w1(&field, Radau5::new(TOLERANCE)),
         ("W1", "radau5-replaced") => w1(&field, Radau5::new(REPLACED)),
+        ("W1", "radau5-matched") => w1(&field, Radau5::new(MATCHED)),
         ("W1", "taylor") => w1(&field, Taylor::new(TOLERANCE)),
         ("W3", "taylor-extended") => w3(&field),
         ("W1", "layered") => w1(&field, Layered::new(TOLERANCE)),
@@ -114,7 +135,7 @@ fn once(unit: &str, set: &str, method: &str) -> Option<Done> {
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     let [unit, set, method, repeats] = words.iter().map(String::as_str).collect::<Vec<_>>()[..] else {
-        println!("usage: cargo bench --bench units -- W1|W2|W3 A|B METHOD REPEATS");
+        println!("usage: cargo bench --bench units -- W0|W1|W2|W3 A|B METHOD REPEATS");
         return;
     };
     let mut best = f64::INFINITY;

@@ -1,4 +1,4 @@
-// Units of work W1 and W2 (benches/README.md) with Boost.odeint's Dormand-Prince 5(4) and its dense output.
+// Units of work W0, W1 and W2 (benches/README.md) with Boost.odeint's Dormand-Prince 5(4) and its dense output.
 //
 //     g++ -O3 -march=native -std=c++17 boost_dopri5.cpp -o boost_dopri5 && ./boost_dopri5 W1 A 5
 //
@@ -83,7 +83,7 @@ void run(const Caricature &field, State x, double t_end, double every, double ca
 
 int main(int argc, char **argv) {
     if (argc != 4) {
-        std::fprintf(stderr, "usage: boost_dopri5 W1|W2 A|B REPEATS\n");
+        std::fprintf(stderr, "usage: boost_dopri5 W0|W1|W2 A|B REPEATS\n");
         return 2;
     }
     const bool a = std::strcmp(argv[2], "A") == 0;
@@ -95,6 +95,8 @@ int main(int argc, char **argv) {
         result = {};
         if (std::strcmp(argv[1], "W1") == 0) {
             run<true>(field, {0.2, 0.0, -1.0}, 2e5, 100.0, 10.0, result);
+        } else if (std::strcmp(argv[1], "W0") == 0) {
+            run<false>(field, {0.2, 0.0, -1.0}, 10.0, 10.0, 10.0, result);
         } else {
             for (int k = 0; k < 1000; ++k) {
                 run<false>(field, {0.1 + 0.2 * (k + 0.5) / 1000.0, 0.0, -1.0}, 2000.0, 2000.0, 10.0, result);

@@ -1,11 +1,10 @@
-"""Unit of work W1 (benches/README.md) with heyoka's adaptive Taylor method.
+"""Units of work W0 and W1 (benches/README.md) with heyoka's adaptive Taylor method.
 
     python heyoka_taylor.py [resolved] W1 A 5
-    python heyoka_taylor.py errors
 
 Terminal events at the layer's edge, x = +-20 eps, and at x = 0 end the steps there; every y = 0 crossing is an event. That is not enough for the
 layer to be seen: far from its middle tanh's series has no terms large enough for the step control to notice, and a step goes from the edge to the middle as if
-tanh were constant. With `resolved`, events in between make the error what was asked for; `errors` says how large it is either way.
+tanh were constant. With `resolved`, events in between make the error what was asked for; W0 says how large it is either way.
 Prints: peer, unit, set, the least seconds of processor time of the given number of runs, steps, crossings, final state of the last run.
 """
 
@@ -33,7 +32,7 @@ def go_on(_ta, _sign):
     return True
 
 
-def integrator(which, tolerance, edges, section):
+def integrator(which, edges):
     alpha, beta = (1e-3, 1e-5) if which == "A" else (1e-1, 1e-4)
     phi = 0.5 * (1.0 + hy.tanh(x / EPS))
     r2 = x * x + y * y + z * z
@@ -46,46 +45,26 @@ def integrator(which, tolerance, edges, section):
     return hy.taylor_adaptive(
         system,
         [0.2, 0.0, -1.0],
-        tol=tolerance,
+        tol=TOLERANCE,
         t_events=events,
-        nt_events=[hy.nt_event(y, crossed)] if section else [],
+        nt_events=[hy.nt_event(y, crossed)],
     )
-
-
-def errors():
-    print("set, time: largest error of a component (steps) with events at the edge; resolved")
-    for which in "AB":
-        for t_end in (2.0, 5.0, 10.0):
-
-            def end(tolerance, edges):
-                ta = integrator(which, tolerance, edges, False)
-                steps = ta.propagate_until(t_end, max_delta_t=10.0)[3]
-                return list(ta.state), steps
-
-            exact, _ = end(1e-15, [-20 + 0.25 * i for i in range(161)])
-            found = []
-            for edges in (EDGES, RESOLVED):
-                state, steps = end(TOLERANCE, edges)
-                found.append(f"{max(abs(a - b) for a, b in zip(state, exact)):.1e} ({steps})")
-            print(f"{which}, {t_end:g}: {found[0]}; {found[1]}")
 
 
 def main():
     global crossings
-    if sys.argv[1] == "errors":
-        errors()
-        return
     unit, which, repeats = sys.argv[-3], sys.argv[-2], int(sys.argv[-1])
-    assert unit == "W1", "only W1"
+    assert unit in ("W0", "W1"), "only W0, W1"
+    segments, length = (1, 10.0) if unit == "W0" else (2000, 100.0)
     resolved = "resolved" in sys.argv
-    ta = integrator(which, TOLERANCE, RESOLVED if resolved else EDGES, True)
+    ta = integrator(which, RESOLVED if resolved else EDGES)
     best = math.inf
     for _ in range(repeats):
         start = time.process_time()
         ta.time, ta.state[:], steps, crossings = 0.0, [0.2, 0.0, -1.0], 0, 0
         ta.reset_cooldowns()
-        for segment in range(2000):
-            outcome = ta.propagate_until(100.0 * (segment + 1), max_delta_t=10.0)
+        for segment in range(segments):
+            outcome = ta.propagate_until(length * (segment + 1), max_delta_t=10.0)
             steps += outcome[3]
         best = min(best, time.process_time() - start)
     s = ta.state

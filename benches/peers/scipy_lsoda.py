@@ -1,4 +1,4 @@
-"""Unit of work W1 (benches/README.md) with SciPy's LSODA (ODEPACK) and a right-hand side compiled by Numba.
+"""Units of work W0 and W1 (benches/README.md) with SciPy's LSODA (ODEPACK) and a right-hand side compiled by Numba.
 
     python scipy_lsoda.py W1 A 5
 
@@ -28,7 +28,8 @@ def field(s, _, alpha, beta):
 
 
 unit, which, repeats = sys.argv[1], sys.argv[2], int(sys.argv[3])
-assert unit == "W1", "only W1"
+assert unit in ("W0", "W1"), "only W0, W1"
+segments, length = (1, 10.0) if unit == "W0" else (2000, 100.0)
 parameters = (1e-3, 1e-5) if which == "A" else (1e-1, 1e-4)
 tolerance = 1.0536712e-8
 field(np.array([0.2, 0.0, -1.0]), 0.0, *parameters)
@@ -36,8 +37,8 @@ best = math.inf
 for _ in range(repeats):
     start = time.process_time()
     state, steps = np.array([0.2, 0.0, -1.0]), 0
-    for _ in range(2000):
-        states, info = odeint(field, state, [0.0, 100.0], parameters, rtol=tolerance, atol=tolerance, hmax=10.0,
+    for _ in range(segments):
+        states, info = odeint(field, state, [0.0, length], parameters, rtol=tolerance, atol=tolerance, hmax=10.0,
                               mxstep=10**8, full_output=True)
         state, steps = states[-1], steps + info["nst"][-1]
     best = min(best, time.process_time() - start)

@@ -1,4 +1,4 @@
-//! Unit of work W1 (benches/README.md) with the `differential-equations` crate: crates-units W1 A radau5|dopri5 5
+//! Units of work W0 and W1 (benches/README.md) with the `differential-equations` crate: crates-units W0|W1 A radau5|dopri5 5
 //!
 //! Prints: peer, unit, set, the least seconds of processor time of the given number of runs, steps, crossings, final state.
 //!
@@ -101,10 +101,11 @@ impl Solout<f64, [f64; 3]> for &mut Section {
     }
 }
 
-fn w1(system: &Caricature, method: &str) -> Option<Section> {
+/// So many segments of such a length.
+fn run(system: &Caricature, method: &str, segments: u32, length: f64) -> Option<Section> {
     let mut section = Section { end: [0.2, 0.0, -1.0], ..Section::default() };
-    for k in 1..=2000 {
-        let end = 100.0 * f64::from(k);
+    for k in 1..=segments {
+        let end = length * f64::from(k);
         while section.t < end {
             let (t, x) = (section.t, section.end);
             let done = match method {
@@ -141,8 +142,8 @@ fn seconds() -> f64 {
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    let [_, set, method, repeats] = words.iter().map(String::as_str).collect::<Vec<_>>()[..] else {
-        eprintln!("usage: crates-units W1 A|B radau5|dopri5 REPEATS");
+    let [unit, set, method, repeats] = words.iter().map(String::as_str).collect::<Vec<_>>()[..] else {
+        eprintln!("usage: crates-units W0|W1 A|B radau5|dopri5 REPEATS");
         std::process::exit(2);
     };
     let system =
@@ -151,7 +152,7 @@ fn main() {
     let mut last = None;
     for _ in 0..repeats.parse().unwrap_or(1) {
         let start = seconds();
-        last = w1(&system, method);
+        last = if unit == "W0" { run(&system, method, 1, 10.0) } else { run(&system, method, 2000, 100.0) };
         best = best.min(seconds() - start);
     }
     let Some(Section { steps, crossings, end: [x, y, z], given_up, .. }) = last else {
@@ -161,5 +162,5 @@ fn main() {
     if given_up > 0 {
         eprintln!("gave up {given_up} times (\"step size became too small\") and was started again");
     }
-    println!("differential-equations-{method} W1 {set} {best:.6} {steps} {crossings} {x} {y} {z}");
+    println!("differential-equations-{method} {unit} {set} {best:.6} {steps} {crossings} {x} {y} {z}");
 }
