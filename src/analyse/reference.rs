@@ -12,8 +12,9 @@ use crate::system::VectorField;
 /// A point in double-double precision.
 pub type ExtendedPoint<const N: usize = 3> = SVector<DoubleDouble, N>;
 
-/// The local tolerance of reference orbits: at the precision of the arithmetic.
-pub const REFERENCE_TOLERANCE: Tolerance = Tolerance { rtol: 1e-32, atol: 1e-32 };
+/// The local tolerance of reference orbits: below the precision of the arithmetic, since what a step leaves out just before a two-fold has grown by 10^15 after
+/// it, and roundings, unlike it, may cancel.
+pub const REFERENCE_TOLERANCE: Tolerance = Tolerance { rtol: 1e-33, atol: 1e-33 };
 
 /// The plane through which crossings are counted: `state[coordinate] = value`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
