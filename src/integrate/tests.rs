@@ -803,38 +803,38 @@ const RADAU5: &str = "
     no number: 0 steps, 0 passages, 44e98c1ddd9d1f0d
 ";
 const TAYLOR: &str = "
-    plain: 171 steps, 4 passages, c6e38b82a2d2558f
-    coarse: 172 steps, 4 passages, 136940ef1008f495
-    fine: 84 steps, 2 passages, 1495e95882301353
-    sphere: 86 steps, 2 passages, 638b9dccc4d511d6
-    cube: 108 steps, 2 passages, b131ce284c7e615a
-    normal: 100 steps, 2 passages, 0346820f45f6985b
-    circle of two: 86 steps, 2 passages, 5d6fa0990bb1474d
-    cap: 128 steps, 2 passages, 2aa58e840a27b65b
-    few: 20 steps, 1 passages, b8c9562755db0573
-    wide layer: 19 steps, 3 passages, 241f185640c97e35
-    circle: 2 steps, 0 passages, b2f91aeb0e9e6dc7
-    crossed: 216 steps, 6 passages, 18014caa8caa92f6
-    crossed, coarse: 363 steps, 13 passages, c789c0c03421f0ed
-    van der Pol: 54 steps, 4 passages, 896182b6c12a5b30
-    van der Pol, coarse: 98 steps, 4 passages, b3c9766c82001b8e
-    van der Pol, stiff: 461 steps, 4 passages, 140f2d9b776728b1
-    decay: 289 steps, 2 passages, 9599ad30e200bef6
+    plain: 66 steps, 4 passages, 3ae94478e15cc9b6
+    coarse: 58 steps, 4 passages, 2c4d6318807db012
+    fine: 37 steps, 2 passages, ea8a6964de54ac4f
+    sphere: 31 steps, 2 passages, 263a293a31e4574c
+    cube: 56 steps, 2 passages, 6981a121ad8627b6
+    normal: 46 steps, 2 passages, 35957a9481624797
+    circle of two: 31 steps, 2 passages, 84dfa3e13e026112
+    cap: 75 steps, 2 passages, 7d1bea655b2c22fd
+    few: 20 steps, 2 passages, f8f290fa44a579cf
+    wide layer: 19 steps, 3 passages, a9378df8dba1063f
+    circle: 2 steps, 0 passages, b68c6429402f0b10
+    crossed: 148 steps, 6 passages, 16b7d9f3dc51f778
+    crossed, coarse: 281 steps, 13 passages, 0f88487c1faa3b12
+    van der Pol: 54 steps, 4 passages, a0d24becb34f8e46
+    van der Pol, coarse: 98 steps, 4 passages, 875e17ffab9cb3fc
+    van der Pol, stiff: 461 steps, 4 passages, 2cb92e9ac663dc3f
+    decay: 289 steps, 2 passages, ffaa28a696201d5f
     at rest: 1 steps, 0 passages, e608df1a4ab157ce
-    nearly at rest: 16 steps, 1 passages, 6087abf8dce659f5
-    explosion: 204 steps, 1 passages, e1de3e2515f03a82
-    root: 10 steps, 1 passages, 25ec74f4058ca634
+    nearly at rest: 16 steps, 1 passages, b1cb38d502e9c639
+    explosion: 204 steps, 1 passages, b1e8c9f989be5686
+    root: 10 steps, 1 passages, ce0ce465dc2e8dbf
     no number: 0 steps, 0 passages, 9386fb9c2b95cfe7
 ";
 const TAYLOR_EXTENDED: &str = "
-    plain: 125 steps, 2 passages, 5b0e6bf14c8b0252
-    plain: 124 steps, 2 passages, 02272d845ecfb477
-    plain: 167 steps, 2 passages, 2dae2256680a517c
-    plain: 158 steps, 2 passages, 3bb6873f1ad3713c
-    cube: 53 steps, 2 passages, 3124126ea4ec12c2
-    cube: 51 steps, 2 passages, 71627af9a717cb7d
-    cube: 87 steps, 2 passages, fd5c5bb5f3e23c35
-    cube: 54 steps, 2 passages, e8ea436f8287b06a
+    plain: 54 steps, 2 passages, 9d32d197d129b6b8
+    plain: 49 steps, 2 passages, 58d4ff0b6e4ee2fb
+    plain: 112 steps, 2 passages, c3e4eeba8342442f
+    plain: 57 steps, 2 passages, ebef3bf5d90d38b6
+    cube: 34 steps, 2 passages, 94004a5e2d747856
+    cube: 31 steps, 2 passages, 926a4253a69763a4
+    cube: 78 steps, 2 passages, ad31ea8704997ea1
+    cube: 36 steps, 2 passages, 6ed2710841ecce40
     circle: 1 steps, 0 passages, bc5962590b1840c0
     circle: 1 steps, 0 passages, cdf67ab3791acc9f
     circle: 3 steps, 0 passages, 49c72e1b5ffae2c7
