@@ -8,7 +8,7 @@ use twofold::cli::in_pool;
 use twofold::job::Desk;
 use twofold::paper::checkpoints::{self, Checkpoints};
 use twofold::paper::figures;
-use twofold::paper::pipeline::{Computed, compute, questions};
+use twofold::paper::pipeline::{compute, compute_with_tables, questions};
 use twofold::paper::{Alterations, Figure};
 use twofold::record::{Hash, Manifest};
 
@@ -128,9 +128,12 @@ fn all_hashes(threads: usize) -> Vec<String> {
         pictures
             .iter()
             .map(|p| {
-                let Computed { record, tables, .. } = compute(p, &desk).unwrap();
-                let tables: Vec<Hash> = tables.iter().map(|(_, bytes)| Hash::of(bytes)).collect();
-                format!("{:?} {tables:?}", record.hashes)
+                let mut tables = Vec::new();
+                let computed = compute_with_tables(p, &desk, &mut |name, bytes| {
+                    tables.push((name.to_owned(), Hash::of(bytes)));
+                    Ok(())
+                });
+                format!("{:?} {tables:?}", computed.unwrap().record.hashes)
             })
             .collect()
     })

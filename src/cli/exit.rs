@@ -117,7 +117,8 @@ impl CliError {
             CliError::Pipeline(PipelineError::Render { .. }) => Exit::Failed,
             CliError::Stopped { exit, .. } => *exit,
             CliError::Differs(_) => Exit::CheckFailed,
-            CliError::Usage(_)
+            CliError::Pipeline(PipelineError::Table(_))
+            | CliError::Usage(_)
             | CliError::NoEffect { .. }
             | CliError::NoSuchPanel { .. }
             | CliError::Spec(_)

@@ -14,7 +14,7 @@ use super::{CliError, Exit, LONG_VERSION, in_pool, interrupt};
 use crate::integrate::filippov::ExitRule;
 use crate::job::spec::{RunSpec, SwitchSpec};
 use crate::job::{Desk, Store};
-use crate::paper::pipeline::{Computed, PictureRecord, compute, questions};
+use crate::paper::pipeline::{Computed, PictureRecord, PipelineError, compute_with_tables, questions};
 use crate::paper::{Alterations, Figure, Panel, Picture, View, figures};
 use crate::record::files::{read, still_there, try_folder};
 use crate::record::{FileError, write};
@@ -174,8 +174,14 @@ pub fn make(figures: &[Figure], out: &Path, desk: &Desk<'_>) -> Result<Vec<Pictu
     let results: Vec<Result<(PictureRecord, Vec<Written>), CliError>> = pictures
         .par_iter()
         .map(|(folder, picture)| {
-            let computed = compute(picture, desk)?;
-            let written = write_picture(folder, &computed)?;
+            let mut written = Vec::new();
+            let mut keep = |file: &str, bytes: &[u8]| Ok(written.push(put(folder, file, bytes)?));
+            let computed = compute_with_tables(picture, desk, &mut keep).map_err(|error| match error {
+                PipelineError::Table(file) => CliError::from(file),
+                other => other.into(),
+            })?;
+            write_picture(folder, &computed, &mut written)?;
+            desk.forget();
             let name = &computed.record.hashes.name;
             desk.progress().line(&format!("wrote {}", folder.join(format!("{name}.png")).display()));
             Ok((computed.record, written))
@@ -214,25 +220,28 @@ fn say_how(figures: &[Figure], arguments: &FigureFlags, progress: &Progress) -> 
 /// A file and its length.
 type Written = (PathBuf, u64);
 
-/// Writes a picture's files: data first, the record last, so that a record vouches for everything beside it.
-fn write_picture(folder: &Path, computed: &Computed) -> Result<Vec<Written>, FileError> {
+/// Writes a file.
+fn put(folder: &Path, file: &str, bytes: &[u8]) -> Result<Written, FileError> {
+    let path = folder.join(file);
+    write(&path, bytes)?;
+    Ok((path, bytes.len() as u64))
+}
+
+/// Writes a picture's files, its tables being there: the record last, so that a record vouches for everything beside it.
+fn write_picture(folder: &Path, computed: &Computed, written: &mut Vec<Written>) -> Result<(), FileError> {
     let name = &computed.record.hashes.name;
     let mut json = serde_json::to_vec_pretty(&computed.record).expect("a record is plain data");
     json.push(b'\n');
-    let tables = computed.tables.iter().map(|(label, table)| (format!("{name}-{label}.csv"), table));
     let files = [
         (format!("{name}.png"), &computed.rendered.png),
         (format!("{name}.svg"), &computed.rendered.svg),
         (format!("{name}.pdf"), &computed.rendered.pdf),
         (format!("{name}.json"), &json),
     ];
-    let mut written = Vec::new();
-    for (file, bytes) in tables.chain(files) {
-        let path = folder.join(file);
-        write(&path, bytes)?;
-        written.push((path, bytes.len() as u64));
+    for (file, bytes) in files {
+        written.push(put(folder, &file, bytes)?);
     }
-    Ok(written)
+    Ok(())
 }
 
 /// Refuses a flag that changes none of these figures.

@@ -119,10 +119,26 @@ impl<'a> Desk<'a> {
         Ok(Arc::new(answer))
     }
 
-    /// Asks all these questions side by side on the current thread pool: first what others rest on, and of that the longest. Errors wait in the
-    /// desk until they are asked for.
+    /// Sees to it that all these questions have answers, side by side on the current thread pool: first what others rest on, and of that the longest. With a
+    /// store, answers are there and not in memory. Errors wait in the desk until they are asked for, or are met again.
     pub fn gather(&self, questions: &[AnyQuestion]) {
-        Plan::of(questions).carry_out(|question| drop(self.ask(&**question)));
+        Plan::of(questions).carry_out(|question| match &self.store {
+            Some(store) if store.has(&key(&**question)) => {}
+            _ => drop(self.ask(&**question)),
+        });
+        if self.store.is_some() {
+            self.forget();
+        }
+    }
+
+    /// Lets go of every answer that the store has and nobody holds.
+    pub fn forget(&self) {
+        let Some(store) = &self.store else { return };
+        let mut answers = self.answers.lock().unwrap_or_else(PoisonError::into_inner);
+        answers.retain(|key, cell| {
+            let unused = cell.get().is_some_and(|answer| answer.as_ref().is_ok_and(|a| Arc::strong_count(a) == 1));
+            !(unused && store.has(key))
+        });
     }
 }
 

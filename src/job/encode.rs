@@ -188,8 +188,15 @@ const COMMENT: &str = "# ";
 /// CSV: a comment line of metadata as JSON (`about` is whatever its maker wants to say), a line of column names, then a row per line with
 /// shortest round-trip numbers; blanks are empty. A file that was cut short can say so in a last comment line ([`cut_short`]).
 pub fn csv(table: &Table, about: &Value) -> Vec<u8> {
-    let mut bytes = csv_head(table, about);
-    bytes.extend(csv_rows(table));
+    csv_of_parts(&[table], about)
+}
+
+/// [`csv()`] of tables with the same columns, as if they were one: the rows of the first, then those of the second, and so on. Nothing for no table.
+pub fn csv_of_parts(tables: &[&Table], about: &Value) -> Vec<u8> {
+    let mut bytes = tables.first().map_or_else(Vec::new, |first| csv_head(first, about));
+    for table in tables {
+        bytes = csv_rows_after(bytes, table);
+    }
     bytes
 }
 
@@ -205,7 +212,11 @@ pub fn csv_head(table: &Table, about: &Value) -> Vec<u8> {
 
 /// The rest of [`csv()`]: a line for each row.
 pub fn csv_rows(table: &Table) -> Vec<u8> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
+    csv_rows_after(Vec::new(), table)
+}
+
+fn csv_rows_after(bytes: Vec<u8>, table: &Table) -> Vec<u8> {
+    let mut writer = csv::Writer::from_writer(bytes);
     let written = (|| {
         let mut text = String::new();
         for row in 0..table.len() {
@@ -257,7 +268,8 @@ pub fn stop_of_csv(bytes: &[u8]) -> Option<Stop> {
     serde_json::from_value(Value::String(String::from_utf8_lossy(word).into_owned())).ok()
 }
 
-/// The shortest text that reads as this number; nothing for a blank.
+/// The shortest text that reads as this number; nothing for a blank. (The faster formatters of the crates `zmij` and `ryu` write another last digit where two are
+/// equally near.)
 fn number(text: &mut String, value: f64) {
     use std::fmt::Write as _;
     if !value.is_nan() {

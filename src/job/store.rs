@@ -70,6 +70,11 @@ impl Store {
         self.folder.join(&text[..2]).join(format!("{text}.{ENDING}"))
     }
 
+    /// Whether something is kept under `key`; whether it is of use, [`Store::get`] says.
+    pub fn has(&self, key: &Hash) -> bool {
+        self.path(key).is_file()
+    }
+
     /// What is kept under `key` for `question`.
     pub fn get(&self, key: &Hash, question: &dyn Question) -> Kept {
         let path = self.path(key);

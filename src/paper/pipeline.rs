@@ -12,16 +12,14 @@ use crate::job::encode;
 use crate::job::question::question_hash;
 use crate::job::spec::RunSpec;
 use crate::job::{Answer, AnyQuestion, Desk, JobError, Recording, Run, Stop, Table};
-use crate::record::{Hash, PanelEntry, PictureEntry, VerdictEntry};
+use crate::record::{FileError, Hash, PanelEntry, PictureEntry, VerdictEntry};
 use crate::render::{Pixels, RenderError, Rendered, render};
 
-/// A computed picture: its files' bytes and what is known about them.
+/// A computed picture: what is drawn and what is known about it.
 #[derive(Clone, Debug)]
 pub struct Computed {
     /// PNG, SVG and PDF.
     pub rendered: Rendered,
-    /// A CSV file per table: its name's last part, bytes.
-    pub tables: Vec<(String, Vec<u8>)>,
     /// What is known about the picture, as it is written beside it.
     pub record: PictureRecord,
 }
@@ -107,6 +105,9 @@ pub enum PipelineError {
         /// Why.
         source: RenderError,
     },
+    /// A table's file could not be written.
+    #[error(transparent)]
+    Table(#[from] FileError),
 }
 
 /// The hash of a decoded picture: width and height (little-endian), then RGBA row by row.
@@ -142,6 +143,20 @@ pub fn questions<'a>(pictures: impl IntoIterator<Item = &'a Picture>) -> Vec<Any
 ///
 /// If a computation or the drawing failed.
 pub fn compute(picture: &Picture, desk: &Desk<'_>) -> Result<Computed, PipelineError> {
+    compute_with_tables(picture, desk, &mut |_, _| Ok(()))
+}
+
+/// [`compute`], and hands a CSV file per table to `keep`, one after the other once the picture is drawn: its name and its bytes. All of them together take more
+/// memory than everything else that a picture needs.
+///
+/// # Errors
+///
+/// As [`compute`], or what `keep` says.
+pub fn compute_with_tables(
+    picture: &Picture,
+    desk: &Desk<'_>,
+    keep: &mut dyn FnMut(&str, &[u8]) -> Result<(), FileError>,
+) -> Result<Computed, PipelineError> {
     let failed = |part: &str| {
         let (picture, part) = (picture.name.clone(), part.to_owned());
         move |source: JobError| PipelineError::Job { picture, part, source }
@@ -203,7 +218,7 @@ pub fn compute(picture: &Picture, desk: &Desk<'_>) -> Result<Computed, PipelineE
     let rendered = render(&drawn).map_err(|source| PipelineError::Render { picture: picture.name.clone(), source })?;
 
     let runs = !panels.is_empty();
-    let (tables, table_records) = files(picture, runs, &parts, &answers);
+    let table_records = write_tables(picture, runs, &parts, &answers, keep)?;
     let hashes = PictureEntry {
         name: picture.name.clone(),
         spec,
@@ -226,23 +241,24 @@ pub fn compute(picture: &Picture, desk: &Desk<'_>) -> Result<Computed, PipelineE
         questions: if runs { Vec::new() } else { parts.iter().map(|(_, q)| q.json()).collect() },
         tables: table_records,
     };
-    Ok(Computed { rendered, tables, record })
+    Ok(Computed { rendered, record })
 }
 
-/// A CSV file per table, and what is recorded of it. Tables of one name are one file: a study may ask the same of several parameters.
-fn files(
+/// Hands over a CSV file per table, and says what is recorded of them. Tables of one name are one file: a study may ask the same of several parameters.
+fn write_tables(
     picture: &Picture,
     runs: bool,
     parts: &[(String, AnyQuestion)],
     answers: &[Arc<Answer>],
-) -> (Vec<(String, Vec<u8>)>, Vec<TableRecord>) {
-    struct File {
+    keep: &mut dyn FnMut(&str, &[u8]) -> Result<(), FileError>,
+) -> Result<Vec<TableRecord>, FileError> {
+    struct File<'a> {
         ending: String,
         panel: Option<String>,
-        table: Table,
+        tables: Vec<&'a Table>,
         about: Vec<Value>,
     }
-    let mut files: Vec<File> = Vec::new();
+    let mut files: Vec<File<'_>> = Vec::new();
     for ((label, question), answer) in parts.iter().zip(answers) {
         let about =
             json!({ "kind": question.kind(), "question_sha256": question_hash(&**question), "stop": answer.stop });
@@ -255,31 +271,31 @@ fn files(
             };
             match files.iter_mut().find(|f| f.ending == ending) {
                 Some(file) => {
-                    file.table.extend(table.rows());
+                    file.tables.push(table);
                     file.about.push(about.clone());
                 }
                 None => files.push(File {
                     ending,
                     panel: runs.then(|| label.clone()),
-                    table: table.clone(),
+                    tables: vec![table],
                     about: vec![about.clone()],
                 }),
             }
         }
     }
-    files
-        .into_iter()
-        .map(|file| {
-            let bytes = encode::csv(&file.table, &Value::Array(file.about));
-            let record = TableRecord {
-                file: format!("{}-{}.csv", picture.name, file.ending),
-                panel: file.panel,
-                sha256: Hash::of(&bytes),
-                rows: file.table.len(),
-            };
-            ((file.ending, bytes), record)
-        })
-        .unzip()
+    let mut records = Vec::new();
+    for File { ending, panel, tables, about } in files {
+        let bytes = encode::csv_of_parts(&tables, &Value::Array(about));
+        let record = TableRecord {
+            file: format!("{}-{ending}.csv", picture.name),
+            panel,
+            sha256: Hash::of(&bytes),
+            rows: tables.iter().map(|t| t.len()).sum(),
+        };
+        keep(&record.file, &bytes)?;
+        records.push(record);
+    }
+    Ok(records)
 }
 
 /// An answer that may be published: half a run must not look like a whole one.
