@@ -13,8 +13,8 @@ use crate::system::VectorField;
 pub type ExtendedPoint<const N: usize = 3> = SVector<DoubleDouble, N>;
 
 /// The local tolerance of reference orbits: below the precision of the arithmetic, since what a step leaves out just before a two-fold has grown by 10^15 after
-/// it, and roundings, unlike it, may cancel.
-pub const REFERENCE_TOLERANCE: Tolerance = Tolerance { rtol: 1e-33, atol: 1e-33 };
+/// it, and roundings, unlike it, may cancel. Absolutely far below: at the two-fold every component is small.
+pub const REFERENCE_TOLERANCE: Tolerance = Tolerance { rtol: 1e-33, atol: 1e-40 };
 
 /// The plane through which crossings are counted: `state[coordinate] = value`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
