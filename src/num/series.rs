@@ -606,8 +606,10 @@ mod tests {
             // The arguments of the layers, as far as they are known: those of the error function and of tanh.
             let layers: Vec<_> = s.layer_arguments().collect();
             assert_eq!(layers.len(), 2);
-            for (layer, of) in layers.iter().zip([&x[..1], &x[1..3]]) {
-                assert_eq!(layer.len(), 24);
+            for ((kind, layer), (wanted, of)) in
+                layers.iter().zip([(LayerKind::Erf, &x[..1]), (LayerKind::Tanh, &x[1..3])])
+            {
+                assert_eq!((*kind, layer.len()), (wanted, 24));
                 let gap = (at(layer, t) - of.iter().fold(DoubleDouble::zero(), |sum, x| sum + *x)).to_f64().abs();
                 assert!(gap < 1e-27, "{start:?}: {gap:e}");
             }
