@@ -124,7 +124,7 @@ pub fn from_bits(bytes: &[u8]) -> Result<Vec<Table>, Malformed> {
                     if codes.iter().any(|c| *c as usize >= vocabulary.len()) {
                         return malformed("a word is not in its vocabulary");
                     }
-                    Cells::Words(Words { vocabulary, codes })
+                    Cells::Words(Words::new(vocabulary, codes))
                 }
                 _ => return malformed("a column is of no known kind"),
             };

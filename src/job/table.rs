@@ -3,6 +3,8 @@
 //! A [`Table`] is stored by column, because that is how it is hashed, drawn and written as Parquet; it is built row by row,
 //! because that is how computations yield.
 
+use std::collections::HashMap;
+
 use serde::{Deserialize, Serialize};
 
 /// A named table; the name becomes part of file names.
@@ -37,25 +39,51 @@ pub enum Cells {
 }
 
 /// Words, each kept once.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default)]
 pub struct Words {
     /// The different words, in order of first appearance.
     pub vocabulary: Vec<String>,
     /// Index into the vocabulary, row by row.
     pub codes: Vec<u32>,
+    /// Where in the vocabulary a word stands; empty as long as looking through it is soon done.
+    places: HashMap<String, usize>,
 }
 
+impl PartialEq for Words {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.vocabulary, &self.codes) == (&other.vocabulary, &other.codes)
+    }
+}
+
+/// A longer vocabulary is not looked through word by word: somebody else's file may have a million.
+const SHORT: usize = 32;
+
 impl Words {
+    /// The words with these codes in a vocabulary.
+    pub fn new(vocabulary: Vec<String>, codes: Vec<u32>) -> Self {
+        Self { vocabulary, codes, places: HashMap::new() }
+    }
+
     /// Appends a word.
     pub fn push(&mut self, word: &str) {
         // The last word is by far the likeliest; vocabularies are short.
         let known = match self.codes.last() {
             Some(last) if self.vocabulary[*last as usize] == word => Some(*last as usize),
-            _ => self.vocabulary.iter().position(|w| w == word),
+            _ if self.vocabulary.len() <= SHORT => self.vocabulary.iter().position(|w| w == word),
+            _ => {
+                if self.places.is_empty() {
+                    self.places = self.vocabulary.iter().enumerate().map(|(i, w)| (w.clone(), i)).collect();
+                }
+                self.places.get(word).copied()
+            }
         };
         let code = known.unwrap_or_else(|| {
+            let code = self.vocabulary.len();
+            if !self.places.is_empty() {
+                self.places.insert(word.to_owned(), code);
+            }
             self.vocabulary.push(word.to_owned());
-            self.vocabulary.len() - 1
+            code
         });
         self.codes.push(code as u32);
     }
@@ -278,6 +306,23 @@ mod tests {
         assert!(table.numbers("mode").is_empty() && table.column("y").is_none());
         let Cells::Words(words) = &table.columns[1].cells else { panic!() };
         assert_eq!(words.vocabulary, ["up", "down"]);
+    }
+
+    #[test]
+    fn a_long_vocabulary_keeps_each_word_once() {
+        let mut words = Words::default();
+        let word = |row: usize| format!("word {}", row * row % 1009);
+        for row in 0..5000 {
+            words.push(&word(row));
+        }
+        assert!((0..5000).all(|row| words.get(row) == word(row)));
+        // As many as there are squares modulo the prime 1009.
+        assert_eq!(words.vocabulary.len(), 505);
+        // Words that came with the vocabulary are found too.
+        let mut again = Words::new(words.vocabulary.clone(), words.codes.clone());
+        again.push("word 4");
+        words.push("word 4");
+        assert_eq!(again, words);
     }
 
     #[test]
