@@ -175,7 +175,10 @@ pub fn make(figures: &[Figure], out: &Path, desk: &Desk<'_>) -> Result<Vec<Pictu
         .par_iter()
         .map(|(folder, picture)| {
             let mut written = Vec::new();
-            let mut keep = |file: &str, bytes: &[u8]| Ok(written.push(put(folder, file, bytes)?));
+            let mut keep = |file: &str, bytes: &[u8]| {
+                written.push(put(folder, file, bytes)?);
+                Ok(())
+            };
             let computed = compute_with_tables(picture, desk, &mut keep).map_err(|error| match error {
                 PipelineError::Table(file) => CliError::from(file),
                 other => other.into(),

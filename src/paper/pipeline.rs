@@ -146,17 +146,16 @@ pub fn compute(picture: &Picture, desk: &Desk<'_>) -> Result<Computed, PipelineE
     compute_with_tables(picture, desk, &mut |_, _| Ok(()))
 }
 
+/// What becomes of a table's file: its name and its bytes.
+pub type Keep<'a> = dyn FnMut(&str, &[u8]) -> Result<(), FileError> + 'a;
+
 /// [`compute`], and hands a CSV file per table to `keep`, one after the other once the picture is drawn: its name and its bytes. All of them together take more
 /// memory than everything else that a picture needs.
 ///
 /// # Errors
 ///
 /// As [`compute`], or what `keep` says.
-pub fn compute_with_tables(
-    picture: &Picture,
-    desk: &Desk<'_>,
-    keep: &mut dyn FnMut(&str, &[u8]) -> Result<(), FileError>,
-) -> Result<Computed, PipelineError> {
+pub fn compute_with_tables(picture: &Picture, desk: &Desk<'_>, keep: &mut Keep<'_>) -> Result<Computed, PipelineError> {
     let failed = |part: &str| {
         let (picture, part) = (picture.name.clone(), part.to_owned());
         move |source: JobError| PipelineError::Job { picture, part, source }
@@ -250,7 +249,7 @@ fn write_tables(
     runs: bool,
     parts: &[(String, AnyQuestion)],
     answers: &[Arc<Answer>],
-    keep: &mut dyn FnMut(&str, &[u8]) -> Result<(), FileError>,
+    keep: &mut Keep<'_>,
 ) -> Result<Vec<TableRecord>, FileError> {
     struct File<'a> {
         ending: String,
