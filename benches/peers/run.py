@@ -80,8 +80,7 @@ def error(command):
     words, why = run([str(c) for c in command])
     if words is None:
         return "not run: " + why
-    unit = words[2] if words[1] == "W0" else None
-    exact, why = run([str(OURS), "W0", unit, "taylor-extended", "1"])
+    exact, why = run([str(OURS), *words[1:3], "taylor-extended", "1"])
     if exact is None:
         return "not known: " + why
     largest = max(abs(float(a) - float(b)) for a, b in zip(words[-3:], exact[-3:]))

@@ -356,9 +356,9 @@ fn follow<F: VectorField<3>>(
 
 /// A response to a disturbance, in units of sqrt(eps), is small enough to be linear to a per mille or so up to here, ...
 const LARGEST_RESPONSE: f64 = 1e-4;
-/// ... and far above the arithmetic's own amplified rounding down to here.
+/// ... and far above the arithmetic's own amplified rounding down to here, for eps of 1e-6 and more.
 const SMALLEST_RESPONSE: f64 = 1e-7;
-/// Aimed at. At eps = 1e-7 rounding near the visit is worth some 3e-8 of response: with a tenth of this, growth there was measured to a per cent only.
+/// Aimed at. At eps = 1e-7 rounding near the visit is worth some 1e-7 of response: when 1e-5 was aimed at, growth there was measured to a per cent only.
 const RESPONSE: f64 = 5e-5;
 /// Smallest disturbance, in units of eps across and sqrt(eps) along the layer: far above the spacing of double-double numbers.
 const SMALLEST_SIZE: f64 = 1e-30;

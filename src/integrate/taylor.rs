@@ -13,7 +13,7 @@
 //!
 //! **The bound.** Beyond w > 0, |tanh(w + c) - 1| = 2/|exp(2 w + 2 c) + 1| is at most M = 2/(exp(2 (w - r)) - 1) for complex |c| <= r < w. If the
 //! argument's terms allow it to move by r at most in a (complex) time R, the coefficient k of tanh's series is at most M/R^k, and what follows degree p at
-//! most M q^(p+1)/(1 - q) in a step q R (Cauchy's estimate; Henrici 1974, sec. 2.2). The edge is where tanh differs from 1 by the tolerance.
+//! most M q^(p+1)/(1 - q) in a step q R (Cauchy's estimate; Ahlfors 1979, sec. 4.2.3). The edge is where tanh differs from 1 by the tolerance.
 
 use nalgebra::SVector;
 
@@ -365,7 +365,7 @@ impl Layers {
         if r <= LAYER_STRIDE {
             return 0.0;
         }
-        // M is below 2/(1 - 1/e) exp(-2 (distance - r)), and 1/(1 - q) at most 2.
+        // M is below 2/(1 - 1/e) exp(-2 (distance - r)), and 1/(1 - q) at most 2: for smaller q there is room for the thousandth of r that the travel may be longer.
         let log = (self.log_tolerance - BOUND + 2.0 * (distance - r)) / self.terms;
         let q = exp(log).min(0.5);
         q * stride_time(w, r, h / q)

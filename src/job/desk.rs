@@ -200,6 +200,37 @@ mod tests {
     }
 
     #[test]
+    fn what_the_store_has_is_not_held_in_memory() {
+        static COUNT: AtomicUsize = AtomicUsize::new(0);
+        let folder = tempfile::tempdir().unwrap();
+        let questions: Vec<AnyQuestion> = (0..8).map(|n| Arc::new(Fibonacci(n, &COUNT)) as _).collect();
+        let held = |desk: &Desk<'_>| desk.answers.lock().unwrap().len();
+
+        let desk = Desk::new(Some(Store::new(folder.path())), &());
+        desk.gather(&questions);
+        assert_eq!((COUNT.load(Ordering::Relaxed), held(&desk)), (8, 0));
+        // Asked for, they come from the store; what somebody holds stays.
+        let held_by_us = desk.ask(&Fibonacci(7, &COUNT)).unwrap();
+        desk.ask(&Fibonacci(6, &COUNT)).unwrap();
+        desk.forget();
+        assert_eq!((COUNT.load(Ordering::Relaxed), held(&desk)), (8, 1));
+        drop(held_by_us);
+
+        // A desk that begins with them reads none of them, and computes only what is missing.
+        let next = Desk::new(Some(Store::new(folder.path())), &());
+        next.gather(&questions);
+        assert_eq!((COUNT.load(Ordering::Relaxed), held(&next)), (8, 0));
+        next.gather(&[Arc::new(Fibonacci(8, &COUNT)) as _]);
+        assert_eq!(COUNT.load(Ordering::Relaxed), 9);
+
+        // Without a store, memory is the only place.
+        let without = Desk::quiet();
+        without.gather(&questions);
+        without.forget();
+        assert_eq!(held(&without), 8);
+    }
+
+    #[test]
     fn what_is_asked_in_passing_is_not_kept() {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let (desk, question) = (Desk::quiet(), Fibonacci(1, &COUNT));

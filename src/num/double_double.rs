@@ -435,6 +435,7 @@ impl Elementary for DoubleDouble {
 #[allow(clippy::approx_constant)] // constants are compared digit by digit
 mod tests {
     use super::*;
+    use crate::num::MultiFloat;
     use proptest::prelude::*;
 
     fn dd(x: f64) -> DoubleDouble {
@@ -634,11 +635,12 @@ mod tests {
     proptest! {
         #[test]
         fn a_quotient_by_a_small_number(a in any(), n in 1_u32..2000) {
-            let divisor = f64::from(n);
-            let quotient = a.over(divisor);
-            let error = (quotient.times_f64(divisor) - a).to_f64().abs();
-            prop_assert!(error <= 3.0 * DoubleDouble::EPSILON * a.high.abs(), "{a:?} / {n}: {error:e}");
-            prop_assert!(gap(quotient, a / DoubleDouble::from_f64(divisor)) <= 3.0 * DoubleDouble::EPSILON);
+            // In twice the digits: a - n a/n, exactly.
+            let exact = |x: DoubleDouble| MultiFloat::<4>::from_f64(x.high) + MultiFloat::from_f64(x.low);
+            let quotient = a.over(f64::from(n));
+            let error = (exact(a) - exact(quotient) * MultiFloat::from_f64(f64::from(n))).to_f64().abs();
+            prop_assert!(error <= 2.0 * DoubleDouble::EPSILON * a.high.abs(), "{a:?} / {n}: {error:e}");
+            prop_assert_eq!(quotient, a / DoubleDouble::from_f64(f64::from(n)));
         }
     }
 

@@ -25,7 +25,7 @@ pub(super) fn sum_of_products(a: &[DoubleDouble], b: &[DoubleDouble]) -> DoubleD
     if a.len() <= FEW {
         return a.iter().zip(b.iter().rev()).fold(DoubleDouble::ZERO, |sum, (a, b)| sum + *a * *b);
     }
-    // Eight lanes are one register, two, or four of the baseline's.
+    // Eight lanes are one register, two, or a number each.
     #[cfg(target_arch = "x86_64")]
     if let Some(set) = pulp::x86::V4::try_new() {
         return Simd::vectorize(set, In::<1> { a, b });
