@@ -12,7 +12,9 @@ use twofold::integrate::ensemble::{InstructionSet, Run, ensemble_with};
 use twofold::integrate::{
     Course, Dopri5, Failure, Ignore, Layered, Lsoda, Radau5, Schedule, StepCap, Stepper, Taylor, Tolerance, drive,
 };
-use twofold::system::{BoundField, Caricature, Field as Recorded, Smoothed, System, Transition, VectorField};
+use twofold::system::{
+    Alike, BoundField, Caricature, Equations, Field as Recorded, Smoothed, System, Transition, VectorField,
+};
 
 const TOLERANCE: Tolerance = Tolerance { rtol: 1.0536712e-8, atol: 1.0536712e-8 };
 
@@ -74,11 +76,11 @@ fn w2<F: VectorField<3>, M: Stepper<3>>(field: &F, make: impl Fn() -> M) -> Done
 }
 
 /// W2 in lanes.
-fn w2_in_lanes<F: VectorField<3>>(field: &F, set: InstructionSet) -> Done {
+fn w2_in_lanes<E: Equations<3>>(equations: &E, set: InstructionSet) -> Done {
     let course = Course { step_cap: StepCap::Absolute(10.0), ..Course::to(2000.0) };
     let run = |k: u32| Run { start: vector![0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0, 0.0, -1.0], course };
     let runs: Vec<_> = (0..1000).map(run).collect();
-    let ends = ensemble_with(set, field, &runs, TOLERANCE, None, |_| Ignore);
+    let ends = ensemble_with(set, equations, &runs, TOLERANCE, None, |_| Ignore);
     ends.into_iter().try_fold((0, 0, vector![0.0, 0.0, 0.0]), |done, end| {
         let end = end.summary?;
         Ok((done.0 + end.statistics.steps, 0, end.x))
@@ -127,6 +129,11 @@ fn once(unit: &str, set: &str, method: &str) -> Option<Done> {
         ("W2", "dopri5-lanes-portable") => w2_in_lanes(&field, InstructionSet::Portable),
         ("W1", "dopri5-file") => w1(&from_file(set)?, Dopri5::new(TOLERANCE)),
         ("W2", "dopri5-lanes-file") => w2_in_lanes(&from_file(set)?, InstructionSet::best()),
+        // As if each run had parameters of its own.
+        ("W2", "dopri5-lanes-parameters") => {
+            let field = from_file(set)?;
+            w2_in_lanes(&Alike::new(vec![field; 1000])?, InstructionSet::best())
+        }
         ("W2", "lsoda") => w2(&field, || Lsoda::new(TOLERANCE)),
         _ => return None,
     })

@@ -92,6 +92,32 @@ fn systems_from_files_share_lanes() {
     }
 }
 
+/// Parameters and widths that differ from lane to lane, in built-in systems and in others.
+#[test]
+fn rows_of_other_parameters_share_lanes() {
+    let sweep = |run: RunSpec, over: &[&str]| Sweep::new(run, axes(over), None).unwrap();
+    // Some go far, where a corner is; alpha = 0.001 has none.
+    let corners = RunSpec { start: vec![0.2, 3.0, 3.0], ..run(caricature(), 60.0) };
+    let corners = sweep(corners, &["params.alpha=1e-3,0.1,0.15,0.2", "params.beta=1e-5,1e-4", "start.y=3,0.1"]);
+    assert!(corners.share_lanes(0, 5) || InstructionSet::best() == InstructionSet::Portable);
+    let ends: Vec<String> = (0..corners.rows()).map(|row| corners.row(row, &()).unwrap().outcome().into()).collect();
+    assert!(ends.iter().any(|end| end == "far") && ends.iter().any(|end| end != "far"), "{ends:?}");
+    are_the_rows(&corners);
+    are_the_rows(&sweep(run(caricature(), 20.0), &["eps=1e-2,3e-3,1e-3", "params.alpha=0.1,0.2", "shift.x=1e-9*3"]));
+    // Many of one equation go by themselves, the others together.
+    let uneven = sweep(run(caricature(), 3.0), &["params.alpha=0.1,0.2", "shift.x=1e-9*40"]);
+    are_the_rows(&uneven);
+    let forced = RunSpec { start: vec![0.0, 0.5, 1.0, 0.0], ..run(System::builtin("dry-friction").unwrap(), 20.0) };
+    are_the_rows(&sweep(forced, &["params.friction=0.1..0.3:9"]));
+    // Zero is a number as any other, unless the equation is another one with it.
+    are_the_rows(&sweep(run(caricature(), 5.0), &["params.beta=0,1e-5,1,-1", "params.alpha=0,1"]));
+    // Another transition function is another equation.
+    let one = sweep(run(caricature(), 5.0), &["params.alpha=0.1,0.2"]);
+    let other = sweep(run(caricature(), 5.0), &["tolerance=1e-8,1e-9"]);
+    assert!(!other.share_lanes(0, 1));
+    assert_eq!(one.share_lanes(0, 1), InstructionSet::best() != InstructionSet::Portable);
+}
+
 /// More intermediate results at a time than the interpreter has room for without asking for memory.
 #[test]
 fn long_equations_share_lanes() {

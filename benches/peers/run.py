@@ -42,6 +42,8 @@ METHODS = {
     # A system from a file: beside the compiled one.
     "dopri5-file": (W1, "ours, dopri5", 3.0),
     "dopri5-lanes-file": (["W2 B"], "ours, dopri5-lanes-avx512", 1.3),
+    # The same runs as if each had parameters of its own.
+    "dopri5-lanes-parameters": (["W2 B"], "Boost.odeint dopri5", 1 / 12),
     "dopri5-lanes-portable": (["W2 B"], "Boost.odeint dopri5", None),
     "dopri5-lanes-avx2": (["W2 B"], "Boost.odeint dopri5", 1 / 12),
     "dopri5-lanes-avx512": (["W2 B"], "Boost.odeint dopri5", 1 / 12),

@@ -10,9 +10,9 @@ use super::{CliError, in_pool};
 use crate::job::sweep::{Row, Rows};
 use crate::record::Journal;
 
-/// Fewest and most rows that a thread takes at once for its lanes.
-const LEAST: usize = 8;
-const MOST: usize = 48;
+/// Fewest and most rows that a thread takes at once for its lanes, of which there are eight to thirty-two: the last of many rows leave few lanes empty for long.
+const LEAST: usize = 16;
+const MOST: usize = 192;
 
 /// The name of the journal of a file.
 pub fn journal_of(file: &Path) -> PathBuf {

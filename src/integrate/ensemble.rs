@@ -1,4 +1,5 @@
-//! Many independent runs of one equation at once, side by side in the lanes of vector registers, by Dormand-Prince 5(4).
+//! Many independent runs at once, of one equation or of equations that differ in numbers alone ([`Alike`](crate::system::Alike)), side by side
+//! in the lanes of vector registers, by Dormand-Prince 5(4).
 //!
 //! Each lane has its own time, step size, schedule and end, takes and refuses steps by itself, and is given the next run when its own has
 //! come to an end. So what comes of a run does not depend on its neighbours, on the number of lanes, or on the machine: it is bit for bit
@@ -19,8 +20,8 @@ use super::driver::{Course, Observer, Summary, Watch};
 use super::schedule::{Kicker, Segment};
 use super::step::{Failure, Flow, Statistics, Step, Stepper, StopReason, Tolerance};
 use crate::num::elementary::kernels::{rough_exp2, rough_log2};
-use crate::num::{Arithmetic, Mask, Registers};
-use crate::system::{VectorField, WithRegisters};
+use crate::num::{Aligned, Arithmetic, Mask, Registers};
+use crate::system::{Equations, WithRegisters};
 
 /// A start and what is to happen from there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,8 +57,9 @@ pub struct Common<'a, const N: usize> {
     pub tolerance: Tolerance,
     /// What the observers look at; without one they hear of kicks alone.
     pub plane: Option<Plane>,
-    /// A run ends as if its observer had stopped it ([`StopReason::Observer`]) at the first step's end where each component of the state is above this one's.
-    pub corner: Option<SVector<f64, N>>,
+    /// A corner for each run, which ends as if its observer had stopped it ([`StopReason::Observer`]) at the first step's end where each component of
+    /// the state is above the corner's.
+    pub corners: Option<&'a [SVector<f64, N>]>,
     /// Is asked now and then whether to go on; if not, runs that have not come to their end are given up.
     pub watch: &'a dyn Watch,
 }
@@ -101,66 +103,66 @@ impl InstructionSet {
 ///
 /// Each run has an observer of its own, made by `observer` from the run's number. It hears of every kick, and of those steps only that may
 /// meet `plane`: of none without one. (Steps that certainly do not meet a plane tell a section nothing, and most do not.)
-pub fn ensemble<F, O, const N: usize>(
-    field: &F,
+pub fn ensemble<E, O, const N: usize>(
+    equations: &E,
     runs: &[Run<N>],
     tolerance: Tolerance,
     plane: Option<Plane>,
     observer: impl Fn(usize) -> O,
 ) -> Vec<End<O, N>>
 where
-    F: VectorField<N>,
+    E: Equations<N>,
     O: Observer<N>,
 {
-    ensemble_with(InstructionSet::best(), field, runs, tolerance, plane, observer)
+    ensemble_with(InstructionSet::best(), equations, runs, tolerance, plane, observer)
 }
 
 /// [`ensemble()`] with the instructions `set`; with [`InstructionSet::best`] if this machine has not got it.
-pub fn ensemble_with<F, O, const N: usize>(
+pub fn ensemble_with<E, O, const N: usize>(
     set: InstructionSet,
-    field: &F,
+    equations: &E,
     runs: &[Run<N>],
     tolerance: Tolerance,
     plane: Option<Plane>,
     observer: impl Fn(usize) -> O,
 ) -> Vec<End<O, N>>
 where
-    F: VectorField<N>,
+    E: Equations<N>,
     O: Observer<N>,
 {
     let mut ends: Vec<Option<End<O, N>>> = runs.iter().map(|_| None).collect();
-    let common = Common { tolerance, plane, corner: None, watch: &() };
-    ensemble_watched(set, field, runs, common, observer, &mut |run, end| ends[run] = Some(end));
+    let common = Common { tolerance, plane, corners: None, watch: &() };
+    ensemble_watched(set, equations, runs, common, observer, &mut |run, end| ends[run] = Some(end));
     ends.into_iter().flatten().collect()
 }
 
 /// [`ensemble_with`] that gives each run's number and end to `finished` as it comes to it: in an order that depends on the number of lanes.
-pub fn ensemble_watched<F, O, const N: usize>(
+pub fn ensemble_watched<E, O, const N: usize>(
     set: InstructionSet,
-    field: &F,
+    equations: &E,
     runs: &[Run<N>],
     common: Common<'_, N>,
     observer: impl Fn(usize) -> O,
     finished: &mut dyn FnMut(usize, End<O, N>),
 ) where
-    F: VectorField<N>,
+    E: Equations<N>,
     O: Observer<N>,
 {
     let set = if set.is_here() { set } else { InstructionSet::best() };
-    let all = All::<_, _, _, N, 1> { field, runs, common, observer, finished };
+    let all = All::<_, _, _, N, 1> { equations, runs, common, observer, finished };
     match set {
         InstructionSet::Portable => all.with_simd(Scalar),
-        InstructionSet::Avx2 | InstructionSet::Avx512 => field.with_registers(InVectors { set, all }),
+        InstructionSet::Avx2 | InstructionSet::Avx512 => equations.with_registers(InVectors { set, all }),
     }
 }
 
 /// The whole task, in vector registers of the instruction set `set`, which is here.
-struct InVectors<'a, F, O, M: Fn(usize) -> O, const N: usize> {
+struct InVectors<'a, E, O, M: Fn(usize) -> O, const N: usize> {
     set: InstructionSet,
-    all: All<'a, F, O, M, N, 1>,
+    all: All<'a, E, O, M, N, 1>,
 }
 
-impl<F: VectorField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> WithRegisters for InVectors<'_, F, O, M, N> {
+impl<E: Equations<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> WithRegisters for InVectors<'_, E, O, M, N> {
     fn with<const K: usize>(self) {
         let Self { set, all } = self;
         match set {
@@ -180,40 +182,42 @@ impl<F: VectorField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> WithR
 }
 
 /// The whole task, for `K` registers.
-struct All<'a, F, O, M: Fn(usize) -> O, const N: usize, const K: usize> {
-    field: &'a F,
+struct All<'a, E, O, M: Fn(usize) -> O, const N: usize, const K: usize> {
+    equations: &'a E,
     runs: &'a [Run<N>],
     common: Common<'a, N>,
     observer: M,
     finished: &'a mut dyn FnMut(usize, End<O, N>),
 }
 
-impl<'a, F, O, M: Fn(usize) -> O, const N: usize, const K: usize> All<'a, F, O, M, N, K> {
-    fn in_registers<const L: usize>(self) -> All<'a, F, O, M, N, L> {
-        let Self { field, runs, common, observer, finished } = self;
-        All { field, runs, common, observer, finished }
+impl<'a, E, O, M: Fn(usize) -> O, const N: usize, const K: usize> All<'a, E, O, M, N, K> {
+    fn in_registers<const L: usize>(self) -> All<'a, E, O, M, N, L> {
+        let Self { equations, runs, common, observer, finished } = self;
+        All { equations, runs, common, observer, finished }
     }
 }
 
 /// The watch is asked after so many steps, as [`drive`](super::drive) asks it.
 const STEPS_UNWATCHED: u32 = 4096;
 
-impl<F: VectorField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, const K: usize> WithSimd
-    for All<'_, F, O, M, N, K>
+impl<E: Equations<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, const K: usize> WithSimd
+    for All<'_, E, O, M, N, K>
 {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, set: S) -> Self::Output {
-        let Self { field, runs, common, observer, finished } = self;
+        let Self { equations, runs, common, observer, finished } = self;
         let width = Registers::<S, K>::WIDTH;
         let mut waiting = 0..runs.len();
-        let mut state = State::<S, O, N, K>::idle(set, common.tolerance);
+        let numbers = if runs.is_empty() { 0 } else { equations.numbers(0).len() };
+        let mut state = State::<S, O, N, K>::idle(set, common.tolerance, numbers);
         let mut unwatched = 0;
         loop {
             for l in 0..width {
                 while state.lanes[l].is_none() {
                     let Some(run) = waiting.next() else { break };
-                    if let Some(end) = state.begin(l, field, run, &runs[run], observer(run)) {
+                    state.give(l, equations.numbers(run), common.corners.map(|corners| &corners[run]));
+                    if let Some(end) = state.begin(l, equations, run, &runs[run], observer(run)) {
                         finished(run, end);
                     }
                 }
@@ -222,7 +226,7 @@ impl<F: VectorField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, const
                 break;
             }
             // Until a lane is empty.
-            while !state.step(field, &common, finished) {
+            while !state.step(equations, &common, finished) {
                 unwatched += 1;
                 if unwatched == STEPS_UNWATCHED {
                     unwatched = 0;
@@ -267,6 +271,9 @@ struct State<S: Simd, O, const N: usize, const K: usize> {
     rejected: [S::f64s; K],
     x: [[S::f64s; K]; N],
     fsal: [[S::f64s; K]; N],
+    corner: [[S::f64s; K]; N],
+    /// Those in the runs' equations.
+    numbers: Vec<Aligned<[S::f64s; K]>>,
     lanes: Vec<Option<Lane<O, N>>>,
 }
 
@@ -281,7 +288,7 @@ fn put<V: pulp::bytemuck::Pod, const K: usize>(parts: &mut [V; K], lane: usize, 
 }
 
 impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> {
-    fn idle(set: S, tolerance: Tolerance) -> Self {
+    fn idle(set: S, tolerance: Tolerance, numbers: usize) -> Self {
         let zero = [set.splat_f64s(0.0); K];
         Self {
             set,
@@ -297,16 +304,28 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             rejected: zero,
             x: [zero; N],
             fsal: [zero; N],
+            corner: [zero; N],
+            numbers: vec![Aligned(zero); numbers],
             lanes: (0..Registers::<S, K>::WIDTH).map(|_| None).collect(),
+        }
+    }
+
+    /// What is a run's own besides its course, for lane `l`.
+    fn give(&mut self, l: usize, numbers: &[f64], corner: Option<&SVector<f64, N>>) {
+        for (of_lanes, number) in self.numbers.iter_mut().zip(numbers) {
+            put(&mut of_lanes.0, l, *number);
+        }
+        for i in 0..N {
+            put(&mut self.corner[i], l, corner.map_or(f64::INFINITY, |corner| corner[i]));
         }
     }
 
     /// Puts a run into an empty lane; gives its end if it needs no step.
     #[inline(never)]
-    fn begin<F: VectorField<N>>(
+    fn begin<E: Equations<N>>(
         &mut self,
         l: usize,
-        field: &F,
+        equations: &E,
         run: usize,
         Run { start, course }: &Run<N>,
         observer: O,
@@ -335,16 +354,18 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         if first.is_none() {
             return self.finish(l, Ok(StopReason::EndTime));
         }
-        self.restart(l, field).and_then(|failure| self.finish(l, Err(failure)))
+        self.restart(l, equations).and_then(|failure| self.finish(l, Err(failure)))
     }
 
     /// Begins the segment of lane `l`.
-    fn restart<F: VectorField<N>>(&mut self, l: usize, field: &F) -> Option<Failure> {
+    fn restart<E: Equations<N>>(&mut self, l: usize, equations: &E) -> Option<Failure> {
         let (t, x) = (get(&self.t, l), self.state(l));
         let lane = self.lanes[l].as_mut()?;
         lane.restarts += 1;
         let end = lane.segment.end;
-        if let Err(failure) = lane.stepper.restart(field, t, x, end, lane.course.step_cap.for_segment(end - t)) {
+        if let Err(failure) =
+            lane.stepper.restart(equations.of(lane.run), t, x, end, lane.course.step_cap.for_segment(end - t))
+        {
             return Some(failure);
         }
         let Dopri5 { fsal, h, last_log, max_step, .. } = &lane.stepper;
@@ -384,38 +405,31 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
 
     /// One trial step in every lane. Says whether a lane has become empty.
     #[inline(always)]
-    fn step<F: VectorField<N>>(
+    fn step<E: Equations<N>>(
         &mut self,
-        field: &F,
+        equations: &E,
         common: &Common<'_, N>,
         finished: &mut dyn FnMut(usize, End<O, N>),
     ) -> bool {
         let set = self.set;
-        let vector = |parts: &[[S::f64s; K]; N]| {
-            let mut v = SVector::<Registers<S, K>, N>::from_element(Registers::splat(set, 0.0));
-            for i in 0..N {
-                v[i] = Registers::new(set, parts[i]);
-            }
-            v
-        };
         let number = |value: f64| Registers::<S, K>::splat(set, value);
         let of = |parts: [S::f64s; K]| Registers::<S, K>::new(set, parts);
-        let (t0, x0, k1) = (of(self.t), vector(&self.x), vector(&self.fsal));
+        let (t0, x0, k1) = (of(self.t), vector(set, &self.x), vector(set, &self.fsal));
         let remaining = of(self.t_end) - t0;
         let last = remaining.at_most(of(self.h) * number(1.000_000_1), set);
         let h = last.select(remaining, of(self.h));
 
-        let f = |x: &SVector<Registers<S, K>, N>| vector(&set.vectorize(Field { set, field, x: bare(x) }));
-        let k2 = f(&advanced(&x0, h, [(&k1, A21)]));
-        let k3 = f(&advanced(&x0, h, [(&k1, A31), (&k2, A32)]));
-        let k4 = f(&advanced(&x0, h, [(&k1, A41), (&k2, A42), (&k3, A43)]));
-        let k5 = f(&advanced(&x0, h, [(&k1, A51), (&k2, A52), (&k3, A53), (&k4, A54)]));
-        let k6 = f(&advanced(&x0, h, [(&k1, A61), (&k2, A62), (&k3, A63), (&k4, A64), (&k5, A65)]));
+        let f = Derivative { set, equations, numbers: &self.numbers };
+        let k2 = f.at(&advanced(&x0, h, [(&k1, A21)]));
+        let k3 = f.at(&advanced(&x0, h, [(&k1, A31), (&k2, A32)]));
+        let k4 = f.at(&advanced(&x0, h, [(&k1, A41), (&k2, A42), (&k3, A43)]));
+        let k5 = f.at(&advanced(&x0, h, [(&k1, A51), (&k2, A52), (&k3, A53), (&k4, A54)]));
+        let k6 = f.at(&advanced(&x0, h, [(&k1, A61), (&k2, A62), (&k3, A63), (&k4, A64), (&k5, A65)]));
         let mut x1 = combined(h, (&k1, A71), [(&k3, A73), (&k4, A74), (&k5, A75), (&k6, A76)]);
         for i in 0..N {
             x1[i] = x0[i] + x1[i];
         }
-        let k7 = f(&x1);
+        let k7 = f.at(&x1);
         let e = combined(h, (&k1, E1), [(&k3, E3), (&k4, E4), (&k5, E5), (&k6, E6), (&k7, E7)]);
 
         let (rtol, atol) = (number(self.tolerance.rtol), number(self.tolerance.atol));
@@ -474,10 +488,10 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             noted = noted.or(may);
         }
         let mut beyond = None;
-        if let Some(corner) = common.corner {
+        if common.corners.is_some() {
             let mut all = accepted;
             for i in 0..N {
-                all = all.and(number(corner[i]).less(x1[i], set));
+                all = all.and(of(self.corner[i]).less(x1[i], set));
             }
             beyond = Some(all.select(one, zero).parts());
             noted = noted.or(all);
@@ -498,21 +512,21 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             x: bare(&x0),
             k: [bare(&k1), bare(&k3), bare(&k4), bare(&k5), bare(&k6), bare(&k7)],
         };
-        self.attend(field, &seen, finished)
+        self.attend(equations, &seen, finished)
     }
 
     /// The scalar part of a step, for the lanes that need one. Says whether a lane has become empty.
     #[inline(never)]
-    fn attend<F: VectorField<N>>(
+    fn attend<E: Equations<N>>(
         &mut self,
-        field: &F,
+        equations: &E,
         seen: &Seen<S, N, K>,
         finished: &mut dyn FnMut(usize, End<O, N>),
     ) -> bool {
         let mut emptied = false;
         for l in 0..Registers::<S, K>::WIDTH {
             let Some(run) = self.lanes[l].as_ref().map(|lane| lane.run) else { continue };
-            if let Some(stop) = self.attend_one(l, field, seen) {
+            if let Some(stop) = self.attend_one(l, equations, seen) {
                 if let Some(end) = self.finish(l, stop) {
                     finished(run, end);
                 }
@@ -523,10 +537,10 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
     }
 
     /// As the loop of [`drive`](super::drive) and [`Dopri5::step`] do it; gives the end of the run.
-    fn attend_one<F: VectorField<N>>(
+    fn attend_one<E: Equations<N>>(
         &mut self,
         l: usize,
-        field: &F,
+        equations: &E,
         seen: &Seen<S, N, K>,
     ) -> Option<Result<StopReason, Failure>> {
         let yes = |parts: &[S::f64s; K]| get(parts, l) > 0.5;
@@ -579,7 +593,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             None => Some(Ok(StopReason::EndTime)),
             Some(segment) => {
                 lane.segment = segment;
-                self.restart(l, field).map(Err)
+                self.restart(l, equations).map(Err)
             }
         }
     }
@@ -600,20 +614,50 @@ struct Seen<S: Simd, const N: usize, const K: usize> {
     k: [[[S::f64s; K]; N]; 6],
 }
 
-/// f at the state `x`: a function of its own in the instruction set, so that the equation is compiled once and not for every stage.
-struct Field<'a, F, S: Simd, const N: usize, const K: usize> {
+/// The runs' equations with their numbers.
+#[derive(Clone, Copy)]
+struct Derivative<'a, E, S: Simd, const K: usize> {
     set: S,
-    field: &'a F,
-    x: [[S::f64s; K]; N],
+    equations: &'a E,
+    numbers: &'a [Aligned<[S::f64s; K]>],
 }
 
-impl<F: VectorField<N>, S: Simd, const N: usize, const K: usize> WithSimd for Field<'_, F, S, N, K> {
-    type Output = [[S::f64s; K]; N];
+impl<E, S: Simd, const K: usize> Derivative<'_, E, S, K> {
+    #[inline(always)]
+    fn at<const N: usize>(&self, x: &SVector<Registers<S, K>, N>) -> SVector<Registers<S, K>, N>
+    where
+        E: Equations<N>,
+    {
+        let Self { set, equations, numbers } = *self;
+        vector(set, &set.vectorize(Field { set, equations, numbers, x: Aligned(bare(x)) }).0)
+    }
+}
+
+/// f at the state `x`: a function of its own in the instruction set, so that the equation is compiled once and not for every stage.
+struct Field<'a, E, S: Simd, const N: usize, const K: usize> {
+    set: S,
+    equations: &'a E,
+    numbers: &'a [Aligned<[S::f64s; K]>],
+    x: Aligned<[[S::f64s; K]; N]>,
+}
+
+impl<E: Equations<N>, S: Simd, const N: usize, const K: usize> WithSimd for Field<'_, E, S, N, K> {
+    type Output = Aligned<[[S::f64s; K]; N]>;
     #[inline(always)]
     fn with_simd<T: Simd>(self, _: T) -> Self::Output {
         // The instruction set is that of the caller, who has chosen it.
-        self.field.eval_in_registers(self.set, self.x)
+        Aligned(self.equations.eval_in_registers(self.set, self.x.0, self.numbers))
     }
+}
+
+/// A vector of the registers.
+#[inline(always)]
+fn vector<S: Simd, const N: usize, const K: usize>(set: S, parts: &[[S::f64s; K]; N]) -> SVector<Registers<S, K>, N> {
+    let mut v = SVector::<Registers<S, K>, N>::from_element(Registers::splat(set, 0.0));
+    for i in 0..N {
+        v[i] = Registers::new(set, parts[i]);
+    }
+    v
 }
 
 /// The registers of a vector.

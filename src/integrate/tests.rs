@@ -664,9 +664,19 @@ fn lanes_are_runs_alone() {
         Err(failure) => format!("{failure:?}"),
     };
     for (corner, plane) in [(None, None), (Some(corner), None), (None, Some(Plane { coordinate: 1, value: 0.125 }))] {
+        // Every third run has none of its own.
+        let corners = corner.map(|corner| {
+            (0..runs.len())
+                .map(|i| if i % 3 == 1 { SVector::repeat(f64::INFINITY) } else { corner })
+                .collect::<Vec<_>>()
+        });
         let alone: Vec<_> = runs
             .iter()
-            .map(|run| word(&drive(&field, run.start, &run.course, &mut Dopri5::new(size), &mut Stops(corner), &())))
+            .enumerate()
+            .map(|(i, run)| {
+                let mut stops = Stops(corners.as_ref().map(|corners| corners[i]));
+                word(&drive(&field, run.start, &run.course, &mut Dopri5::new(size), &mut stops, &()))
+            })
             .collect();
         if corner.is_some() {
             assert!(
@@ -696,7 +706,7 @@ fn lanes_are_runs_alone() {
             })
             .collect();
         for set in InstructionSet::ALL.into_iter().filter(|set| set.is_here()) {
-            let common = Common { tolerance: size, plane, corner, watch: &() };
+            let common = Common { tolerance: size, plane, corners: corners.as_deref(), watch: &() };
             let mut ends = vec![None; runs.len()];
             ensemble_watched(
                 set,
@@ -719,7 +729,7 @@ fn lanes_are_runs_alone() {
             let mut finished = 0;
             let long =
                 [Run { start: START.into(), course: Course { step_cap: StepCap::Absolute(1e-3), ..Course::to(50.0) } }];
-            let common = Common { tolerance: size, plane: None, corner: None, watch: &Refuses };
+            let common = Common { tolerance: size, plane: None, corners: None, watch: &Refuses };
             ensemble_watched(set, &field, &long, common, |_| Ignore, &mut |_, _| finished += 1);
             assert_eq!(finished, 0, "{set:?}");
             ensemble_watched(set, &field, &runs[..3], common, |_| Ignore, &mut |_, _| finished += 1);

@@ -34,6 +34,6 @@ pub use lanes::Lanes;
 pub use multi::MultiFloat;
 /// An instruction set, for rooms that hand numbers on in registers and compute nothing with them.
 pub use pulp::Simd;
-pub use registers::{Mask, Registers};
+pub use registers::{Aligned, Mask, Registers};
 pub use scalar::{Arithmetic, Elementary, Scalar};
 pub use tape::Tape;

@@ -25,6 +25,11 @@ pub struct Registers<S: Simd, const K: usize> {
     parts: [S::f64s; K],
 }
 
+/// Registers in memory, from the beginning of a cache line on: where one lies across two lines, it is read and written in two parts.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub struct Aligned<T>(pub T);
+
 /// Yes or no for each lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Mask<S: Simd, const K: usize> {

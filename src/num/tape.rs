@@ -562,6 +562,8 @@ impl Program {
     pub const ON_STACK: usize = 32;
     /// As many as most systems need: fewer are sooner cleared.
     const FEW: usize = 16;
+    /// As many as small systems need.
+    const FEWEST: usize = 8;
     /// Most registers of a program.
     const MOST: usize = 1 << 16;
 
@@ -619,6 +621,27 @@ impl Program {
     /// Instructions run in an evaluation.
     pub fn instructions(&self) -> usize {
         self.code.len()
+    }
+
+    /// Whether the two differ in numbers alone.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        let operation = |i: &Instruction| (i.code, i.to, i.a, i.b);
+        let place = |output: &Output| match output {
+            Output::Register(at) => Some(*at),
+            Output::Fixed(_) => None,
+        };
+        (self.variables, self.registers) == (other.variables, other.registers)
+            && self.code.iter().map(operation).eq(other.code.iter().map(operation))
+            && self.outputs.iter().map(place).eq(other.outputs.iter().map(place))
+    }
+
+    /// One number for each instruction, then one for each value; 0 where there is none.
+    pub(crate) fn numbers(&self) -> Vec<f64> {
+        let of_value = |output: &Output| match output {
+            Output::Register(_) => 0.0,
+            Output::Fixed(value) => *value,
+        };
+        self.code.iter().map(|i| i.fixed).chain(self.outputs.iter().map(of_value)).collect()
     }
 
     /// Writes the function's values at `x` into `out`.

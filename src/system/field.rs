@@ -236,6 +236,11 @@ impl Field {
         Self::made(names.map(Into::into).to_vec(), Tape::clone(&field.tape()))
     }
 
+    /// Whether the two equations differ in numbers alone: in the values of parameters, in the width of a layer.
+    pub fn is_like(&self, other: &Self) -> bool {
+        self.of_one_surface == other.of_one_surface && self.program.is_like(&other.program)
+    }
+
     /// Number of states.
     pub fn dimension(&self) -> usize {
         self.tape.variables()
@@ -289,6 +294,12 @@ fn free_name(name: &str, taken: &[String]) -> String {
 pub struct BoundField<const N: usize> {
     tape: Arc<Tape>,
     program: Arc<Program>,
+}
+
+impl<const N: usize> BoundField<N> {
+    pub(super) fn program(&self) -> &Program {
+        &self.program
+    }
 }
 
 impl<const N: usize> VectorField<N> for BoundField<N> {

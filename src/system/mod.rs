@@ -13,6 +13,7 @@
 //! The paper's own two, [`Caricature`] and [`Wheel`], exist as Rust too, with [`Smoothed`] and [`Hysteretic`] on top: fast paths, tested to
 //! give the bits of the files. Equations in Rust are generic over [`Elementary`], so that each is written once.
 
+mod alike;
 pub mod caricature;
 pub mod definition;
 pub mod diagnostic;
@@ -35,6 +36,7 @@ use nalgebra::{SMatrix, SVector};
 use crate::num::tape::Recorded;
 use crate::num::{Dual, Elementary, Registers, Simd, Tape};
 
+pub use alike::{Alike, Equations};
 pub use caricature::Caricature;
 pub use definition::Definition;
 pub use diagnostic::Diagnostic;

@@ -15,10 +15,14 @@ use crate::job::recording::{Data, Recording};
 use crate::job::spec::{Method, Observation, RunSpec, SwitchSpec};
 use crate::job::table::Entry;
 use crate::record::Hash;
-use crate::system::{Compiled, Field, Smoothed, VectorField};
+use crate::system::{Alike, BindError, BoundField, Compiled, Equations, Field, Smoothed};
 
 /// Fewer cells than this are computed one after the other.
 const FEWEST: usize = 3;
+
+/// So many cells of one equation run by themselves, compiled where that is possible; with fewer, lanes would stay empty that cells of
+/// other parameters can have.
+const ENOUGH: usize = 32;
 
 /// States of the systems that run in lanes: compiled once for each number of them, the usual ones.
 const STATES: std::ops::RangeInclusive<usize> = 2..=4;
@@ -51,14 +55,76 @@ impl Cell {
         }
     }
 
-    /// Whether both have one equation, tolerance and section: what all lanes share.
-    fn is_like(&self, other: &Self) -> bool {
+    /// The equation, if it is a smoothed one.
+    fn equation(&self) -> Option<Field> {
+        let run = self.run();
+        match run.switch {
+            SwitchSpec::Smoothed { eps, transition } => Some(Field::smoothed(&run.system, transition, eps)),
+            _ => None,
+        }
+    }
+
+    fn has_the_equation_of(&self, other: &Self) -> bool {
         let (a, b) = (self.run(), other.run());
-        a.system == b.system
-            && a.switch == b.switch
-            && a.observe == b.observe
-            && a.method.name == b.method.name
-            && a.method.tolerance == b.method.tolerance
+        a.system == b.system && a.switch == b.switch
+    }
+
+    /// Whether both have one tolerance and section: what all lanes share besides the operations of their equations.
+    fn is_asked_like(&self, other: &Self) -> bool {
+        let (a, b) = (self.run(), other.run());
+        a.observe == b.observe && a.method.name == b.method.name && a.method.tolerance == b.method.tolerance
+    }
+}
+
+/// Cells that share lanes.
+struct Group {
+    cells: Vec<Cell>,
+    /// The first one's.
+    equation: Field,
+    /// All have that one.
+    of_one_equation: bool,
+}
+
+impl Group {
+    /// Those among `cells` that share lanes, together; cells of one equation that are many share them with no others.
+    fn all(cells: Vec<Cell>) -> Vec<Self> {
+        let mut of_one: Vec<Self> = Vec::new();
+        for cell in cells {
+            let same = |group: &&mut Self| {
+                let first = &group.cells[0];
+                first.is_asked_like(&cell) && first.has_the_equation_of(&cell)
+            };
+            match of_one.iter_mut().find(same) {
+                Some(group) => group.cells.push(cell),
+                None => of_one.extend(cell.equation().map(|equation| Self {
+                    cells: vec![cell],
+                    equation,
+                    of_one_equation: true,
+                })),
+            }
+        }
+        let (mut groups, few): (Vec<Self>, Vec<Self>) = of_one.into_iter().partition(|g| g.cells.len() >= ENOUGH);
+        let apart = groups.len();
+        for group in few {
+            let alike = |other: &&mut Self| {
+                other.cells[0].is_asked_like(&group.cells[0]) && other.equation.is_like(&group.equation)
+            };
+            match groups[apart..].iter_mut().find(alike) {
+                Some(other) => {
+                    other.cells.extend(group.cells);
+                    other.of_one_equation = false;
+                }
+                None => groups.push(group),
+            }
+        }
+        groups
+    }
+
+    /// The cells' equations, in their order.
+    fn alike<const N: usize>(&self) -> Result<Option<Alike<N>>, BindError> {
+        let bound: Result<Vec<BoundField<N>>, _> =
+            self.cells.iter().filter_map(Cell::equation).map(|e| e.bind()).collect();
+        Ok(Alike::new(bound?))
     }
 }
 
@@ -77,8 +143,9 @@ impl Watch for Both<'_> {
 impl Sweep {
     /// Whether these two rows would share lanes on this machine: then it pays to ask for many at once.
     pub fn share_lanes(&self, a: u64, b: u64) -> bool {
-        let cell = |number| self.cell(number).filter(|cell| cell.plane().is_some());
-        InstructionSet::best() != InstructionSet::Portable && cell(a).zip(cell(b)).is_some_and(|(a, b)| a.is_like(&b))
+        let cells = [a, b].into_iter().filter_map(|number| self.cell(number)).filter(|cell| cell.plane().is_some());
+        InstructionSet::best() != InstructionSet::Portable
+            && Group::all(cells.collect()).iter().any(|group| group.cells.len() == 2)
     }
 
     fn cell(&self, number: u64) -> Option<Cell> {
@@ -88,7 +155,7 @@ impl Sweep {
     }
 
     /// Computes the rows of these numbers, and gives each to `take` as it is finished, which says whether it wants more: the rows that [`Sweep::row`] makes, bit for bit.
-    /// Those that have their equation and tolerance in common run side by side in the lanes of vector registers, where the machine has any.
+    /// Those that have the operations of their equation, tolerance and section in common run side by side in the lanes of vector registers, where the machine has any.
     ///
     /// # Errors
     ///
@@ -114,28 +181,23 @@ impl Sweep {
         progress: &dyn Progress,
         take: &mut dyn FnMut(Row) -> bool,
     ) -> Result<(), JobError> {
-        let mut groups: Vec<Vec<Cell>> = Vec::new();
+        let mut cells = Vec::new();
         let mut single = Vec::new();
         for &number in numbers {
-            let cell = self.cell(number).filter(|cell| set != InstructionSet::Portable && cell.plane().is_some());
-            let Some(cell) = cell else {
-                single.push(number);
-                continue;
-            };
-            match groups.iter_mut().find(|group| group[0].is_like(&cell)) {
-                Some(group) => group.push(cell),
-                None => groups.push(vec![cell]),
+            match self.cell(number).filter(|cell| set != InstructionSet::Portable && cell.plane().is_some()) {
+                Some(cell) => cells.push(cell),
+                None => single.push(number),
             }
         }
         let enough = AtomicBool::new(false);
-        for group in groups {
-            let few = group.len() < FEWEST;
+        for group in Group::all(cells) {
+            let few = group.cells.len() < FEWEST;
             let done = !few && self.group(set, &group, progress, &enough, take)?;
             if enough.load(Ordering::Relaxed) {
                 return Ok(());
             }
             if !done {
-                single.extend(group.iter().map(|cell| cell.number));
+                single.extend(group.cells.iter().map(|cell| cell.number));
             }
         }
         for number in single {
@@ -146,37 +208,47 @@ impl Sweep {
         Ok(())
     }
 
-    /// Cells that are alike. Says whether lanes could compute them.
+    /// Says whether lanes could compute them.
     fn group(
         &self,
         set: InstructionSet,
-        cells: &[Cell],
+        group: &Group,
         progress: &dyn Progress,
         enough: &AtomicBool,
         take: &mut dyn FnMut(Row) -> bool,
     ) -> Result<bool, JobError> {
-        let run = cells[0].run();
+        let (cells, run) = (&group.cells[..], group.cells[0].run());
         let SwitchSpec::Smoothed { eps, transition } = run.switch else { return Ok(false) };
         // The compiled equation where there is one: it gives the same bits sooner.
-        if let Some(Compiled::Caricature(system)) = run.system.compiled() {
+        if let (true, Some(Compiled::Caricature(system))) = (group.of_one_equation, run.system.compiled()) {
             let field = Smoothed { system, transition, eps };
             side_by_side(set, &field, cells, progress, enough, take)?;
             return Ok(true);
         }
-        let field = Field::smoothed(&run.system, transition, eps);
+        macro_rules! of {
+            ($n:literal) => {
+                if group.of_one_equation {
+                    side_by_side(set, &group.equation.bind::<$n>()?, cells, progress, enough, take)?;
+                } else if let Some(alike) = group.alike::<$n>()? {
+                    side_by_side(set, &alike, cells, progress, enough, take)?;
+                } else {
+                    return Ok(false);
+                }
+            };
+        }
         match run.system.dimension() {
-            2 => side_by_side(set, &field.bind::<2>()?, cells, progress, enough, take)?,
-            3 => side_by_side(set, &field.bind::<3>()?, cells, progress, enough, take)?,
-            4 => side_by_side(set, &field.bind::<4>()?, cells, progress, enough, take)?,
+            2 => of!(2),
+            3 => of!(3),
+            4 => of!(4),
             _ => return Ok(false),
         }
         Ok(true)
     }
 }
 
-fn side_by_side<F: VectorField<N>, const N: usize>(
+fn side_by_side<E: Equations<N>, const N: usize>(
     set: InstructionSet,
-    field: &F,
+    equations: &E,
     cells: &[Cell],
     progress: &dyn Progress,
     enough: &AtomicBool,
@@ -185,18 +257,25 @@ fn side_by_side<F: VectorField<N>, const N: usize>(
     let first = cells[0].run();
     let plane = cells[0].plane();
     let runs: Vec<Run<N>> = cells.iter().map(|cell| course(cell.run())).collect();
-    // y and z, as `Fate` looks at them; systems that have such a corner have three states.
-    let corner = far::corner(first).map(|c| SVector::from_fn(|i, _| if i == 0 { f64::NEG_INFINITY } else { c }));
+    // y and z, as `Fate` looks at them; systems that have such a corner have three states. No state is above infinity.
+    let corners: Vec<SVector<f64, N>> = cells
+        .iter()
+        .map(|cell| match far::corner(cell.run()) {
+            Some(c) => SVector::from_fn(|i, _| if i == 0 { f64::NEG_INFINITY } else { c }),
+            None => SVector::repeat(f64::INFINITY),
+        })
+        .collect();
+    let corners = corners.iter().any(|corner| corner[N - 1] < f64::INFINITY).then_some(&corners[..]);
     let display = progress.begin("cells side by side", first.t_end);
     let watch = Both { display: &*display, enough };
-    let common = Common { tolerance: first.method.tolerance, plane, corner, watch: &watch };
+    let common = Common { tolerance: first.method.tolerance, plane, corners, watch: &watch };
     let observer = |_| match plane {
         Some(Plane { coordinate, value }) => SectionRecorder::<N>::new(coordinate, value),
         None => SectionRecorder::<N>::new(0, 0.0),
     };
     let mut interrupted = false;
     let mut unfinished = cells.len();
-    ensemble_watched(set, field, &runs, common, observer, &mut |i, end| {
+    ensemble_watched(set, equations, &runs, common, observer, &mut |i, end| {
         unfinished -= 1;
         if interrupted || enough.load(Ordering::Relaxed) {
             return;
