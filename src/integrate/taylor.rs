@@ -219,6 +219,19 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         t_end: f64,
         max_step: f64,
     ) -> Result<(), Failure> {
+        self.solution.set_tape(&field.tape(), self.constants);
+        self.begin(field, t, x, t_end, max_step)
+    }
+
+    /// A start, the equation being known.
+    fn begin<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        t: S,
+        x: SVector<S, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
         self.t = t;
         self.x = x;
         self.lost = SVector::from_element(S::zero());
@@ -226,7 +239,7 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         self.max_step = max_step;
         self.h = S::zero();
         self.statistics.restarts += 1;
-        self.record(field);
+        self.statistics.evaluations += 1;
         let rounded = self.x.map(S::to_f64);
         if !finite(&rounded) || !finite(&field.eval(&rounded)) {
             return Err(Failure::NotFinite { t: t.to_f64(), state: Failure::state(&rounded) });
@@ -234,9 +247,12 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         Ok(())
     }
 
-    fn record<F: VectorField<N>>(&mut self, field: &F) {
-        self.solution.set_tape(&field.tape(), self.constants);
-        self.statistics.evaluations += 1;
+    /// A state in `f64` as it is meant: a start is given in decimal, like the constants; later states are what they are.
+    fn exact(&self, t: f64, x: SVector<f64, N>) -> SVector<S, N> {
+        x.map(|x| match self.constants {
+            Constants::Decimal if t == 0.0 && x.is_finite() => S::from_decimal(&x.into()),
+            _ => S::from_f64(x),
+        })
     }
 
     /// The last step's series at the time `s` after its start.
@@ -394,6 +410,17 @@ fn speed(c: &[f64], s: f64) -> f64 {
     c.iter().enumerate().skip(1).rev().fold(0.0, |sum, (k, c)| sum * s + k as f64 * c.abs())
 }
 
+/// [`travel`] and [`speed`], which need not wait for each other.
+fn travel_and_speed(c: &[f64], s: f64) -> (f64, f64) {
+    let (mut travel, mut speed, mut k) = (0.0, 0.0, c.len() as f64);
+    for c in c[1..].iter().rev() {
+        k -= 1.0;
+        travel = (travel + c.abs()) * s;
+        speed = speed * s + k * c.abs();
+    }
+    (travel, speed)
+}
+
 /// A time in [0, h] during which the polynomial `w`, which starts beyond `edge` + EDGE_MARGIN, certainly stays beyond
 /// `edge`; if less than `h`, it ends less than EDGE_MARGIN beyond (or the search was given up).
 fn free_time(w: &[f64], edge: f64, h: f64) -> f64 {
@@ -416,17 +443,20 @@ fn free_time(w: &[f64], edge: f64, h: f64) -> f64 {
 /// A time in [0, h] during which the polynomial `w` certainly moves by `stride` (and a thousandth) at most; not much shorter than need
 /// be.
 fn stride_time(w: &[f64], stride: f64, h: f64) -> f64 {
-    if travel(w, h) <= stride {
+    // The first term alone often tells; no rounding makes the sum less.
+    let fast = w[1].abs() * h > stride;
+    if !fast && travel(w, h) <= stride {
         return h;
     }
     // The travel is increasing and convex, so that Newton's method from the right converges from the right.
     let mut s = h.min(stride / w[1].abs());
     for _ in 0..50 {
-        let excess = travel(w, s) - stride;
+        let (travel, speed) = travel_and_speed(w, s);
+        let excess = travel - stride;
         if excess <= 1e-3 * stride {
             break;
         }
-        s -= excess / speed(w, s);
+        s -= excess / speed;
     }
     s
 }
@@ -440,15 +470,34 @@ impl<const N: usize, S: Precision> Stepper<N> for Taylor<N, S> {
         t_end: f64,
         max_step: f64,
     ) -> Result<(), Failure> {
-        // A start is given in decimal, like the constants; later states are what they are.
-        let exact = |x: f64| match self.constants {
-            Constants::Decimal if t == 0.0 && x.is_finite() => S::from_decimal(&x.into()),
-            _ => S::from_f64(x),
-        };
-        self.restart_from(field, S::from_f64(t), x.map(exact), t_end, max_step)
+        let x = self.exact(t, x);
+        self.restart_from(field, S::from_f64(t), x, t_end, max_step)
+    }
+
+    fn restart_again<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
+        let x = self.exact(t, x);
+        self.begin(field, S::from_f64(t), x, t_end, max_step)
     }
 
     fn step<F: VectorField<N>>(&mut self, _: &F) -> Result<Step<'_, N>, Failure> {
+        self.advance()
+    }
+
+    fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+}
+
+impl<const N: usize, S: Precision> Taylor<N, S> {
+    /// A step. The equation is on the tape by now, so that this is compiled once for all equations.
+    fn advance(&mut self) -> Result<Step<'_, N>, Failure> {
         let (t0, x0) = (self.t.to_f64(), self.x.map(S::to_f64));
         self.solution.expand(self.x.as_slice());
         // One evaluation of the series costs about as much as one of the right-hand side per degree.
@@ -467,11 +516,18 @@ impl<const N: usize, S: Precision> Stepper<N> for Taylor<N, S> {
         self.h = if last { remaining } else { S::from_f64(h) };
         // Summed with what the sums before have lost (Moller 1965; Hairer, Lubich & Wanner 2006, sec. VIII.5): an error is then small beside the step's
         // increment, not beside the state.
+        // All components at once: none waits for another.
+        let series: [&[S]; N] = std::array::from_fn(|i| &self.solution.component(i)[..=self.order]);
+        let mut increment = SVector::<S, N>::from_element(S::zero());
+        for k in (1..=self.order).rev() {
+            for i in 0..N {
+                increment[i] = (increment[i] + series[i][k]) * self.h;
+            }
+        }
         let mut x = self.x;
         let mut lost = self.lost;
         for i in 0..N {
-            let series = &self.solution.component(i)[1..];
-            let increment = series.iter().rev().fold(S::zero(), |sum, c| (sum + *c) * self.h) + self.lost[i];
+            let increment = increment[i] + self.lost[i];
             x[i] = self.x[i] + increment;
             lost[i] = (self.x[i] - x[i]) + increment;
         }
@@ -484,17 +540,13 @@ impl<const N: usize, S: Precision> Stepper<N> for Taylor<N, S> {
 
         let mut power = S::one();
         self.rounded.coefficients.clear();
-        for k in 0..=self.order {
-            let c = SVector::from_fn(|i, _| (self.solution.component(i)[k] * power).to_f64());
-            self.rounded.coefficients.push(c);
+        self.rounded.coefficients.extend((0..=self.order).map(|k| {
+            let rounded = SVector::from_fn(|i, _| (series[i][k] * power).to_f64());
             power = power * self.h;
-        }
+            rounded
+        }));
         self.statistics.steps += 1;
         Ok(Step { t0, t1: self.t.to_f64(), x0, x1, interpolant: &self.rounded })
-    }
-
-    fn statistics(&self) -> &Statistics {
-        &self.statistics
     }
 }
 

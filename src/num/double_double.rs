@@ -294,6 +294,8 @@ impl SubAssign for DoubleDouble {
 }
 
 impl Arithmetic for DoubleDouble {
+    const EXACT_ZEROS: bool = true;
+
     #[inline]
     fn from_f64(value: f64) -> Self {
         Self { high: value, low: 0.0 }

@@ -23,6 +23,10 @@ pub trait Arithmetic:
     + Sync
     + 'static
 {
+    /// Whether zeros are exact to the bit, as long as all numbers are finite: a - a is positive zero, a - 0 is a, sums of products begin with positive zero, and products with
+    /// zero change nothing in them, nor zeros in a sum of others that is no negative zero. Work with numbers that are known to be zero may then be left out.
+    const EXACT_ZEROS: bool = false;
+
     /// The exact value of an `f64`.
     fn from_f64(value: f64) -> Self;
 
@@ -125,6 +129,8 @@ pub trait Scalar: Elementary + PartialOrd {
 }
 
 impl Arithmetic for f64 {
+    const EXACT_ZEROS: bool = true;
+
     #[inline]
     fn from_f64(value: f64) -> Self {
         value

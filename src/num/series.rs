@@ -8,13 +8,20 @@
 //! The tape also knows the arguments of every tanh and erf. That is how an integrator learns where an equation has a layer, without
 //! being told (see [`Solution::layer_arguments`]).
 
-use std::ops::Range;
+#[cfg(test)]
+mod plain;
+mod plan;
+mod table;
 
+use std::any::{Any, TypeId};
+
+use super::Elementary;
 use super::decimal::{Decimal, FromDecimal};
 use super::tape::{Operation, Tape};
-use super::{Arithmetic, Elementary};
+use plan::{Equation, Plan, advance, start};
+use table::{Columns, LONGEST, ROW, advance_rows, start_rows};
 
-/// A series: where its coefficients begin.
+/// A series: the state's components come first, then one for each recurrence.
 type Series = usize;
 
 /// A series of [`Recurrence::Weighted`].
@@ -87,12 +94,16 @@ pub enum LayerKind {
 pub struct Solution<S> {
     degree: usize,
     dimension: usize,
-    /// The series, `degree + 1` coefficients each: the state's components, then one for each recurrence.
+    /// The series, `degree + 1` coefficients each; if there are rows, only those that are read.
     coefficients: Vec<S>,
+    /// The same by degrees, if they are `f64`s and not too many: so cheap are these that where they lie matters.
+    rows: Vec<[f64; ROW]>,
     recurrences: Vec<Recurrence<S>>,
     /// The series of the components' derivatives.
     outputs: Vec<Series>,
     layer_arguments: Vec<(LayerKind, Series)>,
+    /// The plans that were needed so far.
+    plans: Vec<Plan<S>>,
 }
 
 impl<S: Elementary + FromDecimal> Solution<S> {
@@ -105,9 +116,11 @@ impl<S: Elementary + FromDecimal> Solution<S> {
             degree,
             dimension: 0,
             coefficients: Vec::new(),
+            rows: Vec::new(),
             recurrences: Vec::new(),
             outputs: Vec::new(),
             layer_arguments: Vec::new(),
+            plans: Vec::new(),
         };
         solution.set_tape(tape, constants);
         solution
@@ -125,7 +138,6 @@ impl<S: Elementary + FromDecimal> Solution<S> {
         };
         let mut compiler = Compiler {
             dimension: tape.variables(),
-            width: self.degree + 1,
             recurrences: std::mem::take(&mut self.recurrences),
             series: vec![None; tape.operations().len()],
             fixed,
@@ -135,7 +147,7 @@ impl<S: Elementary + FromDecimal> Solution<S> {
         let needed = tape.needed();
         for (node, operation) in tape.operations().iter().enumerate() {
             if let Operation::Variable(i) = operation {
-                compiler.series[node] = Some(*i * compiler.width);
+                compiler.series[node] = Some(*i);
             } else if needed[node] && compiler.fixed[node].is_none() {
                 let series = compiler.compile(*operation);
                 compiler.series[node] = Some(series);
@@ -150,25 +162,29 @@ impl<S: Elementary + FromDecimal> Solution<S> {
         self.outputs.extend(tape.outputs().iter().map(|node| compiler.of(*node)));
         self.dimension = tape.variables();
         self.recurrences = compiler.recurrences;
+        self.plans.clear();
+        let count = self.dimension + self.recurrences.len();
         self.coefficients.clear();
-        self.coefficients.resize((self.dimension + self.recurrences.len()) * (self.degree + 1), S::zero());
+        self.coefficients.resize(count * (self.degree + 1), S::zero());
+        self.rows.clear();
+        if TypeId::of::<S>() == TypeId::of::<f64>() && count <= ROW && self.degree <= LONGEST {
+            self.rows.resize(self.degree + 1, [0.0; ROW]);
+        }
     }
 
-    fn range(&self, series: Series) -> Range<usize> {
-        series..series + self.degree + 1
+    fn series(&self, series: Series) -> &[S] {
+        let width = self.degree + 1;
+        &self.coefficients[series * width..(series + 1) * width]
     }
 
     /// The series of the `i`-th component of the state: coefficient j belongs to t^j.
     pub fn component(&self, i: usize) -> &[S] {
-        &self.coefficients[self.range(i * (self.degree + 1))]
+        self.series(i)
     }
 
     /// The series of the arguments of every tanh and every erf in the equation, up to degree `degree - 1`.
     pub fn layer_arguments(&self) -> impl Iterator<Item = (LayerKind, &[S])> {
-        self.layer_arguments.iter().map(|(kind, series)| {
-            let range = self.range(*series);
-            (*kind, &self.coefficients[range.start..range.end - 1])
-        })
+        self.layer_arguments.iter().map(|(kind, series)| (*kind, &self.series(*series)[..self.degree]))
     }
 
     /// Computes the series of the solution that passes through `x` at t = 0.
@@ -178,98 +194,80 @@ impl<S: Elementary + FromDecimal> Solution<S> {
     pub fn expand(&mut self, x: &[S]) {
         assert_eq!(x.len(), self.dimension, "one number a component");
         let width = self.degree + 1;
-        // Recurrences rely on coefficients not yet computed being zero.
-        self.coefficients.fill(S::zero());
         for (i, value) in x.iter().enumerate() {
             self.coefficients[i * width] = *value;
         }
-        for k in 0..self.degree {
-            let mut series = self.dimension * width;
-            for i in 0..self.recurrences.len() {
-                self.coefficients[series + k] = self.coefficient(&self.recurrences[i], series, k);
-                series += width;
-            }
-            for i in 0..self.dimension {
-                self.coefficients[i * width + k + 1] = self.coefficients[self.outputs[i] + k].over((k + 1) as f64);
-            }
+        // Asked of the type and not of a constant of it: what is compiled for each degree is compiled for this type alone.
+        if let Some(solution) = (self as &mut dyn Any).downcast_mut::<Solution<f64>>().filter(|s| !s.rows.is_empty()) {
+            solution.expand_rows();
+        } else {
+            self.expand_columns();
         }
     }
 
-    /// Coefficient `k` of a series, those below `k` of itself and up to `k` of its arguments being known.
-    #[inline]
-    fn coefficient(&self, recurrence: &Recurrence<S>, this: Series, k: usize) -> S {
-        let width = self.degree + 1;
-        let series = |n: Series| &self.coefficients[n..n + width];
-        let at = |n: Series| self.coefficients[n + k];
-        // Coefficient k of the integral of a' b.
-        let integral = |weights: Weights, b: &[S]| weighted(series(weights), b, k).over(k as f64);
-        match *recurrence {
-            Recurrence::Constant(c) if k == 0 => c,
-            Recurrence::Constant(_) => S::zero(),
-            Recurrence::Add(a, b) => at(a) + at(b),
-            Recurrence::Sub(a, b) => at(a) - at(b),
-            Recurrence::Neg(a) => -at(a),
-            Recurrence::Shift(a, c) if k == 0 => at(a) + c,
-            Recurrence::Shift(a, _) => at(a),
-            Recurrence::Minus(c, a) if k == 0 => c - at(a),
-            Recurrence::Minus(_, a) => -at(a),
-            Recurrence::Scale(a, c) => at(a) * c,
-            Recurrence::Over(a, c) => at(a) / c,
-            Recurrence::Mul(a, b) if a == b => square(series(a), k),
-            Recurrence::Mul(a, b) => convolution(series(a), series(b), 0, k),
-            Recurrence::Div(a, b) => {
-                let (a, b) = (series(a), series(b));
-                (a[k] - tail(series(this), b, k)) / b[0]
-            }
-            Recurrence::Weighted(_) if k == 0 => S::zero(),
-            Recurrence::Weighted(a) => at(a).scale(k as f64),
-            Recurrence::Exp(a, _) if k == 0 => series(a)[0].exp(),
-            Recurrence::Exp(_, weights) => integral(weights, series(this)),
-            Recurrence::Ln(a) if k == 0 => series(a)[0].ln(),
-            // The coefficient asked for is still zero, so that the sum lacks exactly its term.
-            Recurrence::Ln(a) => (series(a)[k] - integral(this + width, series(a))) / series(a)[0],
-            Recurrence::Sqrt(a) if k == 0 => series(a)[0].sqrt(),
-            Recurrence::Sqrt(a) => {
-                let r = series(this);
-                // r_k is still zero, so that the square's coefficient lacks exactly 2 r_0 r_k.
-                (series(a)[k] - square(r, k)) / r[0].scale(2.0)
-            }
-            Recurrence::Sign(a) if k == 0 => series(a)[0].sign(),
-            Recurrence::Sign(_) => S::zero(),
-            Recurrence::Tanh(a, _) if k == 0 => series(a)[0].tanh(),
-            // u' = a' (1 - u^2)
-            Recurrence::Tanh(_, weights) => integral(weights, series(this + width)),
-            Recurrence::TanhSlope(u) if k == 0 => {
-                let known = match self.recurrences[u / width - self.dimension] {
-                    Recurrence::Tanh(a, _) => series(a)[0].sech_squared(),
-                    _ => None,
-                };
-                // As (1 - u)(1 + u): exactly zero where tanh is saturated, and accurate near it.
-                known.unwrap_or_else(|| (S::one() - series(u)[0]) * (S::one() + series(u)[0]))
-            }
-            Recurrence::TanhSlope(u) => -square(series(u), k),
-            Recurrence::Sin(a, _) if k == 0 => series(a)[0].sin(),
-            Recurrence::Sin(_, weights) => integral(weights, series(this + width)),
-            Recurrence::Cos(a, _) if k == 0 => series(a)[0].cos(),
-            Recurrence::Cos(_, weights) => -integral(weights, series(this - width)),
-            Recurrence::OnePlusSquare(a) if k == 0 => S::one() + series(a)[0].squared(),
-            Recurrence::OnePlusSquare(a) => square(series(a), k),
-            Recurrence::Atan(a) if k == 0 => series(a)[0].atan(),
-            Recurrence::Atan(a) => {
-                let w = series(this - width);
-                (series(a)[k] - integral(this + width, w)) / w[0]
-            }
-            Recurrence::Erf(a, _) if k == 0 => series(a)[0].erf(),
-            Recurrence::Erf(_, weights) => integral(weights, series(this - width)),
+    fn expand_columns(&mut self) {
+        if self.degree == 0 {
+            return;
         }
+        let width = self.degree + 1;
+        let mut coefficients = std::mem::take(&mut self.coefficients);
+        let mut table = Columns { coefficients: &mut coefficients, width, k: 0 };
+        let saturated = start(&self.equation(), &mut table);
+        let plan = self.plan(saturated);
+        for k in 1..self.degree {
+            table.k = k;
+            advance(&self.plans[plan], &mut table);
+        }
+        self.coefficients = coefficients;
+    }
+
+    fn equation(&self) -> Equation<'_, S> {
+        Equation {
+            dimension: self.dimension,
+            recurrences: &self.recurrences,
+            outputs: &self.outputs,
+            layer_arguments: &self.layer_arguments,
+        }
+    }
+
+    /// The index of the plan for these saturated tanh.
+    fn plan(&mut self, saturated: u64) -> usize {
+        self.plans.iter().position(|plan| plan.saturated == saturated).unwrap_or_else(|| {
+            let plan = Plan::new(&self.equation(), saturated);
+            self.plans.push(plan);
+            self.plans.len() - 1
+        })
+    }
+}
+
+impl Solution<f64> {
+    fn expand_rows(&mut self) {
+        if self.degree == 0 {
+            return;
+        }
+        let width = self.degree + 1;
+        let mut rows = std::mem::take(&mut self.rows);
+        for (start, series) in rows[0].iter_mut().zip(self.coefficients.chunks(width)).take(self.dimension) {
+            *start = series[0];
+        }
+        let saturated = start_rows(&self.equation(), &mut rows);
+        let plan = self.plan(saturated);
+        for k in 1..self.degree {
+            advance_rows(&self.plans[plan], &mut rows, k);
+        }
+        for series in (0..self.dimension).chain(self.layer_arguments.iter().map(|(_, series)| *series)) {
+            let column = &mut self.coefficients[series * width..(series + 1) * width];
+            for (coefficient, row) in column.iter_mut().zip(rows.iter()) {
+                *coefficient = row[series % ROW];
+            }
+        }
+        self.rows = rows;
     }
 }
 
 /// From a tape's operations to recurrences: terms without variables become numbers, and some functions get companions.
 struct Compiler<S> {
     dimension: usize,
-    /// Coefficients of a series.
-    width: usize,
     recurrences: Vec<Recurrence<S>>,
     /// The series of each operation, if it has one.
     series: Vec<Option<Series>>,
@@ -284,7 +282,7 @@ impl<S: Elementary> Compiler<S> {
 
     /// The series of a recurrence.
     fn at(&self, recurrence: usize) -> Series {
-        (self.dimension + recurrence) * self.width
+        self.dimension + recurrence
     }
 
     /// The series of an operation. A term without variables gets one where it is needed as such.
@@ -339,7 +337,7 @@ impl<S: Elementary> Compiler<S> {
                 return tanh;
             }
             Operation::Sin(a) => return self.sine(a),
-            Operation::Cos(a) => return self.sine(a) + self.width,
+            Operation::Cos(a) => return self.sine(a) + 1,
             Operation::Atan(a) => {
                 let a = self.of(a);
                 self.push(Recurrence::OnePlusSquare(a));
@@ -390,44 +388,11 @@ impl<S: Elementary> Compiler<S> {
     }
 }
 
-/// sum over j from `first` to k of a_j b_(k-j).
-#[inline]
-fn convolution<S: Arithmetic>(a: &[S], b: &[S], first: usize, k: usize) -> S {
-    if k < first {
-        return S::zero();
-    }
-    S::sum_of_products(&a[first..=k], &b[..=k - first])
-}
-
-/// sum over j from 1 to k of c_(k-j) b_j: what the known part of a quotient c = a/b contributes to a.
-#[inline]
-fn tail<S: Arithmetic>(c: &[S], b: &[S], k: usize) -> S {
-    convolution(b, c, 1, k)
-}
-
-/// Coefficient k of a^2, each product once.
-#[inline]
-fn square<S: Arithmetic>(a: &[S], k: usize) -> S {
-    let half = k.div_ceil(2);
-    let mut sum = S::sum_of_products(&a[..half], &a[k + 1 - half..=k]);
-    sum += sum;
-    if k.is_multiple_of(2) {
-        sum += a[k / 2].squared();
-    }
-    sum
-}
-
-/// sum over j from 1 to k of j a_j b_(k-j), from the `weights` j a_j: k times the coefficient k of the integral of a' b.
-#[inline]
-fn weighted<S: Arithmetic>(weights: &[S], b: &[S], k: usize) -> S {
-    S::sum_of_products(&weights[1..=k], &b[..k])
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::tape::Recorded;
     use super::*;
-    use crate::num::{DoubleDouble, Scalar};
+    use crate::num::{Arithmetic, DoubleDouble, Scalar};
 
     fn expand<const N: usize>(
         degree: usize,
@@ -565,6 +530,16 @@ mod tests {
     }
 
     #[test]
+    fn a_series_of_degree_zero_is_the_state() {
+        let s = expand(0, [0.25, 3.0], |x| vec![x[0] * x[1], x[1].tanh()]);
+        assert_eq!(
+            (s.component(0), s.component(1)),
+            (&[DoubleDouble::from_f64(0.25)][..], &[DoubleDouble::from_f64(3.0)][..])
+        );
+        assert!(s.layer_arguments().all(|(_, series)| series.is_empty()));
+    }
+
+    #[test]
     fn absolute_value_by_the_sign_at_the_start() {
         // x' = -|x| from -1: -exp(t); from 1: exp(-t)
         for (start, sign) in [(-1.0, 1.0), (1.0, -1.0_f64)] {
@@ -614,15 +589,5 @@ mod tests {
                 assert!(gap < 1e-27, "{start:?}: {gap:e}");
             }
         }
-    }
-
-    #[test]
-    fn a_square_is_a_product_to_the_last_bits() {
-        let c: Vec<f64> = (0..12).map(|i| 1.0 / f64::from(i + 3)).collect();
-        for k in 0..12 {
-            assert!((square(&c, k) - convolution(&c, &c, 0, k)).abs() < 1e-15, "{k}");
-        }
-        assert_eq!(convolution(&c, &c, 3, 2), 0.0);
-        assert_eq!(square(&[1.0, 2.0, 3.0], 2), 10.0);
     }
 }
