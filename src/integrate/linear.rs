@@ -1,9 +1,8 @@
 //! Linear systems of a fixed small size, for the implicit methods: LU with partial pivoting.
 //!
 //! `nalgebra`'s own `LU` type asks every caller to carry its dimension bounds (`DimMin`), up to the figure that only
-//! wants a `Stepper<N>`. Its elimination step does not, so the factorisation is put together from that.
+//! wants a `Stepper<N>`, and its elimination step finds the size out only when it runs.
 
-use nalgebra::linalg::{gauss_step, gauss_step_swap};
 use nalgebra::{ComplexField, SMatrix, SVector};
 
 /// P A = L U.
@@ -17,6 +16,7 @@ pub(super) struct Lu<T, const N: usize> {
 
 impl<T: ComplexField<RealField = f64> + Copy, const N: usize> Lu<T, N> {
     /// Factorises `a`; `None` if it is singular to working precision or not finite.
+    #[inline(always)]
     pub fn new(a: SMatrix<T, N, N>) -> Option<Self> {
         let mut factors = a;
         let mut exchanged = [0; N];
@@ -28,25 +28,29 @@ impl<T: ComplexField<RealField = f64> + Copy, const N: usize> Lu<T, N> {
                 }
             }
             exchanged[i] = pivot;
-            let diagonal = factors[(pivot, i)];
+            factors.swap_rows(i, pivot);
+            let diagonal = factors[(i, i)];
             // Written so that a NaN is refused as well.
             if !(diagonal.norm1() > 0.0 && diagonal.norm1().is_finite()) {
                 return None;
             }
-            if pivot == i {
-                gauss_step(&mut factors, diagonal, i);
-            } else {
-                // The swap of the already eliminated columns is ours to make.
-                for column in 0..i {
-                    factors.swap((i, column), (pivot, column));
+            let inverse = T::one() / diagonal;
+            for row in i + 1..N {
+                factors[(row, i)] *= inverse;
+            }
+            for column in i + 1..N {
+                let above = -factors[(i, column)];
+                for row in i + 1..N {
+                    let eliminated = above * factors[(row, i)];
+                    factors[(row, column)] = eliminated + factors[(row, column)];
                 }
-                gauss_step_swap(&mut factors, diagonal, i, pivot);
             }
         }
         Some(Self { factors, exchanged })
     }
 
     /// The solution of A x = b.
+    #[inline(always)]
     pub fn solve(&self, mut b: SVector<T, N>) -> SVector<T, N> {
         for (i, &with) in self.exchanged.iter().enumerate() {
             b.swap_rows(i, with);

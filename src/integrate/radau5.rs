@@ -248,7 +248,10 @@ impl<const N: usize> Radau5<N> {
         let t = &self.tableau;
         // Start: the last step's polynomial, continued (sec. IV.8, "Starting values").
         let mut z = match &self.dense {
-            Some(last) => t.c.map(|c| last.at(1.0 + c * h / last.h) - self.x),
+            Some(last) => {
+                let at = |c: f64| last.at(1.0 + c * h / last.h) - self.x;
+                [at(t.c[0]), at(t.c[1]), at(t.c[2])]
+            }
             None => [SVector::zeros(); 3],
         };
         let mut w_real = combine(&z, &t.l_real);
@@ -259,7 +262,8 @@ impl<const N: usize> Radau5<N> {
         let mut rate = 0.0;
         let mut size_before = 0.0;
         for iteration in 1..=control::MOST_ITERATIONS {
-            let f = z.map(|z| field.eval(&(self.x + z)));
+            let [z1, z2, z3] = &z;
+            let f = [field.eval(&(self.x + z1)), field.eval(&(self.x + z2)), field.eval(&(self.x + z3))];
             self.statistics.evaluations += 3;
             let right_real = combine(&f, &t.l_real) - w_real * (t.real / h);
             let delta_real = matrices.real.solve(right_real);
@@ -268,12 +272,13 @@ impl<const N: usize> Radau5<N> {
             let right_complex = SVector::from_fn(|i, _| f_complex[i] - w_complex[i] * shift);
             let delta_complex = matrices.complex.solve(right_complex);
             let expand = |real: &SVector<f64, N>, complex: &SVector<Complex<f64>, N>| {
-                [0, 1, 2].map(|s| {
+                let stage = |s: usize| {
                     SVector::<f64, N>::from_fn(|i, _| {
                         t.v_real[s] * real[i]
                             + 2.0 * (t.v_complex[s].re * complex[i].re - t.v_complex[s].im * complex[i].im)
                     })
-                })
+                };
+                [stage(0), stage(1), stage(2)]
             };
             let delta = expand(&delta_real, &delta_complex);
             let mut sum = 0.0;
@@ -452,7 +457,8 @@ impl<const N: usize> Stepper<N> for Radau5<N> {
             } else {
                 (h * factor).min(self.max_step)
             };
-            let p = self.tableau.polynomial.map(|row| combine(&solved.z, &row));
+            let [first, second, third] = &self.tableau.polynomial;
+            let p = [combine(&solved.z, first), combine(&solved.z, second), combine(&solved.z, third)];
             self.t = if last { self.t_end } else { t0 + h };
             self.x = x1;
             self.derivative = derivative;
