@@ -56,6 +56,7 @@ pub mod question;
 pub mod recording;
 pub mod run;
 pub mod scan;
+mod shortest;
 pub mod simulate;
 pub mod spec;
 pub mod store;
