@@ -171,8 +171,10 @@ pub fn make(figures: &[Figure], out: &Path, desk: &Desk<'_>) -> Result<Vec<Pictu
     desk.gather(&questions(figures.iter().flat_map(|f| &f.pictures)));
     let pictures: Vec<(PathBuf, &Picture)> =
         figures.iter().flat_map(|f| f.pictures.iter().map(|p| (out.join(f.id), p))).collect();
+    // One by one: in larger portions a thread would be left with several while others have none.
     let results: Vec<Result<(PictureRecord, Vec<Written>), CliError>> = pictures
         .par_iter()
+        .with_max_len(1)
         .map(|(folder, picture)| {
             let mut written = Vec::new();
             let mut keep = |file: &str, bytes: &[u8]| {
