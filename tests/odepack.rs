@@ -15,7 +15,6 @@ use data::{Reference, ReferenceProblem, ReferenceRun, reference};
 use problems::{Problem, Visit, for_each};
 use twofold::integrate::lsoda::{Family, Lsoda, Switch};
 use twofold::integrate::{Course, Ignore, Radau5, Statistics, StepCap, Stepper, Tolerance, drive};
-use twofold::system::VectorField;
 
 /// What our LSODA did.
 struct Ours {
@@ -26,8 +25,8 @@ struct Ours {
     bdf_orders: [u64; 5],
 }
 
-fn ours<F: VectorField<N>, const N: usize>(
-    problem: &Problem<F, N>,
+fn ours<const N: usize>(
+    problem: &Problem<N>,
     known: &ReferenceProblem,
     run: &ReferenceRun,
 ) -> Ours {
@@ -63,7 +62,7 @@ fn compare(check: impl FnMut(&str, &ReferenceProblem, &ReferenceRun, &Ours)) {
         check: C,
     }
     impl<C: FnMut(&str, &ReferenceProblem, &ReferenceRun, &Ours)> Visit for Each<C> {
-        fn visit<F: VectorField<N>, const N: usize>(&mut self, problem: &Problem<F, N>) {
+        fn visit<const N: usize>(&mut self, problem: &Problem<N>) {
             let known = self.reference.problems.iter().find(|p| p.name == problem.name).expect(problem.name);
             assert_eq!(known.start, problem.start.as_slice(), "{}", problem.name);
             for run in &known.runs {
@@ -188,7 +187,7 @@ fn switches_are_odepacks() {
 fn radau5_reaches_the_reference_solutions() {
     struct Check(Reference);
     impl Visit for Check {
-        fn visit<F: VectorField<N>, const N: usize>(&mut self, problem: &Problem<F, N>) {
+        fn visit<const N: usize>(&mut self, problem: &Problem<N>) {
             let known = self.0.problems.iter().find(|p| p.name == problem.name).expect(problem.name);
             let error = |tolerance: f64| {
                 let mut radau = Radau5::new(Tolerance { rtol: tolerance, atol: tolerance * known.atol_over_rtol });

@@ -3,7 +3,6 @@
 use serde::Deserialize;
 use twofold::analyse::work_precision::{WorkPrecisionQuestion, weighted_error, work_precision};
 use twofold::integrate::{Method, StepCap, Tolerance};
-use twofold::system::VectorField;
 
 use super::problems::{Problem, Visit, for_each};
 
@@ -130,7 +129,7 @@ pub fn rows() -> Vec<Row> {
         rows: Vec<Row>,
     }
     impl Visit for Collect {
-        fn visit<F: VectorField<N>, const N: usize>(&mut self, problem: &Problem<F, N>) {
+        fn visit<const N: usize>(&mut self, problem: &Problem<N>) {
             let Self { reference, rows } = self;
             let known =
                 reference.problems.iter().find(|p| p.name == problem.name).expect("every problem has a reference");

@@ -9,6 +9,11 @@ use crate::num::elementary::cos;
 ///
 /// Brent (1973), ch. 4: inverse quadratic interpolation and secant steps, kept inside the bracket by bisection.
 pub fn brent(mut f: impl FnMut(f64) -> f64, a: f64, b: f64, fa: f64, fb: f64) -> f64 {
+    brent_of(&mut f, a, b, fa, fb)
+}
+
+/// For any function, so that it is compiled once for all of them; so are those below.
+fn brent_of(f: &mut dyn FnMut(f64) -> f64, a: f64, b: f64, fa: f64, fb: f64) -> f64 {
     let (mut a, mut b, mut fa, mut fb) = (a, b, fa, fb);
     let (mut c, mut fc) = (a, fa);
     let mut d = b - a;
@@ -88,11 +93,11 @@ impl Passages {
     /// `g` is sampled at two points more than the interpolant's degree; between samples that keep their sign, a smallest |g| in the
     /// middle is followed to its minimum, so that two zeros between neighbouring samples are found as well.
     pub fn in_step<const N: usize>(&mut self, step: &Step<'_, N>, g: impl Fn(&SVector<f64, N>) -> f64) -> Vec<Passage> {
-        self.of(step.interpolant.degree(), |theta| g(&step.at(theta)))
+        self.of(step.interpolant.degree(), &|theta| g(&step.at(theta)))
     }
 
     /// [`Passages::in_step`] for a function of the fraction of the step, on an interpolant of this degree.
-    fn of(&mut self, degree: usize, value: impl Fn(f64) -> f64) -> Vec<Passage> {
+    fn of(&mut self, degree: usize, value: &dyn Fn(f64) -> f64) -> Vec<Passage> {
         let n = degree + 2;
         let sample = |i: usize| {
             let s = i as f64 / n as f64;
@@ -108,7 +113,7 @@ impl Passages {
             if point.1 != 0.0 {
                 let side = point.1.signum();
                 if side != self.side && self.side != 0.0 {
-                    let theta = if last.1 == 0.0 { last.0 } else { brent(&value, last.0, point.0, last.1, point.1) };
+                    let theta = if last.1 == 0.0 { last.0 } else { brent(value, last.0, point.0, last.1, point.1) };
                     found.push(Passage { theta, upward: side > 0.0 });
                 }
                 self.side = side;
@@ -126,7 +131,7 @@ impl Passages {
             let same = (g0 > 0.0) == (g1 > 0.0) && (g1 > 0.0) == (g2 > 0.0);
             let mut between = None;
             if same && g1.abs() <= g0.abs() && g1.abs() <= g2.abs() {
-                let (s, v) = smallest(&value, s0, s2, g1.signum());
+                let (s, v) = smallest(value, s0, s2, g1.signum());
                 between = ((v > 0.0) != (g1 > 0.0)).then_some((s, v));
             }
             match between {
@@ -163,12 +168,12 @@ impl Passages {
             let theta = brent(|theta| step.coordinate(theta, coordinate) - value, 0.0, 1.0, h0, h1);
             return vec![Passage { theta, upward: h1 > 0.0 }];
         }
-        self.of(step.interpolant.degree(), |theta| step.coordinate(theta, coordinate) - value)
+        self.of(step.interpolant.degree(), &|theta| step.coordinate(theta, coordinate) - value)
     }
 }
 
 /// Golden-section search for the smallest `sign * f` on [a, b]; stops early once it is negative.
-fn smallest(f: &impl Fn(f64) -> f64, mut a: f64, mut b: f64, sign: f64) -> (f64, f64) {
+fn smallest(f: &dyn Fn(f64) -> f64, mut a: f64, mut b: f64, sign: f64) -> (f64, f64) {
     const INVERSE_GOLDEN: f64 = 0.618_033_988_749_894_9;
     let (mut c, mut d) = (b - INVERSE_GOLDEN * (b - a), a + INVERSE_GOLDEN * (b - a));
     let (mut fc, mut fd) = (sign * f(c), sign * f(d));
@@ -254,7 +259,7 @@ pub fn first_zero(f: impl Fn(f64) -> f64, start: Start) -> Option<Zero> {
     first_in(&reduced, 0.0, 1.0, 0)
 }
 
-fn first_in(q: &impl Fn(f64) -> f64, a: f64, b: f64, depth: usize) -> Option<Zero> {
+fn first_in(q: &dyn Fn(f64) -> f64, a: f64, b: f64, depth: usize) -> Option<Zero> {
     let basis = bernstein_basis();
     let at = |u: f64| q(if u >= 1.0 { b } else { a + (b - a) * u });
     let values: Coefficients = std::array::from_fn(|j| at(basis.nodes[j]));
@@ -274,7 +279,7 @@ fn first_in(q: &impl Fn(f64) -> f64, a: f64, b: f64, depth: usize) -> Option<Zer
     isolate(q, &coefficients, a, b, 0, size)
 }
 
-fn isolate(q: &impl Fn(f64) -> f64, c: &Coefficients, a: f64, b: f64, depth: usize, size: f64) -> Option<Zero> {
+fn isolate(q: &dyn Fn(f64) -> f64, c: &Coefficients, a: f64, b: f64, depth: usize, size: f64) -> Option<Zero> {
     let signs = c.iter().filter(|v| **v != 0.0).map(|v| *v > 0.0);
     let changes = signs.clone().zip(signs.skip(1)).filter(|(x, y)| x != y).count();
     let rounding = 64.0 * f64::EPSILON * size;

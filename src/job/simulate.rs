@@ -394,7 +394,7 @@ fn settings(spec: &RunSpec) -> filippov::Settings {
 /// A Filippov run, given what looks on.
 type FilippovRun<'a, const D: usize> = dyn FnMut(
         &filippov::Settings,
-        &mut AnyObserver<'_, dyn FilippovObserver<D> + '_>,
+        &mut dyn FilippovObserver<D>,
     ) -> Result<FilippovSummary<D>, filippov::FilippovError>
     + 'a;
 
@@ -405,7 +405,7 @@ fn watched<const D: usize>(
     run: &mut FilippovRun<'_, D>,
 ) -> Result<Recording<D>, JobError> {
     let settings = settings(spec);
-    let mut run = |observer: &mut dyn FilippovObserver<D>| run(&settings, &mut AnyObserver(observer))?.within_budget();
+    let mut run = |observer: &mut dyn FilippovObserver<D>| run(&settings, observer)?.within_budget();
     let recording = |data, summary: FilippovSummary<D>| Recording {
         data,
         t: summary.t,
@@ -435,15 +435,6 @@ fn watched<const D: usize>(
 
 /// Any observer, so that methods are compiled once for all of them.
 struct AnyObserver<'a, O: ?Sized>(&'a mut O);
-
-impl<const N: usize> FilippovObserver<N> for AnyObserver<'_, dyn FilippovObserver<N> + '_> {
-    fn step(&mut self, mode: Mode, step: &Step<'_, N>) -> Flow {
-        self.0.step(mode, step)
-    }
-    fn event(&mut self, event: &ModeEvent<N>) -> Flow {
-        self.0.event(event)
-    }
-}
 
 impl<const N: usize> Observer<N> for AnyObserver<'_, dyn Observer<N> + '_> {
     fn step(&mut self, step: &Step<'_, N>) -> Flow {

@@ -18,17 +18,16 @@ use crate::system::{PiecewiseSmooth, VectorField, variables};
 ///
 /// # Errors
 /// See [`FilippovError`]; each names the time and the state.
-pub fn run<P, O, const N: usize, const M: usize>(
+pub fn run<P, const N: usize, const M: usize>(
     system: &P,
     x0: SVector<f64, N>,
     t_end: f64,
     settings: &Settings,
     rule: ExitRule,
-    observer: &mut O,
+    observer: &mut dyn FilippovObserver<N>,
 ) -> Result<FilippovSummary<N>, FilippovError>
 where
     P: PiecewiseSmooth<N>,
-    O: FilippovObserver<N>,
     for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
 {
     run_watched(system, x0, t_end, settings, rule, observer, &())
@@ -38,18 +37,17 @@ where
 ///
 /// # Errors
 /// See [`FilippovError`]; each names the time and the state.
-pub fn run_watched<P, O, const N: usize, const M: usize>(
+pub fn run_watched<P, const N: usize, const M: usize>(
     system: &P,
     x0: SVector<f64, N>,
     t_end: f64,
     settings: &Settings,
     rule: ExitRule,
-    observer: &mut O,
+    observer: &mut dyn FilippovObserver<N>,
     watch: &dyn Watch,
 ) -> Result<FilippovSummary<N>, FilippovError>
 where
     P: PiecewiseSmooth<N>,
-    O: FilippovObserver<N>,
     for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
 {
     let origin = Origin { t: 0.0, x: x0, departure: Departure::Anywhere };
@@ -76,18 +74,17 @@ pub(super) enum Departure<const N: usize> {
 }
 
 /// [`run_watched`] from anywhere, with an exit rule that may have been at work before.
-pub(super) fn run_from<P, O, const N: usize, const M: usize>(
+pub(super) fn run_from<P, const N: usize, const M: usize>(
     system: &P,
     origin: Origin<N>,
     t_end: f64,
     settings: &Settings,
     chooser: &mut Chooser,
-    observer: &mut O,
+    observer: &mut dyn FilippovObserver<N>,
     watch: &dyn Watch,
 ) -> Result<FilippovSummary<N>, FilippovError>
 where
     P: PiecewiseSmooth<N>,
-    O: FilippovObserver<N>,
     for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
 {
     let Origin { t: t0, x: x0, departure } = origin;
@@ -356,12 +353,13 @@ struct Lie {
     zero_q: f64,
 }
 
-struct Engine<'a, P, O, const N: usize> {
+struct Engine<'a, P, const N: usize> {
     system: &'a P,
     settings: &'a Settings,
     /// The exit rule at work. It goes on from run to run where one run is made of several.
     chooser: &'a mut Chooser,
-    observer: &'a mut O,
+    /// Any, so that the engine is compiled once for all of them.
+    observer: &'a mut dyn FilippovObserver<N>,
     watch: &'a dyn Watch,
     t: f64,
     x: SVector<f64, N>,
@@ -373,7 +371,7 @@ struct Engine<'a, P, O, const N: usize> {
     steps_until_watch: u32,
 }
 
-impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> Engine<'_, P, O, N> {
+impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     fn summary(self, mode: Option<Mode>, stop: StopReason) -> FilippovSummary<N> {
         FilippovSummary { t: self.t, x: self.x, mode, stop, events: self.events, statistics: self.statistics }
     }

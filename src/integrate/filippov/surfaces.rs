@@ -35,18 +35,17 @@ pub const INTERSECTION: f64 = 1e-9;
 /// # Errors
 /// [`FilippovError::Intersection`] where the run comes to both surfaces at once; else see [`FilippovError`]. Each names the time and the
 /// state.
-pub fn run_two_surfaces<P, O, const N: usize, const M: usize>(
+pub fn run_two_surfaces<P, const N: usize, const M: usize>(
     faces: &Faces<P>,
     x0: SVector<f64, N>,
     t_end: f64,
     settings: &Settings,
     rule: ExitRule,
-    observer: &mut O,
+    observer: &mut dyn FilippovObserver<N>,
     watch: &dyn Watch,
 ) -> Result<FilippovSummary<N>, FilippovError>
 where
     P: PiecewiseSmooth<N>,
-    O: FilippovObserver<N>,
     for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
 {
     if rule == ExitRule::All {
@@ -186,8 +185,8 @@ struct Hit<const N: usize> {
 }
 
 /// Looks out for the other surface, and hands everything on.
-struct Guard<'a, P, O, const N: usize> {
-    observer: &'a mut O,
+struct Guard<'a, P, const N: usize> {
+    observer: &'a mut dyn FilippovObserver<N>,
     guarded: &'a P,
     /// The sign of its function.
     sign: f64,
@@ -200,7 +199,7 @@ struct Guard<'a, P, O, const N: usize> {
     hit: Option<Hit<N>>,
 }
 
-impl<P: PiecewiseSmooth<N>, O: FilippovObserver<N>, const N: usize> FilippovObserver<N> for Guard<'_, P, O, N> {
+impl<P: PiecewiseSmooth<N>, const N: usize> FilippovObserver<N> for Guard<'_, P, N> {
     fn step(&mut self, mode: Mode, step: &Step<'_, N>) -> Flow {
         if self.hit.is_some() {
             return Flow::Stop;
