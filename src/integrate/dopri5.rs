@@ -164,7 +164,7 @@ impl<const N: usize> Dopri5<N> {
         let x = self.x;
         let longest = self.max_step.min(self.t_end - self.t);
         let norm = |v: &SVector<f64, N>| self.norm(v, |i| x[i].abs());
-        let h = starting_step(&x, &self.fsal, norm, 0.2, longest, |y| field.eval(y));
+        let h = starting_step(&x, &self.fsal, &norm, 0.2, longest, &|y| field.eval(y));
         self.statistics.evaluations += 1;
         h
     }

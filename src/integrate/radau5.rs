@@ -218,7 +218,7 @@ impl<const N: usize> Radau5<N> {
         let weights = self.weights();
         let longest = self.max_step.min(self.t_end - self.t);
         let norm = |v: &SVector<f64, N>| norm(v, &weights);
-        let h = starting_step(&self.x, &self.derivative, norm, 0.25, longest, |y| field.eval(y));
+        let h = starting_step(&self.x, &self.derivative, &norm, 0.25, longest, &|y| field.eval(y));
         self.statistics.evaluations += 1;
         h
     }

@@ -11,10 +11,10 @@ use crate::num::elementary::rough_pow;
 pub(super) fn starting_step<const N: usize>(
     x: &SVector<f64, N>,
     derivative: &SVector<f64, N>,
-    norm: impl Fn(&SVector<f64, N>) -> f64,
+    norm: &dyn Fn(&SVector<f64, N>) -> f64,
     exponent: f64,
     longest: f64,
-    eval: impl FnOnce(&SVector<f64, N>) -> SVector<f64, N>,
+    eval: &dyn Fn(&SVector<f64, N>) -> SVector<f64, N>,
 ) -> f64 {
     let (d0, d1) = (norm(x), norm(derivative));
     let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 };
@@ -35,7 +35,7 @@ mod tests {
     /// The first step of x' = f(x) from `x` with tolerances of 1e-6, by hand from the book's recipe.
     fn first(x: f64, f: impl Fn(f64) -> f64, longest: f64) -> f64 {
         let norm = |v: &SVector<f64, 1>| v[0].abs() / (1e-6 + 1e-6 * x.abs());
-        starting_step(&vector![x], &vector![f(x)], norm, 0.2, longest, |y| vector![f(y[0])])
+        starting_step(&vector![x], &vector![f(x)], &norm, 0.2, longest, &|y| vector![f(y[0])])
     }
 
     fn near(a: f64, b: f64) {

@@ -220,13 +220,13 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         max_step: f64,
     ) -> Result<(), Failure> {
         self.solution.set_tape(&field.tape(), self.constants);
-        self.begin(field, t, x, t_end, max_step)
+        self.begin(&|x| field.eval(x), t, x, t_end, max_step)
     }
 
-    /// A start, the equation being known.
-    fn begin<F: VectorField<N>>(
+    /// A start, the equation being known. Like the step it is compiled once for all equations.
+    fn begin(
         &mut self,
-        field: &F,
+        eval: &dyn Fn(&SVector<f64, N>) -> SVector<f64, N>,
         t: S,
         x: SVector<S, N>,
         t_end: f64,
@@ -241,7 +241,7 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         self.statistics.restarts += 1;
         self.statistics.evaluations += 1;
         let rounded = self.x.map(S::to_f64);
-        if !finite(&rounded) || !finite(&field.eval(&rounded)) {
+        if !finite(&rounded) || !finite(&eval(&rounded)) {
             return Err(Failure::NotFinite { t: t.to_f64(), state: Failure::state(&rounded) });
         }
         Ok(())
@@ -483,7 +483,7 @@ impl<const N: usize, S: Precision> Stepper<N> for Taylor<N, S> {
         max_step: f64,
     ) -> Result<(), Failure> {
         let x = self.exact(t, x);
-        self.begin(field, S::from_f64(t), x, t_end, max_step)
+        self.begin(&|x| field.eval(x), S::from_f64(t), x, t_end, max_step)
     }
 
     fn step<F: VectorField<N>>(&mut self, _: &F) -> Result<Step<'_, N>, Failure> {
@@ -497,6 +497,7 @@ impl<const N: usize, S: Precision> Stepper<N> for Taylor<N, S> {
 
 impl<const N: usize, S: Precision> Taylor<N, S> {
     /// A step. The equation is on the tape by now, so that this is compiled once for all equations.
+    #[inline(never)]
     fn advance(&mut self) -> Result<Step<'_, N>, Failure> {
         let (t0, x0) = (self.t.to_f64(), self.x.map(S::to_f64));
         self.solution.expand(self.x.as_slice());

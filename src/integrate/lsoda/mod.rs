@@ -213,6 +213,7 @@ impl<const N: usize> Lsoda<N> {
     }
 
     /// The weighted maximum norm.
+    #[inline]
     fn norm(&self, v: &SVector<f64, N>) -> f64 {
         let mut largest = 0.0;
         for (v, w) in v.iter().zip(&self.weights) {
