@@ -227,6 +227,8 @@ bench-keep: ## benchmarks, kept as what `make bench` compares with
 	@$(CARGO) bench --locked --bench steppers -- --save-baseline kept
 	@$(CARGO) bench --locked --bench render -- --save-baseline kept
 
+# What is built once needs no notes for the next time; they take more room on the disk than all the rest.
+ci: export CARGO_INCREMENTAL = 0
 ci: lint test ## what CI runs; nothing in it rests on a store
 	@$(MAKE) --no-print-directory figures FIGURE_FLAGS=--fresh
 	@$(MAKE) --no-print-directory check

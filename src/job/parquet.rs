@@ -122,6 +122,11 @@ fn sound(pages: Box<dyn PageReader>, kind: Kind, rows: usize) -> Result<bool, Pa
 ///
 /// If the file is anything else.
 pub fn from_parquet(bytes: &[u8]) -> Result<(Heading, Table), Malformed> {
+    read(bytes, WORDS)
+}
+
+/// [`from_parquet`] with at most so many rows of words alone.
+fn read(bytes: &[u8], most_words: usize) -> Result<(Heading, Table), Malformed> {
     let wrong = |e: ParquetError| Malformed(e.to_string());
     let reader = SerializedFileReader::new(Bytes::copy_from_slice(bytes)).map_err(wrong)?;
     let metadata = reader.metadata().file_metadata();
@@ -150,7 +155,7 @@ pub fn from_parquet(bytes: &[u8]) -> Result<(Heading, Table), Malformed> {
     for group in 0..reader.num_row_groups() {
         let group = reader.get_row_group(group).map_err(wrong)?;
         let rows = usize::try_from(group.metadata().num_rows()).map_err(|_| Malformed("a negative length".into()))?;
-        if rows > GROUP || (words_alone && table.len() + rows > WORDS) {
+        if rows > GROUP || (words_alone && table.len() + rows > most_words) {
             return Err(Malformed(format!("a group of {rows} rows")));
         }
         for (i, column) in table.columns.iter().enumerate() {
@@ -189,6 +194,7 @@ pub fn from_parquet(bytes: &[u8]) -> Result<(Heading, Table), Malformed> {
 mod tests {
     use super::*;
     use crate::job::encode::bits;
+    use ::parquet::file::metadata::{ParquetMetaDataWriter, RowGroupMetaData};
     use serde_json::json;
 
     fn table(rows: usize) -> Table {
@@ -232,6 +238,54 @@ mod tests {
             let said = from_parquet(&lies).unwrap_err().to_string();
             assert!(said.contains("column mode is not laid out as it is here"), "{said}");
         }
+    }
+
+    /// `bytes` with other row groups in its footer.
+    fn with_groups(bytes: &[u8], change: impl Fn(&RowGroupMetaData) -> Vec<RowGroupMetaData>) -> Vec<u8> {
+        let reader = SerializedFileReader::new(Bytes::copy_from_slice(bytes)).unwrap();
+        let metadata = reader.metadata().clone();
+        let groups = metadata.row_groups().iter().flat_map(change).collect();
+        let metadata = metadata.into_builder().set_row_groups(groups).build();
+        // A footer ends with its length and the magic number.
+        let (before, end) = bytes.split_at(bytes.len() - 8);
+        let footer = u32::from_le_bytes(end[..4].try_into().unwrap()) as usize;
+        let mut changed = before[..before.len() - footer].to_vec();
+        ParquetMetaDataWriter::new(&mut changed, &metadata).finish().unwrap();
+        changed
+    }
+
+    /// The same bytes for every group of rows: a short file that would be a long table.
+    #[test]
+    fn one_place_is_read_once() {
+        let bytes = parquet(&table(1000), &Value::Null);
+        let same = with_groups(&bytes, |group| vec![group.clone()]);
+        assert_eq!(bits(&[from_parquet(&same).unwrap().1]), bits(&[table(1000)]), "a footer may be written anew");
+        let said = from_parquet(&with_groups(&bytes, |group| vec![group.clone(); 3])).unwrap_err().to_string();
+        assert!(said.contains("its columns are longer than the file"), "{said}");
+        let negative = with_groups(&bytes, |group| {
+            let mut columns = group.columns().to_vec();
+            columns[0] = columns[0].clone().into_builder().set_data_page_offset(-4).build().unwrap();
+            vec![group.clone().into_builder().set_column_metadata(columns).build().unwrap()]
+        });
+        let said = from_parquet(&negative).unwrap_err().to_string();
+        assert!(said.contains("a column at a negative place"), "{said}");
+    }
+
+    /// Words alone take next to no room in a file, and much in memory.
+    #[test]
+    fn words_alone_are_so_many_at_most() {
+        let words = |rows: usize| {
+            let mut table = Table::new("t", [Column::words("mode")]);
+            (0..rows).for_each(|_| table.push(["up".into()]));
+            parquet(&table, &Value::Null)
+        };
+        let bytes = words(5000);
+        assert!(bytes.len() < 2000, "{} bytes", bytes.len());
+        assert_eq!(read(&bytes, 5000).unwrap().1.len(), 5000);
+        let said = read(&bytes, 4999).unwrap_err().to_string();
+        assert!(said.contains("a group of 5000 rows"), "{said}");
+        // Numbers pay for their rows.
+        assert_eq!(read(&parquet(&table(1000), &Value::Null), 10).unwrap().1.len(), 1000);
     }
 
     #[test]

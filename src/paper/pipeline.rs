@@ -112,11 +112,7 @@ pub enum PipelineError {
 
 /// The hash of a decoded picture: width and height (little-endian), then RGBA row by row.
 pub fn pixel_hash(pixels: &Pixels) -> Hash {
-    let mut bytes = Vec::with_capacity(8 + pixels.rgba.len());
-    bytes.extend_from_slice(&pixels.width.to_le_bytes());
-    bytes.extend_from_slice(&pixels.height.to_le_bytes());
-    bytes.extend_from_slice(&pixels.rgba);
-    Hash::of(&bytes)
+    Hash::of_parts([&pixels.width.to_le_bytes()[..], &pixels.height.to_le_bytes(), &pixels.rgba])
 }
 
 /// What a picture's panels ask, label by label; a study's questions are named after their kind.
