@@ -324,6 +324,22 @@ fn wait_until(what: &str, mut ready: impl FnMut() -> bool) {
     }
 }
 
+/// Waits until it has worked for a second; on a loaded machine that takes longer.
+#[cfg(unix)]
+fn let_it_work(running: &mut Running) {
+    let stat = format!("/proc/{}/stat", running.child().id());
+    if !Path::new(&stat).exists() {
+        return std::thread::sleep(Duration::from_millis(1500));
+    }
+    // Fields 14 and 15, counted from the name's end, which is the second: hundredths of a second of the processor.
+    let used = || -> u64 {
+        let text = fs::read_to_string(&stat).unwrap_or_default();
+        let fields = text.rsplit(')').next().unwrap_or_default().split_whitespace().skip(11).take(2);
+        fields.map(|field| field.parse::<u64>().unwrap_or(0)).sum()
+    };
+    wait_until("a second of work", || used() >= 100);
+}
+
 /// Ctrl-C and SIGTERM: within a second (and what a loaded machine adds), one line, what is finished stays, nothing else does.
 #[cfg(unix)]
 #[test]
@@ -333,12 +349,11 @@ fn signals_leave_at_once_and_keep_what_is_finished() {
         let out = folder.path().join("orbit.csv");
         fs::write(&out, "the last whole one").unwrap();
         let ends = |mut running: Running, words: &[&str]| {
-            // Long enough for the program to have begun: it listens before it does anything else.
-            std::thread::sleep(Duration::from_millis(1500));
+            let_it_work(&mut running);
             let begun = Instant::now();
             signal(&mut running, name);
             let output = running.output();
-            assert!(begun.elapsed() < Duration::from_secs(4), "{name}: {:?}", begun.elapsed());
+            assert!(begun.elapsed() < Duration::from_secs(10), "{name}: {:?}", begun.elapsed());
             refuses(&output, code, words);
             let said = String::from_utf8(output.stderr.clone()).unwrap();
             assert_eq!(said.lines().count(), 1, "{said}");
@@ -444,13 +459,21 @@ fn short_fig7(folder: &Path, t_end: &str) -> Running {
 /// Figures are not lost without a word when something removes their folder meanwhile.
 #[test]
 fn a_folder_removed_meanwhile_is_noticed() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("fig7");
-    let mut made = short_fig7(folder.path(), "1000");
-    let record = |reading: &str| out.join(format!("fig7-{reading}-shortened.json"));
-    wait_until("the first picture", || ["printed", "reconstructed"].iter().any(|r| record(r).exists()) || made.ended());
-    fs::remove_dir_all(&out).unwrap();
-    refuses(&made.output(), 2, &["fig7", "run this again"]);
+    // On a loaded machine all may be done before the folder is removed: then there is nothing to notice.
+    let late = |made: &Output| made.status.code() == Some(0);
+    let made = std::iter::repeat_with(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("fig7");
+        let mut made = short_fig7(folder.path(), "1000");
+        let record = |reading: &str| out.join(format!("fig7-{reading}-shortened.json"));
+        wait_until("the first picture", || {
+            ["printed", "reconstructed"].iter().any(|r| record(r).exists()) || made.ended()
+        });
+        fs::remove_dir_all(&out).unwrap();
+        made.output()
+    });
+    let made = made.take(5).find(|made| !late(made)).expect("five times nothing was noticed");
+    refuses(&made, 2, &["fig7", "run this again"]);
 }
 
 #[test]

@@ -25,11 +25,7 @@ struct Ours {
     bdf_orders: [u64; 5],
 }
 
-fn ours<const N: usize>(
-    problem: &Problem<N>,
-    known: &ReferenceProblem,
-    run: &ReferenceRun,
-) -> Ours {
+fn ours<const N: usize>(problem: &Problem<N>, known: &ReferenceProblem, run: &ReferenceRun) -> Ours {
     let mut lsoda = Lsoda::new(Tolerance { rtol: run.rtol, atol: run.atol });
     let cap = known.max_step.unwrap_or(f64::INFINITY);
     lsoda.restart(&problem.field, 0.0, problem.start, known.t_end, cap).unwrap();

@@ -392,10 +392,7 @@ fn settings(spec: &RunSpec) -> filippov::Settings {
 }
 
 /// A Filippov run, given what looks on.
-type FilippovRun<'a, const D: usize> = dyn FnMut(
-        &filippov::Settings,
-        &mut dyn FilippovObserver<D>,
-    ) -> Result<FilippovSummary<D>, filippov::FilippovError>
+type FilippovRun<'a, const D: usize> = dyn FnMut(&filippov::Settings, &mut dyn FilippovObserver<D>) -> Result<FilippovSummary<D>, filippov::FilippovError>
     + 'a;
 
 /// A Filippov run, and what is to be recorded of it.
