@@ -3,7 +3,11 @@
 //! Numbers are required doubles (a blank is not-a-number), whole numbers 64-bit integers, words dictionary-encoded UTF-8. What a CSV file says in
 //! its first line stands in the file's metadata under the key `twofold`. Nothing is compressed: section points are noise to a compressor, and
 //! the compressors that other programs expect are not pure Rust.
+//!
+//! A Parquet file is little-endian. The crate writes and reads numbers, and writes the lengths of words, in the machine's own order of bytes: on a big-endian machine that is put right here
+//! (found by running `check` on s390x).
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use bytes::Bytes;
@@ -12,7 +16,7 @@ use parquet::column::page::{Page, PageReader};
 use parquet::column::reader::ColumnReader;
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::KeyValue;
+use parquet::file::metadata::{KeyValue, ParquetMetaData};
 use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterVersion};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
@@ -62,17 +66,25 @@ fn write(table: &Table, about: &Value, bytes: &mut Vec<u8>) -> Result<(), Parque
         .set_encoding(Encoding::PLAIN)
         .set_key_value_metadata(Some(vec![KeyValue::new(KEY.to_owned(), metadata)]));
     for column in table.columns.iter().filter(|c| c.kind() == Kind::Word) {
-        properties = properties.set_column_dictionary_enabled(ColumnPath::from(column.name.as_str()), true);
+        // However many: `lengths_in_file_order` looks for every word there.
+        let path = ColumnPath::from(column.name.as_str());
+        properties = properties
+            .set_column_dictionary_enabled(path.clone(), true)
+            .set_column_dictionary_page_size_limit(path, usize::MAX);
     }
-    let mut writer = SerializedFileWriter::new(bytes, schema, Arc::new(properties.build()))?;
+    let mut writer = SerializedFileWriter::new(&mut *bytes, schema, Arc::new(properties.build()))?;
     for start in (0..table.len()).step_by(GROUP) {
         let rows = start..(start + GROUP).min(table.len());
         let mut group = writer.next_row_group()?;
         for column in &table.columns {
             let mut to = group.next_column()?.ok_or_else(|| ParquetError::General("a column is missing".into()))?;
             match &column.cells {
-                Cells::Numbers(v) => to.typed::<DoubleType>().write_batch(&v[rows.clone()], None, None)?,
-                Cells::Integers(v) => to.typed::<Int64Type>().write_batch(&v[rows.clone()], None, None)?,
+                Cells::Numbers(v) => {
+                    to.typed::<DoubleType>().write_batch(&in_file_order(&v[rows.clone()], little), None, None)?
+                }
+                Cells::Integers(v) => {
+                    to.typed::<Int64Type>().write_batch(&in_file_order(&v[rows.clone()], i64::to_le), None, None)?
+                }
                 Cells::Words(w) => {
                     let words: Vec<ByteArray> = rows.clone().map(|row| ByteArray::from(w.get(row))).collect();
                     to.typed::<ByteArrayType>().write_batch(&words, None, None)?
@@ -82,8 +94,45 @@ fn write(table: &Table, about: &Value, bytes: &mut Vec<u8>) -> Result<(), Parque
         }
         group.close()?;
     }
-    writer.close()?;
+    let metadata = writer.close()?;
+    lengths_in_file_order(table, &metadata, bytes);
     Ok(())
+}
+
+/// The number whose bytes in this machine's order are those of `value` in a file.
+fn little(value: f64) -> f64 {
+    f64::from_bits(value.to_bits().to_le())
+}
+
+/// What the crate is to write.
+fn in_file_order<T: Copy>(values: &[T], little: impl Fn(T) -> T) -> Cow<'_, [T]> {
+    if cfg!(target_endian = "big") {
+        Cow::Owned(values.iter().map(|value| little(*value)).collect())
+    } else {
+        Cow::Borrowed(values)
+    }
+}
+
+/// Writes the lengths of words in dictionaries anew. A dictionary has a group's words in the order in which they occur there, each behind its length in four bytes, and ends where the data begin.
+fn lengths_in_file_order(table: &Table, metadata: &ParquetMetaData, bytes: &mut [u8]) {
+    for (group, start) in metadata.row_groups().iter().zip((0..table.len()).step_by(GROUP)) {
+        for (column, chunk) in table.columns.iter().zip(group.columns()) {
+            let Cells::Words(words) = &column.cells else { continue };
+            let mut seen = vec![false; words.vocabulary.len()];
+            let codes = &words.codes[start..(start + GROUP).min(table.len())];
+            let first = |code: &&u32| !std::mem::replace(&mut seen[**code as usize], true);
+            let dictionary: Vec<&String> =
+                codes.iter().filter(first).map(|code| &words.vocabulary[*code as usize]).collect();
+            let long: usize = dictionary.iter().map(|word| 4 + word.len()).sum();
+            let mut at = chunk.data_page_offset() as usize - long;
+            for word in dictionary {
+                let length = word.len() as u32;
+                debug_assert_eq!(bytes[at..at + 4], length.to_ne_bytes());
+                bytes[at..at + 4].copy_from_slice(&length.to_le_bytes());
+                at += 4 + word.len();
+            }
+        }
+    }
 }
 
 /// Whether a column's pages are such as [`parquet()`] writes. The decoders, unlike what reads the pages, take a page's word for how many values it has, and for a dictionary
@@ -168,8 +217,18 @@ fn read(bytes: &[u8], most_words: usize) -> Result<(Heading, Table), Malformed> 
         }
         for (i, column) in table.columns.iter_mut().enumerate() {
             let read = match (&mut column.cells, group.get_column_reader(i).map_err(wrong)?) {
-                (Cells::Numbers(v), ColumnReader::DoubleColumnReader(mut r)) => r.read_records(rows, None, None, v),
-                (Cells::Integers(v), ColumnReader::Int64ColumnReader(mut r)) => r.read_records(rows, None, None, v),
+                (Cells::Numbers(v), ColumnReader::DoubleColumnReader(mut r)) => {
+                    let before = v.len();
+                    let read = r.read_records(rows, None, None, v);
+                    v[before..].iter_mut().for_each(|value| *value = little(*value));
+                    read
+                }
+                (Cells::Integers(v), ColumnReader::Int64ColumnReader(mut r)) => {
+                    let before = v.len();
+                    let read = r.read_records(rows, None, None, v);
+                    v[before..].iter_mut().for_each(|value| *value = value.to_le());
+                    read
+                }
                 (Cells::Words(w), ColumnReader::ByteArrayColumnReader(mut r)) => {
                     let mut words = Vec::new();
                     let read = r.read_records(rows, None, None, &mut words).map_err(wrong)?;
@@ -218,6 +277,34 @@ mod tests {
             assert_eq!(heading.about, about);
             assert_eq!(bits(&[back]), bits(&[t]), "{rows} rows");
         }
+    }
+
+    /// A file is little-endian, whatever the machine: the bytes of a short one.
+    #[test]
+    fn bytes_are_in_file_order() {
+        let mut table =
+            Table::new("t", [Column::new("x", "", Kind::Number), Column::words("w"), Column::integers("n")]);
+        table.push([(-2.5).into(), "up".into(), 258.into()]);
+        let bytes = parquet(&table, &Value::Null);
+        let has = |what: &[u8]| bytes.windows(what.len()).any(|window| window == what);
+        assert!(has(&[0, 0, 0, 0, 0, 0, 4, 0xc0]), "-2.5");
+        assert!(has(&[2, 1, 0, 0, 0, 0, 0, 0]), "258");
+        assert!(has(&[2, 0, 0, 0, b'u', b'p']), "two letters");
+    }
+
+    /// Words of more than a megabyte, the last ones in a second group of rows.
+    #[test]
+    fn many_words_are_a_dictionary_too() {
+        let mut t = Table::new("t", [Column::words("w")]);
+        let word = |i: usize| format!("word number {i} of very many");
+        for i in 0..50_000 {
+            t.push([word(i).as_str().into()]);
+        }
+        for i in 0..GROUP {
+            t.push([word(i % 10).as_str().into()]);
+        }
+        let (_, back) = from_parquet(&parquet(&t, &Value::Null)).unwrap();
+        assert!(bits(&[back]) == bits(&[t]));
     }
 
     /// A dictionary that is passed over, and one that claims more words than it has bytes for.
