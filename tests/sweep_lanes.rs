@@ -111,7 +111,7 @@ fn rows_of_other_parameters_share_lanes() {
     are_the_rows(&sweep(forced, &["params.friction=0.1..0.3:9"]));
     // Zero is a number as any other, unless the equation is another one with it.
     are_the_rows(&sweep(run(caricature(), 5.0), &["params.beta=0,1e-5,1,-1", "params.alpha=0,1"]));
-    // Another transition function is another equation.
+    // Rows of different tolerances share no lanes.
     let one = sweep(run(caricature(), 5.0), &["params.alpha=0.1,0.2"]);
     let other = sweep(run(caricature(), 5.0), &["tolerance=1e-8,1e-9"]);
     assert!(!other.share_lanes(0, 1));

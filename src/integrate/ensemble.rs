@@ -103,6 +103,9 @@ impl InstructionSet {
 ///
 /// Each run has an observer of its own, made by `observer` from the run's number. It hears of every kick, and of those steps only that may
 /// meet `plane`: of none without one. (Steps that certainly do not meet a plane tell a section nothing, and most do not.)
+///
+/// # Panics
+/// If `equations` are those of fewer runs than `runs`.
 pub fn ensemble<E, O, const N: usize>(
     equations: &E,
     runs: &[Run<N>],
