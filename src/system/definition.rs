@@ -757,6 +757,24 @@ mod tests {
     use super::*;
     use crate::system::System;
 
+    /// A file, the same in another order and with other texts, and what is kept of it are one system.
+    #[test]
+    fn order_and_texts_of_a_file_make_no_other_system() {
+        let read = |title: &str, [a, b, c, d]: [&str; 4]| {
+            let text = format!(
+                "title = '{title}'\nstates = ['x', 'v']\nh = 'x'\nplus = ['p*v', 's + t']\nminus = ['v', 's + t + 1']\n\
+                 [let]\n{a}\n{b}\n[parameters]\n{c}\n{d}"
+            );
+            System::new(Definition::from_toml(&text, "").unwrap())
+        };
+        let one = read("One", ["t = 'p*x*v'", "s = 'q*v*v'", "q = 2", "p = 3"]);
+        let other = read("The same", ["s = 'q*v*v'", "t = 'p*x*v'", "p = 3", "q = 2"]);
+        let kept: System = serde_json::from_str(&serde_json::to_string(&one).unwrap()).unwrap();
+        assert_eq!([&other, &kept], [&one, &one]);
+        assert_ne!(read("One", ["t = 'p*x*v'", "s = 'q*v*v'", "q = 3", "p = 2"]), one);
+        assert_ne!(read("One", ["t = 'p*v*x'", "s = 'q*v*v'", "q = 2", "p = 3"]), one);
+    }
+
     const GOOD: &str = r#"name = "block"
 states = ["x", { name = "v", meaning = "speed" }]
 start = [0, 0.5]

@@ -333,9 +333,15 @@ impl fmt::Debug for System {
 }
 
 impl PartialEq for System {
-    /// Same definition, texts included, and same values.
+    /// Same name, equations and values, whatever texts and order they stand in: what is left of a system in JSON is equal to it.
     fn eq(&self, other: &Self) -> bool {
-        self.definition == other.definition && self.values == other.values
+        if Arc::ptr_eq(&self.definition, &other.definition) {
+            return self.values == other.values;
+        }
+        let values = |system: &Self, name: &str| system.parameters().find(|(n, _)| *n == name).map(|(_, v)| v.clone());
+        self.name() == other.name()
+            && self.definition.same_equations(&other.definition)
+            && self.parameters().all(|(name, value)| values(other, name).as_ref() == Some(value))
     }
 }
 
