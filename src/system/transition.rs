@@ -29,15 +29,19 @@ impl Transition {
     /// phi at the value `h` of the switching function, for the stiffness parameter `eps`.
     #[inline(always)]
     pub fn eval<S: Elementary>(&self, h: S, eps: f64) -> S {
-        let u = h / S::from_f64(eps);
+        let width = S::from_f64(eps);
+        // h/eps in every arm, and not once before them: where tanh is known beforehand (`num::Given`) nobody asks for it.
         match *self {
-            Transition::Tanh => half(u.tanh()),
+            Transition::Tanh => half((h / width).tanh()),
             Transition::PerturbedTanh { sigma } => {
-                half(u.tanh()) + (-(h * h)).exp().scale(sigma * Elementary::sqrt(eps))
+                half((h / width).tanh()) + (-(h * h)).exp().scale(sigma * Elementary::sqrt(eps))
             }
-            Transition::Arctan => u.atan() / S::from_f64(std::f64::consts::PI) + S::from_f64(0.5),
-            Transition::Algebraic => half(u / (S::one() + u * u).sqrt()),
-            Transition::Erf => half(u.erf()),
+            Transition::Arctan => (h / width).atan() / S::from_f64(std::f64::consts::PI) + S::from_f64(0.5),
+            Transition::Algebraic => {
+                let u = h / width;
+                half(u / (S::one() + u * u).sqrt())
+            }
+            Transition::Erf => half((h / width).erf()),
         }
     }
 

@@ -19,6 +19,9 @@ type Parts = [f64; PARTS];
 /// Most fixed-point iterations.
 const SWEEPS: usize = 14;
 
+/// The stage whose states are looked at to see whether they still move.
+const MIDDLE: usize = STAGES / 2;
+
 /// Never a part so short, in u, unless it is the last.
 const LEAST: f64 = 1e-2;
 
@@ -258,6 +261,24 @@ impl<F: VectorField<N>, const N: usize> Collocation<'_, F, N> {
     }
 }
 
+impl Gauss {
+    /// The integral of component `i`'s slopes from each part's start to stage `j`, for parts that are as long as they are for [`Gauss`].
+    #[inline(always)]
+    fn along<S: Simd, const N: usize, const K: usize>(
+        &self,
+        set: S,
+        slopes: &[[[S::f64s; K]; N]; STAGES],
+        i: usize,
+        j: usize,
+    ) -> Registers<S, K> {
+        let mut sum = Registers::splat(set, self.integrals[0][j]) * Registers::new(set, slopes[0][i]);
+        for m in 1..STAGES {
+            sum += Registers::splat(set, self.integrals[m][j]) * Registers::new(set, slopes[m][i]);
+        }
+        sum
+    }
+}
+
 impl<F: VectorField<N>, const N: usize, const K: usize> WithSimd for In<Collocation<'_, F, N>, K> {
     type Output = (bool, u64);
 
@@ -286,8 +307,8 @@ impl<F: VectorField<N>, const N: usize, const K: usize> WithSimd for In<Collocat
         let mut states = [[zero.parts(); N]; STAGES];
         let mut slopes = [[zero.parts(); N]; STAGES];
         let mut rates = [zero.parts(); STAGES];
-        // Where the parts begin, and the end.
-        let mut bounds = [[0.0; PARTS + 1]; N];
+        // Where each part begins and ends.
+        let (mut first, mut last) = ([zero.parts(); N], [zero.parts(); N]);
         let (mut evaluations, mut before) = (2, f64::NAN);
         for sweep in 0..SWEEPS {
             let mut forward = number(1.0);
@@ -325,46 +346,41 @@ impl<F: VectorField<N>, const N: usize, const K: usize> WithSimd for In<Collocat
             if forward.less(number(0.5), set).any() {
                 return (false, evaluations);
             }
-            let mut change = 0.0_f64;
+            // How far the ends of the parts have moved, and a state in the middle of each.
+            let (mut moved, mut no_number) = (zero, zero);
             for i in 0..N {
                 let mut increment = number(gauss.weights[0]) * full(slopes[0][i]);
                 for j in 1..STAGES {
                     increment += number(gauss.weights[j]) * full(slopes[j][i]);
                 }
                 let increments = bare(increment * half);
-                let mut sum = x0[i];
-                let mut starts = [0.0; PARTS];
+                let (mut sum, mut from, mut to) = (x0[i], [0.0; PARTS], [0.0; PARTS]);
                 for part in 0..PARTS {
-                    starts[part] = sum;
+                    from[part] = sum;
                     sum += increments[part];
-                    let moved = (sum - bounds[i][part + 1]).abs() * scale[i];
-                    // NaN must not be lost, as it would be in f64::max.
-                    change = if moved > change || moved.is_nan() { moved } else { change };
-                    bounds[i][part + 1] = sum;
+                    to[part] = sum;
                 }
-                let start = lanes(&starts);
-                for j in 0..STAGES {
-                    let mut sum = number(gauss.integrals[0][j]) * full(slopes[0][i]);
-                    for m in 1..STAGES {
-                        sum += number(gauss.integrals[m][j]) * full(slopes[m][i]);
-                    }
-                    let new = start + sum * half;
-                    if j == STAGES / 2 {
-                        let moved = bare((new - full(states[j][i])).size() * number(scale[i]));
-                        for part in 0..PARTS {
-                            change = if moved[part] > change || moved[part].is_nan() { moved[part] } else { change };
-                        }
-                    }
-                    states[j][i] = new.parts();
+                let (start, end) = (lanes(&from), lanes(&to));
+                let middle = start + gauss.along(set, &slopes, i, MIDDLE) * half;
+                let steps = [end - full(last[i]), middle - full(states[MIDDLE][i])];
+                for k in 0..steps.len() {
+                    let far = steps[k].size() * number(scale[i]);
+                    moved = moved.less(far, set).select(far, moved);
+                    // NaN must not be lost, as it is in a comparison.
+                    no_number = far.at_most(number(f64::INFINITY), set).select(no_number, far);
                 }
+                (first[i], last[i], states[MIDDLE][i]) = (start.parts(), end.parts(), middle.parts());
             }
-            if sweep == 0 {
-                continue;
+            let mut change = 0.0_f64;
+            for far in bare(moved + no_number) {
+                change = if far > change || far.is_nan() { far } else { change };
             }
             let contraction = change / before;
-            before = change;
+            if sweep > 0 {
+                before = change;
+            }
             // What is left is about change * contraction / (1 - contraction); of the first iteration nothing is known.
-            if contraction < 0.5 && change * contraction <= 0.02 || change <= 0.02 {
+            if sweep > 0 && (contraction < 0.5 && change * contraction <= 0.02 || change <= 0.02) {
                 let mut error = 0.0_f64;
                 for i in 0..N {
                     let (mut rough, mut size) = (zero, zero);
@@ -386,9 +402,8 @@ impl<F: VectorField<N>, const N: usize, const K: usize> WithSimd for In<Collocat
                     for part in bare(worst * number(scale[i])) {
                         error = error.max(part);
                     }
-                    crossing.states[i].copy_from_slice(&bounds[i][..PARTS]);
-                    crossing.states[i][0] = x0[i];
-                    crossing.end[i] = bounds[i][PARTS];
+                    crossing.states[i] = bare(full(first[i]));
+                    crossing.end[i] = bare(full(last[i]))[PARTS - 1];
                     for j in 0..STAGES {
                         crossing.slopes[i][j] = bare(full(slopes[j][i]));
                     }
@@ -406,8 +421,17 @@ impl<F: VectorField<N>, const N: usize, const K: usize> WithSimd for In<Collocat
                 crossing.duration = crossing.times[section.count];
                 return (error <= 1.0, evaluations);
             }
-            if contraction >= 0.5 {
+            if sweep > 0 && contraction >= 0.5 {
                 return (false, evaluations);
+            }
+            // Only now, since after the last iteration nobody asks for them.
+            for i in 0..N {
+                let start = full(first[i]);
+                for j in 0..STAGES {
+                    if j != MIDDLE {
+                        states[j][i] = (start + gauss.along(set, &slopes, i, j) * half).parts();
+                    }
+                }
             }
         }
         (false, evaluations)

@@ -114,16 +114,12 @@ struct Polynomial<const N: usize> {
 impl<const N: usize> Polynomial<N> {
     /// The coefficients of degree 0 to `degree` in the fraction of a step of length `h`, from those in time.
     fn scale(&mut self, series: &Series, h: f64, degree: usize) {
-        let mut powers = [0.0; MOST];
-        powers[0] = 1.0;
-        for k in 1..=degree {
-            powers[k] = powers[k - 1] * h;
-        }
-        for i in 0..N {
-            let from = series.component(i);
-            for k in 0..=degree {
-                self.coefficients[i][k] = from[k] * powers[k];
+        let mut power = 1.0;
+        for k in 0..(degree + 1).min(MOST) {
+            for i in 0..N {
+                self.coefficients[i][k] = series.component(i)[k] * power;
             }
+            power *= h;
         }
         self.count = degree + 1;
     }
