@@ -111,11 +111,18 @@ fn rows_of_other_parameters_share_lanes() {
     are_the_rows(&sweep(forced, &["params.friction=0.1..0.3:9"]));
     // Zero is a number as any other, unless the equation is another one with it.
     are_the_rows(&sweep(run(caricature(), 5.0), &["params.beta=0,1e-5,1,-1", "params.alpha=0,1"]));
-    // Rows of different tolerances share no lanes.
-    let one = sweep(run(caricature(), 5.0), &["params.alpha=0.1,0.2"]);
-    let other = sweep(run(caricature(), 5.0), &["tolerance=1e-8,1e-9"]);
-    assert!(!other.share_lanes(0, 1));
-    assert_eq!(one.share_lanes(0, 1), InstructionSet::best() != InstructionSet::Portable);
+    let alphas = sweep(run(caricature(), 5.0), &["params.alpha=0.1,0.2"]);
+    assert_eq!(alphas.share_lanes(0, 1), InstructionSet::best() != InstructionSet::Portable);
+}
+
+/// Tolerances that differ from lane to lane; methods do not.
+#[test]
+fn rows_of_other_tolerances_share_lanes() {
+    let sweep = |over: &[&str]| Sweep::new(run(caricature(), 20.0), axes(over), None).unwrap();
+    let tolerances = sweep(&["tolerance=1e-4,1e-6,1e-8,1e-10,1e-12", "params.alpha=0.1,0.2"]);
+    assert_eq!(tolerances.share_lanes(0, 9), InstructionSet::best() != InstructionSet::Portable);
+    are_the_rows(&tolerances);
+    assert!(!sweep(&["method=dopri5,lsoda"]).share_lanes(0, 1));
 }
 
 /// More intermediate results at a time than the interpreter has room for without asking for memory.

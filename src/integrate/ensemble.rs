@@ -50,11 +50,29 @@ pub struct Plane {
     pub value: f64,
 }
 
-/// What runs side by side have in common besides their equation.
+/// The local errors that runs side by side may make.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tolerances<'a> {
+    /// The same in all.
+    All(Tolerance),
+    /// One for each run.
+    Each(&'a [Tolerance]),
+}
+
+impl Tolerances<'_> {
+    fn of(&self, run: usize) -> Tolerance {
+        match self {
+            Self::All(tolerance) => *tolerance,
+            Self::Each(tolerances) => tolerances[run],
+        }
+    }
+}
+
+/// What is asked of runs side by side besides their equations and courses.
 #[derive(Clone, Copy)]
 pub struct Common<'a, const N: usize> {
-    /// The local errors that all may make.
-    pub tolerance: Tolerance,
+    /// The local errors that they may make.
+    pub tolerances: Tolerances<'a>,
     /// What the observers look at; without one they hear of kicks alone.
     pub plane: Option<Plane>,
     /// A corner for each run, which ends as if its observer had stopped it ([`StopReason::Observer`]) at the first step's end where each component of
@@ -134,7 +152,7 @@ where
     O: Observer<N>,
 {
     let mut ends: Vec<Option<End<O, N>>> = runs.iter().map(|_| None).collect();
-    let common = Common { tolerance, plane, corners: None, watch: &() };
+    let common = Common { tolerances: Tolerances::All(tolerance), plane, corners: None, watch: &() };
     ensemble_watched(set, equations, runs, common, observer, &mut |run, end| ends[run] = Some(end));
     ends.into_iter().flatten().collect()
 }
@@ -213,14 +231,15 @@ impl<E: Equations<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, const K
         let width = Registers::<S, K>::WIDTH;
         let mut waiting = 0..runs.len();
         let numbers = if runs.is_empty() { 0 } else { equations.numbers(0).len() };
-        let mut state = State::<S, O, N, K>::idle(set, common.tolerance, numbers);
+        let mut state = State::<S, O, N, K>::idle(set, numbers);
         let mut unwatched = 0;
         loop {
             for l in 0..width {
                 while state.lanes[l].is_none() {
                     let Some(run) = waiting.next() else { break };
                     state.give(l, equations.numbers(run), common.corners.map(|corners| &corners[run]));
-                    if let Some(end) = state.begin(l, equations, run, &runs[run], observer(run)) {
+                    let tolerance = common.tolerances.of(run);
+                    if let Some(end) = state.begin(l, equations, run, &runs[run], tolerance, observer(run)) {
                         finished(run, end);
                     }
                 }
@@ -261,7 +280,8 @@ struct Lane<O, const N: usize> {
 /// All lanes: the fields of [`Dopri5`] side by side, as bare registers.
 struct State<S: Simd, O, const N: usize, const K: usize> {
     set: S,
-    tolerance: Tolerance,
+    rtol: [S::f64s; K],
+    atol: [S::f64s; K],
     t: [S::f64s; K],
     t_end: [S::f64s; K],
     max_step: [S::f64s; K],
@@ -291,11 +311,13 @@ fn put<V: pulp::bytemuck::Pod, const K: usize>(parts: &mut [V; K], lane: usize, 
 }
 
 impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> {
-    fn idle(set: S, tolerance: Tolerance, numbers: usize) -> Self {
-        let zero = [set.splat_f64s(0.0); K];
+    fn idle(set: S, numbers: usize) -> Self {
+        let (zero, one) = ([set.splat_f64s(0.0); K], [set.splat_f64s(1.0); K]);
         Self {
             set,
-            tolerance,
+            // Of a lane that never has a run: its errors, which are zero, are divided by them.
+            rtol: one,
+            atol: one,
             t: zero,
             t_end: zero,
             max_step: zero,
@@ -331,9 +353,12 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         equations: &E,
         run: usize,
         Run { start, course }: &Run<N>,
+        tolerance: Tolerance,
         observer: O,
     ) -> Option<End<O, N>> {
         let mut segments = Box::new(course.schedule.segments(0.0, course.t_end));
+        put(&mut self.rtol, l, tolerance.rtol);
+        put(&mut self.atol, l, tolerance.atol);
         put(&mut self.steps, l, 0.0);
         put(&mut self.rejected, l, 0.0);
         put(&mut self.t, l, 0.0);
@@ -352,7 +377,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             restarts: 0,
             steps_before: 0.0,
             most_steps_in_segment: 0.0,
-            stepper: Dopri5::new(self.tolerance),
+            stepper: Dopri5::new(tolerance),
         });
         if first.is_none() {
             return self.finish(l, Ok(StopReason::EndTime));
@@ -435,7 +460,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         let k7 = f.at(&x1);
         let e = combined(h, (&k1, E1), [(&k3, E3), (&k4, E4), (&k5, E5), (&k6, E6), (&k7, E7)]);
 
-        let (rtol, atol) = (number(self.tolerance.rtol), number(self.tolerance.atol));
+        let (rtol, atol) = (of(self.rtol), of(self.atol));
         let larger = |a: Registers<S, K>, b: Registers<S, K>| a.less(b, set).select(b, a);
         let smaller = |a: Registers<S, K>, b: Registers<S, K>| b.less(a, set).select(b, a);
         let mut square = number(0.0);

@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 use nalgebra::{SVector, vector};
 
-use super::ensemble::{Common, InstructionSet, Plane, Run, ensemble_watched};
+use super::ensemble::{Common, InstructionSet, Plane, Run, Tolerances, ensemble_watched};
 use super::filippov::{
     AllModes, ExitRule, FilippovObserver, FunnelGrid, Mode, ModeEvent, Settings, Side, SlidingFlow, SlidingLaw,
     connect, funnel, history, run, run_two_surfaces,
@@ -646,6 +646,7 @@ fn lanes_are_runs_alone() {
             Run { start: vector![0.1 + 0.01 * f64::from(k), 0.0, -1.0], course }
         })
         .collect();
+    let sizes: Vec<Tolerance> = (0..runs.len()).map(|i| tolerance([1e-7, 1e-4, 1e-9][i % 3])).collect();
     runs[5].start[0] = f64::NAN;
     runs[6].start[1] = 1e200;
     runs[7].course.t_end = 0.0;
@@ -675,7 +676,7 @@ fn lanes_are_runs_alone() {
             .enumerate()
             .map(|(i, run)| {
                 let mut stops = Stops(corners.as_ref().map(|corners| corners[i]));
-                word(&drive(&field, run.start, &run.course, &mut Dopri5::new(size), &mut stops, &()))
+                word(&drive(&field, run.start, &run.course, &mut Dopri5::new(sizes[i]), &mut stops, &()))
             })
             .collect();
         if corner.is_some() {
@@ -699,14 +700,16 @@ fn lanes_are_runs_alone() {
         }
         let met_alone: Vec<_> = runs
             .iter()
-            .map(|run| {
+            .zip(&sizes)
+            .map(|(run, size)| {
                 let mut met = Met(Passages::default(), Vec::new());
-                let _ = drive(&field, run.start, &run.course, &mut Dopri5::new(size), &mut met, &());
+                let _ = drive(&field, run.start, &run.course, &mut Dopri5::new(*size), &mut met, &());
                 met.1
             })
             .collect();
         for set in InstructionSet::ALL.into_iter().filter(|set| set.is_here()) {
-            let common = Common { tolerance: size, plane, corners: corners.as_deref(), watch: &() };
+            let tolerances = Tolerances::Each(&sizes);
+            let common = Common { tolerances, plane, corners: corners.as_deref(), watch: &() };
             let mut ends = vec![None; runs.len()];
             ensemble_watched(
                 set,
@@ -729,7 +732,8 @@ fn lanes_are_runs_alone() {
             let mut finished = 0;
             let long =
                 [Run { start: START.into(), course: Course { step_cap: StepCap::Absolute(1e-3), ..Course::to(50.0) } }];
-            let common = Common { tolerance: size, plane: None, corners: None, watch: &Refuses };
+            let tolerances = Tolerances::All(size);
+            let common = Common { tolerances, plane: None, corners: None, watch: &Refuses };
             ensemble_watched(set, &field, &long, common, |_| Ignore, &mut |_, _| finished += 1);
             assert_eq!(finished, 0, "{set:?}");
             ensemble_watched(set, &field, &runs[..3], common, |_| Ignore, &mut |_, _| finished += 1);

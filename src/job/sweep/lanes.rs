@@ -7,7 +7,7 @@ use nalgebra::SVector;
 use super::{Fate, Row, Sweep, far};
 use crate::analyse::SectionRecorder;
 use crate::analyse::path::MOST_POINTS;
-use crate::integrate::ensemble::{Common, End, InstructionSet, Plane, Run, ensemble_watched};
+use crate::integrate::ensemble::{Common, End, InstructionSet, Plane, Run, Tolerances, ensemble_watched};
 use crate::integrate::{Course, StopReason, Summary, Watch};
 use crate::job::desk::{Desk, Progress};
 use crate::job::question::{JobError, question_hash};
@@ -69,10 +69,10 @@ impl Cell {
         a.system == b.system && a.switch == b.switch
     }
 
-    /// Whether both have one tolerance and section: what all lanes share besides the operations of their equations.
+    /// Whether both have one section: what all lanes share besides the operations of their equations.
     fn is_asked_like(&self, other: &Self) -> bool {
         let (a, b) = (self.run(), other.run());
-        a.observe == b.observe && a.method.name == b.method.name && a.method.tolerance == b.method.tolerance
+        a.observe == b.observe && a.method.name == b.method.name
     }
 }
 
@@ -155,7 +155,7 @@ impl Sweep {
     }
 
     /// Computes the rows of these numbers, and gives each to `take` as it is finished, which says whether it wants more: the rows that [`Sweep::row`] makes, bit for bit.
-    /// Those that have the operations of their equation, tolerance and section in common run side by side in the lanes of vector registers, where the machine has any.
+    /// Those that have the operations of their equation and the section in common run side by side in the lanes of vector registers, where the machine has any.
     ///
     /// # Errors
     ///
@@ -268,7 +268,8 @@ fn side_by_side<E: Equations<N>, const N: usize>(
     let corners = corners.iter().any(|corner| corner[N - 1] < f64::INFINITY).then_some(&corners[..]);
     let display = progress.begin("cells side by side", first.t_end);
     let watch = Both { display: &*display, enough };
-    let common = Common { tolerance: first.method.tolerance, plane, corners, watch: &watch };
+    let tolerances: Vec<_> = cells.iter().map(|cell| cell.run().method.tolerance).collect();
+    let common = Common { tolerances: Tolerances::Each(&tolerances), plane, corners, watch: &watch };
     let observer = |_| match plane {
         Some(Plane { coordinate, value }) => SectionRecorder::<N>::new(coordinate, value),
         None => SectionRecorder::<N>::new(0, 0.0),
