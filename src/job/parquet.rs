@@ -7,6 +7,8 @@
 //! A Parquet file is little-endian. The crate writes and reads numbers, and writes the lengths of words, in the machine's own order of bytes: on a big-endian machine that is put right here
 //! (found by running `check` on s390x).
 
+mod thrift;
+
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -138,6 +140,29 @@ fn lengths_in_file_order(table: &Table, metadata: &ParquetMetaData, bytes: &mut 
     }
 }
 
+/// Whether the footer's structure can be read: it stands before its length, in four bytes, and the magic number. What is too short for that is left to the crate's words.
+fn footer_is_sound(bytes: &[u8]) -> bool {
+    let Some((before, [length @ .., _, _, _, _])) = bytes.split_last_chunk::<8>() else { return true };
+    let length = u32::from_le_bytes(*length) as usize;
+    let Some(start) = before.len().checked_sub(length) else { return true };
+    thrift::structure(&before[start..], 0).is_some()
+}
+
+/// Whether the headers of a column's pages, the first of them at `start`, the last one's page up to `end`, can be read.
+fn headers_are_sound(bytes: &[u8], start: u64, end: u64) -> bool {
+    /// Where a page's header has the number of bytes behind it.
+    const LENGTH: i64 = 3;
+    let (Ok(mut at), Ok(end)) = (usize::try_from(start), usize::try_from(end)) else { return false };
+    while at < end {
+        let Some((header, length)) = bytes.get(at..).and_then(|bytes| thrift::structure(bytes, LENGTH)) else {
+            return false;
+        };
+        let Ok(length) = usize::try_from(length) else { return false };
+        at = at.saturating_add(header).saturating_add(length);
+    }
+    true
+}
+
 /// Whether a column's pages are such as [`parquet()`] writes. The decoders, unlike what reads the pages, take a page's word for how many values it has, and for a dictionary
 /// that came before it: a file that lies would end the process.
 fn sound(pages: Box<dyn PageReader>, kind: Kind, rows: usize) -> Result<bool, ParquetError> {
@@ -180,6 +205,9 @@ pub fn from_parquet(bytes: &[u8]) -> Result<(Heading, Table), Malformed> {
 /// [`from_parquet`] with at most so many rows of words alone.
 fn read(bytes: &[u8], most_words: usize) -> Result<(Heading, Table), Malformed> {
     let wrong = |e: ParquetError| Malformed(e.to_string());
+    if !footer_is_sound(bytes) {
+        return Err(Malformed("its footer is damaged".into()));
+    }
     let reader = SerializedFileReader::new(Bytes::copy_from_slice(bytes)).map_err(wrong)?;
     let metadata = reader.metadata().file_metadata();
     let ours = metadata.key_value_metadata().and_then(|all| all.iter().find(|kv| kv.key == KEY));
@@ -199,6 +227,10 @@ fn read(bytes: &[u8], most_words: usize) -> Result<(Heading, Table), Malformed> 
             return Err(Malformed("a column at a negative place".into()));
         }
         held = held.saturating_add(chunk.compressed_size() as u64);
+        let (start, length) = chunk.byte_range();
+        if !headers_are_sound(bytes, start, start.saturating_add(length)) {
+            return Err(Malformed(format!("column {} is not laid out as it is here", chunk.column_path())));
+        }
     }
     if held > bytes.len() as u64 {
         return Err(Malformed("its columns are longer than the file".into()));
@@ -328,6 +360,25 @@ mod tests {
             let said = from_parquet(&lies).unwrap_err().to_string();
             assert!(said.contains("column mode is not laid out as it is here"), "{said}");
         }
+    }
+
+    /// What a page's header and the footer say of themselves is looked at before anything is read.
+    #[test]
+    fn claims_are_no_work() {
+        let bytes = parquet(&table(100), &Value::Null);
+        let reader = SerializedFileReader::new(Bytes::from(bytes.clone())).unwrap();
+        let at = reader.metadata().row_group(0).column(0).data_page_offset() as usize;
+        // The header's first field, its type, made a list of so many truth values.
+        let mut claims = bytes.clone();
+        claims[at..at + 7].copy_from_slice(&[0x19, 0xf1, 0xff, 0xff, 0xff, 0xff, 0x07]);
+        let said = from_parquet(&claims).unwrap_err().to_string();
+        assert!(said.contains("is not laid out as it is here"), "{said}");
+        // The footer's, its version.
+        let footer = bytes.len() - 8 - u32::from_le_bytes(bytes[bytes.len() - 8..][..4].try_into().unwrap()) as usize;
+        let mut claims = bytes.clone();
+        claims[footer..footer + 7].copy_from_slice(&[0x19, 0xf1, 0xff, 0xff, 0xff, 0xff, 0x07]);
+        let said = from_parquet(&claims).unwrap_err().to_string();
+        assert!(said.contains("its footer is damaged"), "{said}");
     }
 
     /// `bytes` with other row groups in its footer.

@@ -96,6 +96,12 @@ pub enum RenderError {
         /// Height.
         height: u32,
     },
+    /// A PNG file whose palette is none.
+    #[error("PNG: a palette of {bytes} bytes, where each colour has three")]
+    Palette {
+        /// Its length.
+        bytes: usize,
+    },
     /// Drawing failed inside plotters.
     #[error("drawing failed: {0}")]
     Drawing(String),

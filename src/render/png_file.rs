@@ -142,7 +142,7 @@ pub fn png_size(bytes: &[u8]) -> Option<(u32, u32)> {
 /// Pixels of any PNG file, at eight bits per channel, as opaque RGBA where the file has no transparency.
 ///
 /// # Errors
-/// If it is no PNG file, is damaged, or claims more than 67 million pixels: what it claims is checked before memory is asked for.
+/// If it is no PNG file, is damaged, has a palette that is none, or claims more than 67 million pixels: what it claims is checked before memory is asked for.
 pub fn decode_png(bytes: &[u8]) -> Result<Pixels, RenderError> {
     if let Some((width, height)) = png_size(bytes)
         && u64::from(width) * u64::from(height) > MOST_PIXELS
@@ -153,6 +153,12 @@ pub fn decode_png(bytes: &[u8]) -> Result<Pixels, RenderError> {
     let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), limits);
     decoder.set_transformations(png::Transformations::normalize_to_color8());
     let mut reader = decoder.read_info()?;
+    // The crate takes it for granted that colours are whole.
+    if let Some(palette) = &reader.info().palette
+        && palette.len() % 3 != 0
+    {
+        return Err(RenderError::Palette { bytes: palette.len() });
+    }
     let size = reader.output_buffer_size().ok_or(RenderError::TooLarge)?;
     let mut buffer = vec![0; size];
     let frame = reader.next_frame(&mut buffer)?;

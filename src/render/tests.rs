@@ -434,6 +434,29 @@ fn density_shading_never_changes_where_points_are() {
 }
 
 #[test]
+fn palettes_have_whole_colours() {
+    let picture = |palette: usize| {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
+        encoder.set_color(png::ColorType::Indexed);
+        encoder.set_palette(vec![7; palette]);
+        encoder.write_header().unwrap().write_image_data(&[0]).unwrap();
+        bytes
+    };
+    for good in [3, 9, 768] {
+        assert_eq!(decode_png(&picture(good)).unwrap().rgba, [7, 7, 7, 255], "{good}");
+    }
+    for bad in [4, 8, 767] {
+        let error = decode_png(&picture(bad)).unwrap_err();
+        assert!(matches!(error, RenderError::Palette { bytes } if bytes == bad), "{bad}: {error}");
+    }
+    // These the crate refuses.
+    for bad in [1, 769, 771] {
+        assert!(matches!(decode_png(&picture(bad)).unwrap_err(), RenderError::PngDecoding(_)), "{bad}");
+    }
+}
+
+#[test]
 fn a_picture_that_claims_too_much_is_refused_before_memory_is_asked_for() {
     // 46 bytes that claim 100000 x 100000.
     let hex = "89504e470d0a1a0a0000000d49484452000186a0000186a00806000000a8520bc800000001494441547876e684e6";
