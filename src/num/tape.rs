@@ -525,16 +525,68 @@ enum Code {
     Atan,
     Erf,
     Sign,
+    // Two operations in one, each rounded by itself: to look an instruction up, and to write and read what is between two, takes longer than
+    // either. Operands keep their order.
+    /// a b + c
+    ProductPlus,
+    /// c + a b
+    PlusProduct,
+    /// a b - c
+    ProductMinus,
+    /// c - a b
+    MinusProduct,
+    /// (a + b) c
+    SumTimes,
+    /// c (a + b)
+    TimesSum,
+    /// (a - b) c
+    DifferenceTimes,
+    /// c (a - b)
+    TimesDifference,
+    /// (fixed - a) c
+    FixedSubTimes,
+    /// c (fixed - a)
+    TimesFixedSub,
+    /// b + (a - b) c: three, what smoothing makes of two fields.
+    Blend,
 }
 
-/// One instruction: 16 bytes, nothing to look up.
+/// One instruction, nothing to look up.
 #[derive(Clone, Copy, Debug)]
 struct Instruction {
     code: Code,
     to: u16,
     a: u16,
     b: u16,
+    c: u16,
     fixed: f64,
+}
+
+impl Instruction {
+    /// This instruction and `next`, which alone uses what this one gives, as one; none if there is none that does both.
+    fn with(self, next: Self) -> Option<Self> {
+        if next.a == next.b && next.a == self.to {
+            return None;
+        }
+        let (first, other) = if next.a == self.to { (true, next.b) } else { (false, next.a) };
+        let code = match (self.code, next.code, first) {
+            (Code::Mul, Code::Add, true) => Code::ProductPlus,
+            (Code::Mul, Code::Add, false) => Code::PlusProduct,
+            (Code::Mul, Code::Sub, true) => Code::ProductMinus,
+            (Code::Mul, Code::Sub, false) => Code::MinusProduct,
+            (Code::Add, Code::Mul, true) => Code::SumTimes,
+            (Code::Add, Code::Mul, false) => Code::TimesSum,
+            (Code::Sub, Code::Mul, true) => Code::DifferenceTimes,
+            (Code::Sub, Code::Mul, false) => Code::TimesDifference,
+            (Code::FixedSub, Code::Mul, true) => Code::FixedSubTimes,
+            (Code::FixedSub, Code::Mul, false) => Code::TimesFixedSub,
+            (Code::DifferenceTimes, Code::Add, false) if other == self.b => {
+                return Some(Self { code: Code::Blend, to: next.to, ..self });
+            }
+            _ => return None,
+        };
+        Some(Self { code, to: next.to, c: other, ..self })
+    }
 }
 
 /// Where a value of the function is found.
@@ -580,6 +632,7 @@ impl Program {
         for output in &tape.outputs {
             last_use[*output] = usize::MAX;
         }
+        let mut last = None;
         let mut registers = tape.variables;
         let mut free: Vec<u16> = (0..tape.variables).filter(|i| !needed[*i]).map(|i| i as u16).collect();
         let mut register: Vec<u16> = vec![0; tape.operations.len()];
@@ -604,7 +657,14 @@ impl Program {
             });
             register[node] = to;
             instruction.to = to;
-            code.push(instruction);
+            // Who is used here and was made just now, and is not used again, was made for this.
+            let for_this = last.is_some_and(|last| done.contains(&last));
+            let both = code.last().filter(|_| for_this).and_then(|made: &Instruction| made.with(instruction));
+            if both.is_some() {
+                code.pop();
+            }
+            code.push(both.unwrap_or(instruction));
+            last = Some(node);
         }
         let outputs = tape.outputs.iter().map(|node| match fixed[*node] {
             Some(value) => Output::Fixed(value),
@@ -625,7 +685,7 @@ impl Program {
 
     /// Whether the two differ in numbers alone.
     pub(crate) fn is_like(&self, other: &Self) -> bool {
-        let operation = |i: &Instruction| (i.code, i.to, i.a, i.b);
+        let operation = |i: &Instruction| (i.code, i.to, i.a, i.b, i.c);
         let place = |output: &Output| match output {
             Output::Register(at) => Some(*at),
             Output::Fixed(_) => None,
@@ -691,6 +751,20 @@ impl Program {
                 Code::Atan => a.atan(),
                 Code::Erf => a.erf(),
                 Code::Sign => a.sign(),
+                Code::ProductPlus => a * r.get(i.b) + r.get(i.c),
+                Code::PlusProduct => r.get(i.c) + a * r.get(i.b),
+                Code::ProductMinus => a * r.get(i.b) - r.get(i.c),
+                Code::MinusProduct => r.get(i.c) - a * r.get(i.b),
+                Code::SumTimes => (a + r.get(i.b)) * r.get(i.c),
+                Code::TimesSum => r.get(i.c) * (a + r.get(i.b)),
+                Code::DifferenceTimes => (a - r.get(i.b)) * r.get(i.c),
+                Code::TimesDifference => r.get(i.c) * (a - r.get(i.b)),
+                Code::FixedSubTimes => (S::from_f64(i.fixed) - a) * r.get(i.c),
+                Code::TimesFixedSub => r.get(i.c) * (S::from_f64(i.fixed) - a),
+                Code::Blend => {
+                    let b = r.get(i.b);
+                    b + (a - b) * r.get(i.c)
+                }
             };
             r.set(i.to, value);
         }
@@ -740,7 +814,7 @@ fn instruction(operation: Operation, register: &[u16], fixed: &[Option<f64>]) ->
             unreachable!("inputs and terms without variables need no instruction")
         }
     };
-    Instruction { code, to: 0, a: register[a], b: register[b], fixed: fixed[b].unwrap_or(0.0) }
+    Instruction { code, to: 0, a: register[a], b: register[b], c: 0, fixed: fixed[b].unwrap_or(0.0) }
 }
 
 /// Intermediate results.
@@ -862,8 +936,58 @@ mod tests {
             let (m, g) = (Recorded::parameter("m", &2.0.into()), Recorded::parameter("gamma", &0.5.into()));
             vec![x[0] * (Recorded::from_f64(2.0) * m) + g.sin() / m]
         });
+        // x times a number, plus a number: two instructions.
         assert_eq!(Program::new(&t).instructions(), 2);
         assert_eq!(t.parameters().len(), 2);
+    }
+
+    /// Two operations that are one instruction, in every order of their operands.
+    fn pairs<S: Elementary>(a: S, b: S, c: S) -> Vec<S> {
+        let k = S::from_f64(0.3);
+        vec![
+            a * b + c,
+            c + a * b,
+            a * b - c,
+            c - a * b,
+            (a + b) * c,
+            c * (a + b),
+            (a - b) * c,
+            c * (a - b),
+            (k - a) * c,
+            c * (k - a),
+            b + (a - b) * c,
+        ]
+    }
+
+    /// What looks like one and is not: a result used twice, by itself, wanted as a value, or with another in between.
+    fn no_pairs<S: Elementary>(a: S, b: S, c: S) -> Vec<S> {
+        let (p, d, e) = (a * b, a - b, (a - c) * b);
+        vec![p + c, p - b, (c - a) * (c - a), d, d * c, a + (a - b) * c, c + (a - b) * c, (b - c) * a + e]
+    }
+
+    #[test]
+    fn pairs_are_one_instruction_and_round_as_two() {
+        let x = [0.7, -1.3, 2.9];
+        let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        let fused: Vec<Vec<f64>> = pairs(x[0], x[1], x[2]).into_iter().map(|v| vec![v]).collect();
+        for (i, want) in fused.iter().enumerate() {
+            let program = Program::new(&Tape::record(3, |v| vec![pairs(v[0], v[1], v[2])[i]]));
+            assert_eq!(program.instructions(), 1, "{i}");
+            let mut out = [0.0];
+            program.evaluate(&x, &mut out);
+            assert_eq!(bits(&out), bits(want), "{i}");
+        }
+        let all = |v: &[Recorded]| [pairs(v[0], v[1], v[2]), no_pairs(v[0], v[1], v[2])].concat();
+        let program = Program::new(&Tape::record(3, all));
+        let mut out = [0.0; 19];
+        program.evaluate(&x, &mut out);
+        let want = [pairs(x[0], x[1], x[2]), no_pairs(x[0], x[1], x[2])].concat();
+        assert_eq!(bits(&out), bits(&want));
+        // Numbers with two halves keep the order of operands too.
+        let x = x.map(|x| DoubleDouble::new(x, 1e-18));
+        let mut out = [DoubleDouble::from_f64(0.0); 19];
+        program.evaluate(&x, &mut out);
+        assert_eq!(out.to_vec(), [pairs(x[0], x[1], x[2]), no_pairs(x[0], x[1], x[2])].concat());
     }
 
     #[test]

@@ -119,6 +119,18 @@ impl Program {
                     let $b = if i.b == written { value } else { results[usize::from(i.b) & last].0 };
                     each!($k => $result);
                 }};
+                // With three.
+                (b c, $k:ident, $b:ident, $c:ident => $result:expr) => {{
+                    let $b = if i.b == written { value } else { results[usize::from(i.b) & last].0 };
+                    let $c = if i.c == written { value } else { results[usize::from(i.c) & last].0 };
+                    each!($k => $result);
+                }};
+                // With the instruction's number and the third operand.
+                (c, $k:ident, $c:ident, $fixed:ident => $result:expr) => {{
+                    let $c = if i.c == written { value } else { results[usize::from(i.c) & last].0 };
+                    let $fixed = numbers.at(set, place, i.fixed);
+                    each!($k => $result);
+                }};
                 // With the instruction's number.
                 ($k:ident, $fixed:ident => $result:expr) => {{
                     let $fixed = numbers.at(set, place, i.fixed);
@@ -146,6 +158,17 @@ impl Program {
                 Code::Atan => value = number.atan().parts(),
                 Code::Erf => value = number.erf().parts(),
                 Code::Sign => value = number.sign().parts(),
+                Code::ProductPlus => each!(b c, k, b, c => set.add_f64s(set.mul_f64s(a[k], b[k]), c[k])),
+                Code::PlusProduct => each!(b c, k, b, c => set.add_f64s(c[k], set.mul_f64s(a[k], b[k]))),
+                Code::ProductMinus => each!(b c, k, b, c => set.sub_f64s(set.mul_f64s(a[k], b[k]), c[k])),
+                Code::MinusProduct => each!(b c, k, b, c => set.sub_f64s(c[k], set.mul_f64s(a[k], b[k]))),
+                Code::SumTimes => each!(b c, k, b, c => set.mul_f64s(set.add_f64s(a[k], b[k]), c[k])),
+                Code::TimesSum => each!(b c, k, b, c => set.mul_f64s(c[k], set.add_f64s(a[k], b[k]))),
+                Code::DifferenceTimes => each!(b c, k, b, c => set.mul_f64s(set.sub_f64s(a[k], b[k]), c[k])),
+                Code::TimesDifference => each!(b c, k, b, c => set.mul_f64s(c[k], set.sub_f64s(a[k], b[k]))),
+                Code::FixedSubTimes => each!(c, k, c, fixed => set.mul_f64s(set.sub_f64s(fixed[k], a[k]), c[k])),
+                Code::TimesFixedSub => each!(c, k, c, fixed => set.mul_f64s(c[k], set.sub_f64s(fixed[k], a[k]))),
+                Code::Blend => each!(b c, k, b, c => set.add_f64s(b[k], set.mul_f64s(set.sub_f64s(a[k], b[k]), c[k]))),
             }
             results[usize::from(i.to) & last] = Aligned(value);
             written = i.to;
@@ -179,6 +202,9 @@ mod tests {
             let c = crate::num::tape::Recorded::from_f64(number);
             let a = ((x + y) * (x - y) / (x * x + c) - c) * (c - x) + (c / (y * y + c) + x / c).tanh();
             let b = (-x).exp() + (x * x + c).ln() - y.sin() * y.cos() + (y * y + c).sqrt();
+            // Pairs of operations that are one instruction, in every order.
+            let a = (a * y + x) - (y + a * x) * (x + a) + (a * x - b) * (b - a * y) + b * (x - a) + (x - b) * y;
+            let b = b + (a - b) * y + (c - a) * x + y * (c - b) + x * (a + b);
             vec![a + (x - c).atan(), b + y.erf() * (x * y).sign() + c * (x + c)]
         }))
     }
