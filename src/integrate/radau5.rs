@@ -526,6 +526,29 @@ mod tests {
         }
     }
 
+    /// x' = 1.
+    struct Clock;
+    impl VectorField<1> for Clock {
+        fn eval<S: Elementary>(&self, _: &SVector<S, 1>) -> SVector<S, 1> {
+            SVector::from([S::one()])
+        }
+    }
+
+    /// Less than a ten thousandth of a step is not left for a step of its own; more is.
+    #[test]
+    fn small_remainders_belong_to_the_last_step() {
+        let steps = |t_end: f64| {
+            let mut radau = Radau5::new(Tolerance { rtol: 1e-8, atol: 1e-8 });
+            radau.restart(&Clock, 0.0, [0.0].into(), t_end, 1.0).unwrap();
+            radau.h = 1.0;
+            let steps =
+                std::iter::from_fn(|| (radau.t < t_end).then(|| radau.step(&Clock).unwrap().t1)).collect::<Vec<_>>();
+            assert_eq!(steps.last(), Some(&t_end));
+            steps.len()
+        };
+        assert_eq!([2.9999, 3.0, 3.000_05, 3.0002].map(steps), [3, 3, 3, 4]);
+    }
+
     /// `n` equal steps over [0, t_end], the stages solved to a hundredth of `resolution`, no step control.
     fn equal_steps<F: VectorField<N>, const N: usize>(
         field: &F,

@@ -376,6 +376,25 @@ mod tests {
         }
     }
 
+    /// The same with all that can be proved of it.
+    struct Proving(Cubic);
+    impl Interpolant<1> for Proving {
+        fn at(&self, s: f64) -> SVector<f64, 1> {
+            self.0.at(s)
+        }
+        fn degree(&self) -> usize {
+            3
+        }
+        fn reach(&self, _: usize) -> f64 {
+            let [_, _, c, d] = self.0.0;
+            0.25 * c.abs() + 0.4 * d.abs()
+        }
+        fn is_monotone(&self, _: usize) -> bool {
+            let [_, b, c, d] = self.0.0;
+            b.abs() > 2.0 * c.abs() + 3.0 * d.abs()
+        }
+    }
+
     fn passages(c: [f64; 4]) -> Vec<Passage> {
         let p = Cubic(c);
         let step = Step { t0: 0.0, t1: 1.0, x0: p.at(0.0), x1: p.at(1.0), interpolant: &p };
@@ -388,13 +407,20 @@ mod tests {
 
     /// The senses of the passages through the plane x = `value` in steps given by their cubics, one after the other.
     fn senses(value: f64, steps: &[[f64; 4]]) -> Vec<(usize, f64, bool)> {
-        let (mut by_plane, mut by_surface) = (Passages::default(), Passages::default());
+        let [mut by_plane, mut by_surface, mut by_proof] = [Passages::default(); 3];
         let mut found = Vec::new();
         for (i, c) in steps.iter().enumerate() {
             let p = Cubic(*c);
             let step = Step { t0: 0.0, t1: 1.0, x0: p.at(0.0), x1: p.at(1.0), interpolant: &p };
             let passages = by_plane.through_plane(&step, 0, value);
             assert_eq!(passages, by_surface.in_step(&step, |x| x[0] - value));
+            // Proofs spare work and change nothing.
+            let proved = by_proof.through_plane(&Step { interpolant: &Proving(Cubic(*c)), ..step }, 0, value);
+            assert!(proved.len() == passages.len(), "{proved:?} {passages:?}");
+            assert_eq!(by_proof.side, by_surface.side);
+            for (a, b) in proved.iter().zip(&passages) {
+                assert!(a.upward == b.upward && (a.theta - b.theta).abs() < 1e-14, "{a:?} {b:?}");
+            }
             found.extend(passages.iter().map(|p| (i, p.theta, p.upward)));
         }
         found
@@ -470,6 +496,61 @@ mod tests {
     fn brent_reaches_the_last_bits() {
         let r = brent(|x| x * x - 2.0, 1.0, 2.0, -1.0, 2.0);
         assert!((r - std::f64::consts::SQRT_2).abs() <= 4.5e-16);
+    }
+
+    /// How often the function is asked, as it was when this was written: what no zero shows. No bracket begins at 0, and some go backwards.
+    #[test]
+    fn brent_asks_no_more_than_it_did() {
+        type Case = (fn(f64) -> f64, f64, f64, f64, u32);
+        let cases: [Case; 8] = [
+            (|x| x * x * x - 2.0 * x - 5.0, 2.0, 3.0, 2.094_551_481_542_327, 6),
+            (|x| (x - 1.0) * (x - 1.0) * (x - 1.0), 0.3, 1.9, 1.0, 148),
+            (|x| (x * x * x) * (x * x * x) * (x * x * x), -1.0, 1.1, 0.0, 145),
+            (|x| 2.0 - x * x, 3.0, 0.5, std::f64::consts::SQRT_2, 8),
+            (|x| 1.0 / x - 3.0, 0.01, 10.0, 1.0 / 3.0, 13),
+            (|x| x * x * x * x * x - 1e-3, -0.5, 4.0, 0.251_188_643_150_958, 17),
+            (|x| if x < 0.7 { -1.0 } else { 2.0 }, 0.1, 1.0, 0.7, 51),
+            (|x| (x - 1e-9) * (x + 3.0), -1.0, 0.75, 1e-9, 8),
+        ];
+        for (f, a, b, zero, asked) in cases {
+            let mut count = 0;
+            let mut counted = |x: f64| {
+                count += 1;
+                f(x)
+            };
+            let found = brent(&mut counted, a, b, f(a), f(b));
+            assert!((found - zero).abs() <= 1e-15, "{zero}: {found}");
+            assert_eq!(count, asked, "{zero}");
+        }
+    }
+
+    #[test]
+    fn smallest_is_the_smallest_and_below_zero_is_enough() {
+        for (at, sign) in [(0.3, 1.0), (0.3, -1.0), (0.62, 1.0), (0.62, -1.0), (0.9, 1.0)] {
+            let parabola = |least: f64| move |s: f64| sign * ((s - at) * (s - at) + least);
+            // Of a parabola nothing is known of where it is smallest beyond the square root of a rounding.
+            let (s, v) = smallest(&parabola(0.25), 0.1, 1.0, sign);
+            assert!((s - at).abs() < 1e-6 && (v - sign * 0.25).abs() < 1e-12, "{at} {sign}: {s} {v}");
+            // Below zero near the place only: that is found, and nothing smaller looked for.
+            let (s, v) = smallest(&parabola(-1e-4), 0.1, 1.0, sign);
+            assert!(v * sign < 0.0 && v == parabola(-1e-4)(s), "{at} {sign}: {s} {v}");
+        }
+    }
+
+    /// The ends are asked themselves, and not what rounding makes of them.
+    #[test]
+    fn first_zero_asks_at_both_ends() {
+        let asked = std::cell::RefCell::new(Vec::new());
+        let none = first_zero(
+            |s| {
+                asked.borrow_mut().push(s);
+                1.0 + s
+            },
+            Start::Away,
+        );
+        assert_eq!(none, None);
+        let asked = asked.into_inner();
+        assert!(asked.contains(&0.0) && asked.contains(&1.0), "{asked:?}");
     }
 
     #[test]
