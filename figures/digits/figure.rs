@@ -34,6 +34,8 @@ const NEAR: f64 = 0.05;
 const MAX_STEP: f64 = 2.0;
 /// Most steps of a compared method.
 const MAX_STEPS: u64 = 10_000_000;
+/// Where the axis of digits ends: above the seventeen that two equal numbers count for.
+const TOP: f64 = 18.0;
 /// When disturbances are made, relative to the passage, in units of sqrt(eps).
 const OFFSETS: [f64; 3] = [-3.0, 0.0, 3.0];
 /// The exit is the first passage through y = 0 beyond so many sqrt(eps).
@@ -168,10 +170,10 @@ fn draw(reading: Reading, answers: &[Arc<Answer>]) -> Sheet {
     let [rows, visits, passages @ ..] = &tables[..] else { unreachable!("the first question has two tables") };
     let growth: Vec<Vec<Entry>> = passages.iter().filter(|t| t.name == "growth").flat_map(Table::rows).collect();
     let mut digits =
-        PlanePanel::new(Axis::linear("*t*", 0.0, T_END), Axis::linear("digits that are right", -2.0, 17.0));
+        PlanePanel::new(Axis::linear("*t*", 0.0, T_END), Axis::linear("digits that are right", -2.0, TOP));
     for visit in visits.rows() {
         let t = value(&visit[0]);
-        digits = digits.line(vec![[t, -2.0], [t, 17.0]], LineStyle::new(style::MAGENTA, style::CURVE_PT).dashed());
+        digits = digits.line(vec![[t, -2.0], [t, TOP]], LineStyle::new(style::MAGENTA, style::CURVE_PT).dashed());
     }
     let mut lines = Vec::new();
     for (method, tolerance, colour, shape) in methods().into_iter().rev() {
