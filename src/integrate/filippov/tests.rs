@@ -6,6 +6,7 @@ use nalgebra::{SVector, vector};
 use super::flow::desingularised;
 use super::two_fold::SlidingAtTwoFold;
 use super::*;
+use crate::integrate::Watch;
 use crate::num::Elementary;
 use crate::num::random::RandomStream;
 use crate::system::{Bound, PiecewiseSmooth, System};
@@ -373,4 +374,65 @@ fn a_budget_is_an_error_where_it_is_asked_to_be() {
     for stop in [StopReason::EndTime, StopReason::Observer, StopReason::Watch, StopReason::SetValued] {
         assert_eq!(summary(stop).within_budget(), Ok(summary(stop)));
     }
+}
+
+/// A watch is asked at every event and now and then between steps; when it refuses, the run ends there.
+#[test]
+fn a_watch_ends_a_run() {
+    struct Until(f64);
+    impl Watch for Until {
+        fn reached(&self, t: f64) -> bool {
+            t < self.0
+        }
+    }
+    let system = fold(1.0, -1.0, 0.5, -0.7);
+    let settings = Settings { max_step: 1e-4, ..Settings::default() };
+    let rule = ExitRule::AtOnce { side: Side::Plus };
+    let ends = |until: f64| {
+        let mut seen = Trajectory::new(1);
+        let end = run_watched(&system, vector![0.0, 0.3, 0.8], 3.0, &settings, rule, &mut seen, &Until(until)).unwrap();
+        (end.stop, end.t, seen.events)
+    };
+    let (stop, t, events) = ends(f64::INFINITY);
+    assert!(stop == StopReason::EndTime && t == 3.0 && !events.is_empty(), "{stop:?} {t}");
+    // At an event, and in the thousands of steps between two.
+    let (stop, t, _) = ends(events[0].t);
+    assert!(stop == StopReason::Watch && t == events[0].t, "{stop:?} {t}");
+    let last = events[events.len() - 1].t;
+    assert!(last < 1.0, "{last}");
+    let (stop, t, _) = ends(last + 0.5);
+    assert!(stop == StopReason::Watch && t > last + 0.5 && t < 3.0, "{stop:?} {t}");
+}
+
+#[test]
+fn exit_rules_have_numbers_that_make_sense_and_words() {
+    let random = |law, plus_probability| ExitRule::Random { law, plus_probability, seed: 1, stream: 2 };
+    let uniform = |longest| SlidingLaw::Uniform { longest };
+    let exponential = |mean| SlidingLaw::Exponential { mean };
+    let side = Side::Minus;
+    for good in [
+        ExitRule::All,
+        ExitRule::AtOnce { side },
+        ExitRule::AfterTime { time: 0.0, side },
+        ExitRule::AfterArc { arc: 1.5, side },
+        random(uniform(0.0), 0.0),
+        random(exponential(2.0), 1.0),
+    ] {
+        assert_eq!(good.validate(), Ok(()), "{good}");
+    }
+    for (bad, what) in [
+        (ExitRule::AfterTime { time: -0.1, side }, "time"),
+        (ExitRule::AfterTime { time: f64::INFINITY, side }, "time"),
+        (ExitRule::AfterArc { arc: f64::NAN, side }, "arc"),
+        (random(uniform(-1.0), 0.5), "longest time"),
+        (random(exponential(f64::INFINITY), 0.5), "mean time"),
+        (random(uniform(1.0), 1.1), "probability"),
+        (random(exponential(1.0), -0.1), "probability"),
+        (random(exponential(1.0), f64::NAN), "probability"),
+    ] {
+        let said = bad.validate().unwrap_err();
+        assert!(said.contains(what), "{bad}: {said}");
+    }
+    assert_eq!(ExitRule::AtOnce { side }.to_string(), "at-once:minus");
+    assert_eq!(ExitRule::AfterTime { time: 0.3, side: Side::Plus }.to_string(), "after-time:0.3:plus");
 }
