@@ -140,23 +140,20 @@ fn lengths_in_file_order(table: &Table, metadata: &ParquetMetaData, bytes: &mut 
     }
 }
 
-/// Whether the footer's structure can be read: it stands before its length, in four bytes, and the magic number. What is too short for that is left to the crate's words.
+/// Whether the footer is one as it is written here: it stands before its length, in four bytes, and the magic number. What is too short for that is left to the crate's words.
 fn footer_is_sound(bytes: &[u8]) -> bool {
     let Some((before, [length @ .., _, _, _, _])) = bytes.split_last_chunk::<8>() else { return true };
     let length = u32::from_le_bytes(*length) as usize;
     let Some(start) = before.len().checked_sub(length) else { return true };
-    thrift::structure(&before[start..], 0).is_some()
+    thrift::structure(&before[start..], thrift::FOOTER, 0).is_some()
 }
 
-/// Whether the headers of a column's pages, the first of them at `start`, the last one's page up to `end`, can be read.
+/// Whether the headers of a column's pages, the first of them at `start`, the last one's page up to `end`, are such as they are written here.
 fn headers_are_sound(bytes: &[u8], start: u64, end: u64) -> bool {
-    /// Where a page's header has the number of bytes behind it.
-    const LENGTH: i64 = 3;
     let (Ok(mut at), Ok(end)) = (usize::try_from(start), usize::try_from(end)) else { return false };
     while at < end {
-        let Some((header, length)) = bytes.get(at..).and_then(|bytes| thrift::structure(bytes, LENGTH)) else {
-            return false;
-        };
+        let header = |bytes| thrift::structure(bytes, thrift::PAGE, thrift::PAGE_LENGTH);
+        let Some((header, length)) = bytes.get(at..).and_then(header) else { return false };
         let Ok(length) = usize::try_from(length) else { return false };
         at = at.saturating_add(header).saturating_add(length);
     }
@@ -206,7 +203,7 @@ pub fn from_parquet(bytes: &[u8]) -> Result<(Heading, Table), Malformed> {
 fn read(bytes: &[u8], most_words: usize) -> Result<(Heading, Table), Malformed> {
     let wrong = |e: ParquetError| Malformed(e.to_string());
     if !footer_is_sound(bytes) {
-        return Err(Malformed("its footer is damaged".into()));
+        return Err(Malformed("its footer is not laid out as it is here".into()));
     }
     let reader = SerializedFileReader::new(Bytes::copy_from_slice(bytes)).map_err(wrong)?;
     let metadata = reader.metadata().file_metadata();
@@ -362,7 +359,7 @@ mod tests {
         }
     }
 
-    /// What a page's header and the footer say of themselves is looked at before anything is read.
+    /// What a page's header and the footer say is looked at before the crate reads them.
     #[test]
     fn claims_are_no_work() {
         let bytes = parquet(&table(100), &Value::Null);
@@ -378,7 +375,7 @@ mod tests {
         let mut claims = bytes.clone();
         claims[footer..footer + 7].copy_from_slice(&[0x19, 0xf1, 0xff, 0xff, 0xff, 0xff, 0x07]);
         let said = from_parquet(&claims).unwrap_err().to_string();
-        assert!(said.contains("its footer is damaged"), "{said}");
+        assert!(said.contains("its footer is not laid out as it is here"), "{said}");
     }
 
     /// `bytes` with other row groups in its footer.

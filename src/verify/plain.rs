@@ -31,6 +31,9 @@ fn hyperbolic_tangent(x: f64) -> f64 {
     x.signum() * (1.0 - e) / (1.0 + e)
 }
 
+/// Most steps of an orbit, some twenty times what any of the theorems' takes: a certificate may claim a layer that no orbit comes through.
+const MOST_STEPS: u32 = 1_000_000;
+
 impl Equation {
     fn at(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let r2 = x * x + y * y + z * z;
@@ -49,11 +52,12 @@ impl Equation {
         std::array::from_fn(|i| s[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]))
     }
 
-    /// The first `count` crossings (t, x, z) of y = 0 by the orbit from (x, 0, z); fewer if they take longer than 100.
+    /// The first `count` crossings (t, x, z) of y = 0 by the orbit from (x, 0, z); fewer if they take longer than 100, or too many steps.
     pub fn crossings(&self, x: f64, z: f64, count: usize) -> Vec<[f64; 3]> {
-        let (mut s, mut t) = ([x, 0.0, z], 0.0);
+        let (mut s, mut t, mut steps) = ([x, 0.0, z], 0.0, 0);
         let mut found = Vec::new();
-        while found.len() < count && t < 100.0 {
+        while found.len() < count && t < 100.0 && steps < MOST_STEPS {
+            steps += 1;
             // Outside the layer the field is a polynomial; inside, a step moves x by a fiftieth of eps.
             let outside = (s[0].abs() - 15.0 * self.eps).max(0.0);
             let mut h = ((0.02 * self.eps).max(0.3 * outside) / self.at(s)[0].abs().max(1e-9)).min(0.002);
@@ -76,6 +80,18 @@ impl Equation {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Whatever a certificate says of its equation.
+    #[test]
+    fn no_orbit_takes_for_ever() {
+        let wide = Equation { alpha: 0.1, beta: 1e-5, eps: 1e-3, v_plus: -2.2, v_minus: -0.4 };
+        assert_eq!(wide.crossings(0.2, -1.0, 4).len(), 4);
+        for eps in [1e-9, 1e-300, 0.0, -1.0, f64::NAN, f64::INFINITY] {
+            for alpha in [0.1, 0.0, 1e300, f64::NAN] {
+                assert!(Equation { eps, alpha, ..wide }.crossings(0.2, -1.0, 1000).len() < 1000, "{eps} {alpha}");
+            }
+        }
+    }
 
     #[test]
     fn tanh_is_tanh() {
