@@ -263,6 +263,7 @@ impl<F: VectorField<N>, const N: usize> Collocation<'_, F, N> {
 
 impl Gauss {
     /// The integral of component `i`'s slopes from each part's start to stage `j`, for parts that are as long as they are for [`Gauss`].
+    #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn along<S: Simd, const N: usize, const K: usize>(
         &self,
