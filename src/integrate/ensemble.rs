@@ -55,7 +55,7 @@ pub struct Plane {
 pub enum Tolerances<'a> {
     /// The same in all.
     All(Tolerance),
-    /// One for each run.
+    /// One for each run, in their order.
     Each(&'a [Tolerance]),
 }
 
@@ -158,6 +158,9 @@ where
 }
 
 /// [`ensemble_with`] that gives each run's number and end to `finished` as it comes to it: in an order that depends on the number of lanes.
+///
+/// # Panics
+/// If `equations`, tolerances or corners are those of fewer runs than `runs`.
 pub fn ensemble_watched<E, O, const N: usize>(
     set: InstructionSet,
     equations: &E,
