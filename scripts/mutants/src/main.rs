@@ -1,6 +1,6 @@
 //! Mutation testing with every mutant in one build: mutant schemata (Untch, Offutt, Harrold 1993). See docs/mutants.md.
 //!
-//! `mutants --rooms record,compare --scratch DIR [--jobs 1] [--slow 5] [--user 65534] [--only TEXT] [--tests units,NAME,...] [--keep ROOMS] [--units ROOMS]`, from the package's root.
+//! `mutants --rooms record,compare --scratch DIR [--jobs 1] [--slow 5] [--user 65534] [--only TEXT] [--tests units,NAME,...] [--keep ROOMS] [--units ROOMS] [--among FILE]`, from the package's root.
 
 mod schema;
 
@@ -36,6 +36,8 @@ struct Options {
     keep: Vec<String>,
     /// Of the library's unit tests only those of these rooms, if any are named.
     units: Vec<String>,
+    /// Only the mutants that this file lists, a line each (or a source file for all of its own), as `left.txt` does: what other tests left, to be tried on more tests. The others are not built.
+    among: Option<PathBuf>,
     /// The library's unit tests as an earlier call built them, to go on without building: nothing that is mutated may have changed since.
     built: Option<PathBuf>,
 }
@@ -51,6 +53,7 @@ fn options() -> Result<Options, Failure> {
         programs: None,
         keep: Vec::new(),
         units: Vec::new(),
+        among: None,
         built: None,
     };
     let list =
@@ -62,6 +65,7 @@ fn options() -> Result<Options, Failure> {
             "--rooms" => options.rooms = list(&value),
             "--keep" => options.keep = list(&value),
             "--units" => options.units = list(&value),
+            "--among" => options.among = Some(value.into()),
             "--built" => options.built = Some(PathBuf::from(value).canonicalize()?),
             "--scratch" => options.scratch = value.into(),
             "--jobs" => options.jobs = value.parse()?,
@@ -137,15 +141,17 @@ fn main() -> Result<(), Failure> {
         mutants.extend(file.mutants.iter().cloned());
     }
     let keys: Vec<String> = mutants.iter().map(Mutant::key).collect();
-    println!("{} mutants in {} files", mutants.len(), files.len());
+    let unasked = unasked(options.among.as_deref(), &keys)?;
+    println!("{} mutants in {} files", mutants.len() - unasked.len(), files.len());
 
-    let (dropped, programs) = match &options.built {
+    let (mut dropped, programs) = match &options.built {
         Some(program) => (known(&state, &keys), BTreeMap::from([("lib".to_owned(), program.clone())])),
-        None => (compile(&options, &tree, &state, &files, &offsets, &keys)?, build(&options, &tree)?),
+        None => (compile(&options, &tree, &state, &files, &offsets, &keys, &unasked)?, build(&options, &tree)?),
     };
     println!("{} do not compile", dropped.len());
+    dropped.extend(&unasked);
     let tests = reach(&options, &tree, &state, &programs, &keys, &dropped)?;
-    run(&options, &tree, &state, &mutants, &keys, &dropped, &programs, &tests)
+    run(&options, &tree, &state, &mutants, &keys, &dropped, &unasked, &programs, &tests)
 }
 
 /// Copies every tracked file that changed; returns their paths.
@@ -254,6 +260,25 @@ fn known(state: &Path, keys: &[String]) -> BTreeSet<usize> {
     (0..keys.len()).filter(|m| known.contains(keys[*m].as_str())).collect()
 }
 
+/// The mutants that a list of those asked for does not name.
+fn unasked(list: Option<&Path>, keys: &[String]) -> Result<BTreeSet<usize>, Failure> {
+    let Some(list) = list else { return Ok(BTreeSet::new()) };
+    let text = fs::read_to_string(list).map_err(|e| format!("{}: {e}", list.display()))?;
+    // "survived: KEY" as the tool writes it, "KEY  # survived" as the lists in `left` do.
+    let named: BTreeSet<&str> = text
+        .lines()
+        .filter_map(|l| l.find("src/").map(|at| l[at..].split("  # ").next().unwrap_or_default().trim_end()))
+        .collect();
+    let file = |key: &str| key.split(':').next().unwrap_or_default().to_owned();
+    let strange: Vec<&str> =
+        named.iter().filter(|n| !keys.iter().any(|k| k == *n || file(k) == **n)).copied().collect();
+    if !strange.is_empty() {
+        println!("{} lines of the list name no mutant of these rooms, the first: {}", strange.len(), strange[0]);
+    }
+    let asked = |key: &String| named.contains(key.as_str()) || named.contains(file(key).as_str());
+    Ok((0..keys.len()).filter(|m| !asked(&keys[*m])).collect())
+}
+
 /// Compiles, leaves out the mutants that rustc complains about, and compiles again until it is content.
 fn compile(
     options: &Options,
@@ -262,11 +287,12 @@ fn compile(
     files: &[(String, File)],
     offsets: &[usize],
     keys: &[String],
+    unasked: &BTreeSet<usize>,
 ) -> Result<BTreeSet<usize>, Failure> {
     let kept = state.join("not-viable.txt");
     let mut dropped = known(state, keys);
     for round in 0.. {
-        write(tree, &options.keep, files, offsets, &dropped)?;
+        write(tree, &options.keep, files, offsets, &dropped.union(unasked).copied().collect())?;
         let messages = cargo(options, tree, &["check", "--lib"])?;
         let mut errors = 0;
         let mut now = BTreeSet::new();
@@ -596,6 +622,7 @@ fn run(
     mutants: &[Mutant],
     keys: &[String],
     dropped: &BTreeSet<usize>,
+    unasked: &BTreeSet<usize>,
     programs: &BTreeMap<String, PathBuf>,
     tests: &[Test],
 ) -> Result<(), Failure> {
@@ -718,7 +745,7 @@ fn run(
             if at.is_multiple_of(100) {
                 println!("{at} of {} after {:.0} s", queue.len(), started.elapsed().as_secs_f64());
                 let results = done.lock().map_err(|e| e.to_string())?.clone();
-                summary(state, mutants, keys, dropped, &results).map_err(|e| e.to_string())?;
+                summary(state, mutants, keys, dropped, unasked, &results).map_err(|e| e.to_string())?;
             }
         }
     };
@@ -733,7 +760,7 @@ fn run(
         fs::write(&tried, names.iter().map(|n| format!("{n}\n")).collect::<String>())?;
     }
     let results = done.into_inner()?;
-    summary(state, mutants, keys, dropped, &results)?;
+    summary(state, mutants, keys, dropped, unasked, &results)?;
     println!("{}\nthose left: {}", fs::read_to_string(state.join("table.md"))?, state.join("left.txt").display());
     Ok(())
 }
@@ -752,11 +779,15 @@ fn summary(
     mutants: &[Mutant],
     keys: &[String],
     dropped: &BTreeSet<usize>,
+    unasked: &BTreeSet<usize>,
     results: &HashMap<String, Outcome>,
 ) -> Result<(), Failure> {
     let mut counts: BTreeMap<&str, BTreeMap<&str, usize>> = BTreeMap::new();
     let mut left = String::new();
     for (m, mutant) in mutants.iter().enumerate() {
+        if unasked.contains(&m) {
+            continue;
+        }
         let word = if dropped.contains(&m) {
             "not viable"
         } else {
