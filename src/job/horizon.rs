@@ -157,6 +157,52 @@ mod tests {
         assert_eq!(horizon(1e-32), 20.0);
     }
 
+    fn decay(precision: Option<u16>, order: Option<u16>, rtol: f64) -> Horizon {
+        let mut run = run(Method::TaylorExtended, rtol);
+        (run.system, run.start, run.t_end) = (crate::job::cases::decays(2), vec![3.0, 1.0], 0.25);
+        (run.method.precision, run.method.order) = (precision, order);
+        Horizon { run, within: 1e-9 }
+    }
+
+    /// The next precision; of the highest the one below.
+    #[test]
+    fn every_precision_has_another_to_compare_with() {
+        for (precision, rtol, bits, other) in [
+            (None, 1e-20, 106, 192),
+            (Some(106), 1e-20, 106, 192),
+            (Some(384), 1e-20, 384, 512),
+            (Some(512), 1e-20, 512, 384),
+        ] {
+            let answer = decay(precision, Some(30), rtol).compute(&Desk::quiet(), &()).unwrap();
+            let fact = |name: &str| answer.fact::<u16>(name).unwrap();
+            assert_eq!([fact("precision"), fact("other_precision"), fact("order")], [bits, other, 30]);
+            assert_eq!(fact("other_order"), 38);
+        }
+    }
+
+    #[test]
+    fn an_interrupted_horizon_says_so() {
+        struct Impatient;
+        impl crate::job::Progress for Impatient {
+            fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn crate::job::JobWatch + 'a> {
+                Box::new(Impatient)
+            }
+        }
+        impl crate::job::JobWatch for Impatient {
+            fn done(self: Box<Self>, _: &str) {}
+        }
+        impl Watch for Impatient {
+            fn reached(&self, t: f64) -> bool {
+                t < 0.1
+            }
+        }
+        // Some ten thousand steps of the order 4; the others have few and are not asked.
+        let horizon = decay(None, Some(4), 1e-20);
+        let answer = horizon.compute(&Desk::new(None, &Impatient), &()).unwrap();
+        assert_eq!(answer.stop, Stop::Interrupted);
+        assert!(answer.rows() < Horizon::SAMPLES, "{}", answer.rows());
+    }
+
     #[test]
     fn other_methods_have_none() {
         let error = Horizon { run: run(Method::Lsoda, 1e-9), within: 1e-9 }.compute(&Desk::quiet(), &()).unwrap_err();

@@ -565,3 +565,76 @@ impl<F: VectorField<N>, const N: usize> WithStepper<N> for Drive<'_, F, N> {
         Ok(drive_part(field, x0, &course, part, &mut stepper, &mut observer, watch)?.within_budget()?)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::{Kick, KickLaw, Schedule};
+    use crate::job::cases;
+
+    /// What is given away in parts: all rows, and how many each part had.
+    fn in_parts(run: &RunSpec) -> (Streamed, Vec<Vec<crate::job::Entry>>, Vec<usize>) {
+        let (mut rows, mut parts) = (Vec::new(), Vec::new());
+        let mut take = |table: &Table| {
+            parts.push(table.len());
+            rows.extend(table.rows());
+            true
+        };
+        (stream(run, &mut take, &()).unwrap(), rows, parts)
+    }
+
+    #[test]
+    fn recordings_are_of_three_states() {
+        let section = Observation::Section { coordinate: 0, value: 0.5 };
+        let run = |n: usize| cases::run(cases::decays(n), SwitchSpec::tanh(1e-2), 10.0, section);
+        for n in [2, 4] {
+            for found in [simulate(&run(n), &()), simulate_until(&run(n), &|_| true, &())] {
+                assert!(found.unwrap_err().to_string().contains("three states are looked at"));
+            }
+        }
+        let (whole, all) = (simulate(&run(3), &()).unwrap(), simulate_until(&run(3), &|_| false, &()).unwrap());
+        assert_eq!(whole, all);
+        // a2 = 1/16 at 2 ln 2: the first step's end after that.
+        let until = simulate_until(&run(3), &|x| x[1] < 0.0625, &()).unwrap();
+        assert_eq!((until.stop, until.data.len()), (StopReason::Observer, 1));
+        assert!(until.x[1] < 0.0625 && until.t < 2.0 && whole.t == 10.0);
+    }
+
+    /// Passages of a circle at unit speed through y = 0: one each pi.
+    #[test]
+    fn sections_are_given_away_in_parts() {
+        let circle = cases::smooth(&["x", "y"], "x + 9", &["x*(1 - x*x - y*y) - y", "y*(1 - x*x - y*y) + x"]);
+        let section = Observation::Section { coordinate: 1, value: 0.0 };
+        let mut run = cases::run(circle, SwitchSpec::tanh(1e-2), 30_000.0, section);
+        run.method.tolerance = crate::integrate::Tolerance { rtol: 1e-3, atol: 1e-3 };
+        let (end, rows, parts) = in_parts(&run);
+        assert!(parts.len() == 2 && parts[0] == PART && end.rows as usize == rows.len(), "{parts:?}");
+        assert!(rows == answer(&run, &()).unwrap().tables[0].rows());
+    }
+
+    /// A kick is two points of a path at one time, as far from each other as it is large.
+    #[test]
+    fn kicks_are_seen_in_a_path() {
+        let kick = Some(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 1, stream: 2 });
+        let mut run = cases::run(cases::decays(3), SwitchSpec::tanh(1e-2), 1.0, Observation::Path { chord: 1.0 });
+        run.schedule = Schedule { restart_every: None, kick };
+        let path = &answer(&run, &()).unwrap().tables[0];
+        let t = path.numbers("t");
+        let kicked: Vec<usize> = (1..t.len()).filter(|k| t[*k] == t[k - 1]).collect();
+        assert_eq!(kicked.len(), 3, "{t:?}");
+        for (k, time) in kicked.into_iter().zip([0.3, 0.6, 0.9]) {
+            let apart = ["a1", "a2", "a3"].map(|name| path.numbers(name)[k] - path.numbers(name)[k - 1]);
+            let size = apart.iter().map(|d| d * d).sum::<f64>().sqrt();
+            assert!((t[k] - time).abs() < 1e-12 && (size - 1e-3).abs() < 1e-12, "{size} at {}", t[k]);
+        }
+    }
+
+    #[test]
+    fn a_funnel_has_no_parts() {
+        let funnel = FunnelSpec { shortest: 0.1, longest: 1.0, times: 3, horizon: 5.0, until_two_fold: true };
+        let switch = SwitchSpec::Filippov { exit: ExitRule::All, funnel: Some(funnel) };
+        let run = cases::run(cases::decays(3), switch, 1.0, Observation::Path { chord: 1e-2 });
+        let said = stream(&run, &mut |_| true, &()).unwrap_err().to_string();
+        assert!(said.contains("not given away in parts"), "{said}");
+    }
+}
