@@ -180,6 +180,38 @@ mod tests {
         }
     }
 
+    /// Of the order 4 against the solution, which the other precision has to all its digits, and against the order 12: in units of 1 + the largest state.
+    #[test]
+    fn differences_are_in_units_of_one_and_the_state() {
+        let mut horizon = decay(None, Some(4), 1e-6);
+        // Half of the largest difference: some lie above it.
+        let all = horizon.compute(&Desk::quiet(), &()).unwrap().tables.remove(0);
+        let largest = |name: &str| all.numbers(name).iter().fold(0.0_f64, |a, b| a.max(*b));
+        horizon.within = 0.5 * largest("by_precision").max(largest("by_order"));
+        let answer = horizon.compute(&Desk::quiet(), &()).unwrap();
+        let [own, other] = [4, 12].map(|order| {
+            let run = horizon.variant(106, Some(order), horizon.run.method.tolerance);
+            Desk::quiet().ask(&*run).unwrap().tables[0].clone()
+        });
+        let table = &answer.tables[0];
+        let mut first_beyond = None;
+        for (row, t) in table.numbers("t").iter().enumerate() {
+            let of = |table: &Table| ["a1", "a2"].map(|name| table.numbers(name)[row]);
+            let (state, size) = (of(&own), 1.0 + of(&own)[0]);
+            let far = |b: [f64; 2]| (state[0] - b[0]).abs().max((state[1] - b[1]).abs()) / size;
+            let wanted = [far([3.0 * (-t).exp(), (-2.0 * t).exp()]), far(of(&other))];
+            for (column, wanted) in ["by_precision", "by_order"].into_iter().zip(wanted) {
+                let found = table.numbers(column)[row];
+                assert!((found - wanted).abs() < 1e-15, "{column} {t}: {found:e} {wanted:e}");
+            }
+            if table.numbers("by_precision")[row].max(table.numbers("by_order")[row]) > horizon.within {
+                first_beyond = first_beyond.or(Some(row));
+            }
+        }
+        let last = first_beyond.expect("half of the largest is less") - 1;
+        assert_eq!(answer.fact::<f64>("horizon").unwrap(), table.numbers("t")[last]);
+    }
+
     #[test]
     fn an_interrupted_horizon_says_so() {
         struct Impatient;

@@ -569,8 +569,18 @@ impl<F: VectorField<N>, const N: usize> WithStepper<N> for Drive<'_, F, N> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::integrate::filippov::Side;
     use crate::integrate::{Kick, KickLaw, Schedule};
     use crate::job::cases;
+    use crate::system::Relaxation;
+
+    const EVERY: Observation = Observation::Times { every: 0.25 };
+
+    fn switches() -> [SwitchSpec; 3] {
+        let exit = ExitRule::AtOnce { side: Side::Plus };
+        let hysteretic = SwitchSpec::hysteretic(1e-2, Relaxation::Single);
+        [SwitchSpec::tanh(1e-2), hysteretic, SwitchSpec::Filippov { exit, funnel: None }]
+    }
 
     /// What is given away in parts: all rows, and how many each part had.
     fn in_parts(run: &RunSpec) -> (Streamed, Vec<Vec<crate::job::Entry>>, Vec<usize>) {
@@ -581,6 +591,51 @@ mod tests {
             true
         };
         (stream(run, &mut take, &()).unwrap(), rows, parts)
+    }
+
+    /// Decays at the rates 1, 2, 3 ...: as a whole, given away in parts, and computed in parts.
+    #[test]
+    fn runs_have_one_to_eight_states() {
+        for n in 1..=8 {
+            for switch in switches() {
+                let run = cases::run(cases::decays(n), switch, 1.0, EVERY);
+                let whole = answer(&run, &()).unwrap();
+                let points = &whole.tables[0];
+                assert_eq!(points.numbers("t"), [0.0, 0.25, 0.5, 0.75, 1.0]);
+                for k in 1..=n {
+                    let state = points.numbers(&format!("a{k}"));
+                    let right = |(t, x): (&f64, &f64)| (x - (-(k as f64) * t).exp()).abs() < 1e-10;
+                    assert!(points.numbers("t").iter().zip(state).all(right), "{n} {switch:?}: {state:?}");
+                }
+                let state: Vec<f64> = whole.fact("state").unwrap();
+                assert_eq!((state.len(), state[n - 1]), (n, points.numbers(&format!("a{n}"))[4]));
+                let (end, rows, parts) = in_parts(&run);
+                // Blanks are not equal to each other, but look alike.
+                assert_eq!((format!("{rows:?}"), parts), (format!("{:?}", points.rows()), vec![5]));
+                assert_eq!((end.t, end.rows, end.stop), (1.0, 5, Stop::Finished));
+                assert_eq!(Some(&end.statistics), whole.statistics.as_ref());
+                if let SwitchSpec::Filippov { .. } = switch {
+                    continue;
+                }
+                // a1 is 1/2 at ln 2, between the first restart and the second.
+                let schedule = Schedule { restart_every: Some(0.4), kick: None };
+                let observe = Observation::Section { coordinate: 0, value: 0.5 };
+                let run = RunSpec { schedule, observe, ..run };
+                let (rows, t, state) = part(&run, Part { from: 0, to: 2 }, &()).unwrap();
+                assert!((rows.numbers("t")[0] - 2.0_f64.ln()).abs() < 1e-8 && rows.len() == 1 && t == 0.8, "{rows:?}");
+                assert_eq!(state.len(), n + usize::from(matches!(switch, SwitchSpec::Hysteretic { .. })));
+                assert!((state[n - 1] - (-0.8 * n as f64).exp()).abs() < 1e-10);
+            }
+        }
+        for switch in switches() {
+            let many = cases::run(cases::decays(9), switch, 1.0, Observation::Section { coordinate: 0, value: 0.5 });
+            let said = [
+                answer(&many, &()).unwrap_err(),
+                part(&many, Part::WHOLE, &()).unwrap_err(),
+                stream(&many, &mut |_| true, &()).unwrap_err(),
+            ];
+            assert!(said.iter().all(|e| e.to_string().contains("up to eight states")), "{said:?}");
+        }
     }
 
     #[test]
@@ -598,6 +653,42 @@ mod tests {
         let until = simulate_until(&run(3), &|x| x[1] < 0.0625, &()).unwrap();
         assert_eq!((until.stop, until.data.len()), (StopReason::Observer, 1));
         assert!(until.x[1] < 0.0625 && until.t < 2.0 && whole.t == 10.0);
+    }
+
+    /// A ball that falls to x = 0 from either side, passing once in two units of time: parts are cut inside pieces of its motion.
+    #[test]
+    fn parts_are_the_whole() {
+        let ball = cases::of("states = ['x', 'v']\nh = 'x'\nplus = ['v', '-1']\nminus = ['v', '1']");
+        let turning = cases::smooth(&["x", "v"], "x + 9", &["v", "-x"]);
+        let [tanh, _, filippov] = switches();
+        let times = Observation::Times { every: 1e-3 };
+        let chord = |chord| Observation::Path { chord };
+        for (system, switch, observe, pieces) in [
+            (turning.clone(), tanh, times, 0),
+            (turning, tanh, chord(3e-8), 0),
+            (ball.clone(), filippov, times, 10),
+            (ball, filippov, chord(1e-7), 10),
+        ] {
+            let start = vec![0.5, 0.0];
+            let run = RunSpec { start, ..cases::run(system, switch, 20.0, observe) };
+            let whole = answer(&run, &()).unwrap();
+            let (end, rows, parts) = in_parts(&run);
+            let (last, full) = parts.split_last().unwrap();
+            assert!(full.len() >= 2 && full.iter().all(|n| (PART..3 * PART).contains(n)) && *last < PART, "{parts:?}");
+            assert!(whole.tables[0].integers("piece").last().is_none_or(|last| *last == pieces));
+            // Blanks are not equal to each other, but look alike.
+            assert!(format!("{rows:?}") == format!("{:?}", whole.tables[0].rows()), "{observe:?}");
+            assert_eq!((end.rows as usize, end.stop), (rows.len(), Stop::Finished));
+            // Enough is enough.
+            let mut parts = 0;
+            let mut take = |_: &Table| {
+                parts += 1;
+                parts < 2
+            };
+            let cut = stream(&run, &mut take, &()).unwrap();
+            assert_eq!(cut.stop, Stop::Found);
+            assert!(cut.t < end.t && cut.rows < end.rows);
+        }
     }
 
     /// Passages of a circle at unit speed through y = 0: one each pi.
