@@ -231,3 +231,97 @@ fn extent(section: &[SectionPoint]) -> f64 {
     }
     cycle::distance(&low, &high)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::num::random::RandomStream;
+
+    fn judge(points: impl IntoIterator<Item = [f64; 2]>, upward: impl Fn(usize) -> bool) -> Evidence {
+        let points = points.into_iter().enumerate();
+        let section: Vec<_> = points.map(|(i, u)| SectionPoint { t: i as f64, u, upward: upward(i) }).collect();
+        classify(&section, &Question::default(), &Thresholds::default())
+    }
+
+    #[test]
+    fn the_extent_is_that_of_all_points_and_the_origin() {
+        let of = |points: &[[f64; 2]]| {
+            extent(&points.iter().map(|u| SectionPoint { t: 0.0, u: *u, upward: true }).collect::<Vec<_>>())
+        };
+        assert_eq!((of(&[]), of(&[[3.0, 4.0]]), of(&[[-3.0, -4.0], [-1.0, -2.0]])), (0.0, 5.0, 5.0));
+        assert_eq!(of(&[[-1.0, 7.0], [2.0, 3.0], [1.0, 11.0], [0.0, -1.0 - 1e-99]]), of(&[[-1.0, -1.0], [2.0, 11.0]]));
+    }
+
+    #[test]
+    fn what_cannot_be_judged_is_not() {
+        let up = |_| true;
+        let steps = |k: usize| (0..k).map(|i| [1.0, i as f64]);
+        // A state without a number, in either component.
+        for broken in [[f64::NAN, 1.0], [1.0, f64::NAN], [1.0, f64::INFINITY]] {
+            let e = judge(steps(40).chain([broken]), up);
+            assert!(matches!(e.verdict, Verdict::Escaped { last_crossing: 40.0 }), "{e:?}");
+        }
+        // Nineteen points; forty in the origin; forty too far apart to be measured; forty at one moment.
+        assert!(matches!(judge(steps(19), up).verdict, Verdict::TooFew { points: 19 }));
+        assert!(matches!(judge([[0.0; 2]; 40], up).verdict, Verdict::TooFew { points: 40 }));
+        assert!(matches!(judge(steps(40).map(|u| u.map(|c| 1e200 * c)), up).verdict, Verdict::TooFew { points: 40 }));
+        let once: Vec<_> = steps(40).map(|u| SectionPoint { t: 1.0, u, upward: true }).collect();
+        let e = classify(&once, &Question::default(), &Thresholds::default());
+        assert!(matches!(e.verdict, Verdict::TooFew { points: 40 }) && e.return_time.is_nan(), "{e:?}");
+    }
+
+    #[test]
+    fn the_direction_with_more_points_is_counted_and_upward_if_in_doubt() {
+        // Of 60 dots, so many upwards at (1, 2) and the others downwards at (2, 1): the counted dots come first.
+        for (ups, first) in [(40, true), (30, true), (29, false), (20, false)] {
+            let points = (0..60).map(|i| if i < ups { [1.0, 2.0] } else { [2.0, 1.0] });
+            let e = judge(points, |i| i < ups);
+            let cycle = e.verdict.cycle().unwrap();
+            assert_eq!((cycle.period, cycle.points.len(), cycle.points[0].upward), (1, 2, first), "{ups}: {e:?}");
+            for p in &cycle.points {
+                assert_eq!(p.u, if p.upward { [1.0, 2.0] } else { [2.0, 1.0] });
+            }
+        }
+        // One apart is in doubt.
+        let e = judge((0..59).map(|i| [1.0 + f64::from(i % 2), 2.0]), |i| i % 2 == 1);
+        assert!(e.verdict.cycle().unwrap().points[0].upward, "{e:?}");
+    }
+
+    #[test]
+    fn irregular_motion_in_the_second_coordinate_alone_is_irregular() {
+        let mut x = 0.4;
+        let mut next = || {
+            x = 3.97 * x * (1.0 - x);
+            [0.0, x]
+        };
+        let e = judge((0..1000).map(|_| next()), |_| true);
+        assert!(e.zero_one.unwrap() > 0.9 && e.name == "chaotic", "{e:?}");
+    }
+
+    #[test]
+    fn of_a_kicked_run_only_what_is_shown_is_compared() {
+        // A disc with a hole; in the first half of the run the points are in the hole, in the shown half never.
+        let disc = |n: usize, stream: u64| -> Vec<[f64; 2]> {
+            let mut r = RandomStream::new(5, stream);
+            let mut points = Vec::new();
+            while points.len() < n {
+                let u = [r.uniform_in(-1.0, 1.0), r.uniform_in(-1.0, 1.0)];
+                let square = u[0] * u[0] + u[1] * u[1];
+                if (0.16..1.0).contains(&square) {
+                    points.push(u);
+                }
+            }
+            points
+        };
+        let section = |points: Vec<[f64; 2]>| -> Vec<SectionPoint> {
+            points.into_iter().enumerate().map(|(i, u)| SectionPoint { t: i as f64, u, upward: true }).collect()
+        };
+        let free: Vec<_> = (0..3).map(|k| section(disc(20_000, k))).collect();
+        let hole = disc(2000, 9).into_iter().map(|u| u.map(|c| 0.3 * c)).collect::<Vec<_>>();
+        let run = section([hole, disc(2000, 10)].concat());
+        let question = Question { kicked: true, shown_from: 2000.0, reference: Some(&free), ..Question::default() };
+        let found = classify(&run, &question, &Thresholds::default());
+        let Verdict::Noisy { contrast: Some(contrast), .. } = found.verdict else { panic!("{found:?}") };
+        assert!(contrast.points == 2000 && contrast.value > 0.95, "{contrast:?}");
+    }
+}

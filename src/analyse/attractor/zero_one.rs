@@ -106,4 +106,24 @@ mod tests {
     fn too_short_is_no_answer() {
         assert_eq!(zero_one(&[1.0; 99]), None);
     }
+
+    #[test]
+    fn a_slow_oscillation_and_a_shifted_one_are_regular() {
+        // A seventh of the slowest frequency tried; with a mean a hundred times its size.
+        for shift in [0.0, 100.0] {
+            let phi: Vec<f64> = (0..1000).map(|i| shift + 0.01 * sin(0.15 * f64::from(i))).collect();
+            assert!(zero_one(&phi).unwrap().abs() < 0.1, "{shift}: {:?}", zero_one(&phi));
+        }
+    }
+
+    #[test]
+    fn correlations_of_short_sequences_by_hand() {
+        assert!((correlation_with_index(&[5.0, 7.0, 9.0, 11.0]) - 1.0).abs() < 1e-15);
+        assert!((correlation_with_index(&[3.0, 2.0, 1.0]) + 1.0).abs() < 1e-15);
+        assert_eq!(correlation_with_index(&[1.0, -1.0, -1.0, 1.0]), 0.0);
+        // Deviations -1.5, -0.5, 0.5, 1.5 and -0.75, 0.25, 1.25, -0.75 have the products' sum 0.5.
+        let want = 0.5 / sqrt(5.0 * 2.75);
+        assert!((correlation_with_index(&[0.0, 1.0, 2.0, 0.0]) - want).abs() < 1e-15);
+        assert_eq!(correlation_with_index(&[4.0; 5]), 0.0);
+    }
 }
