@@ -475,6 +475,15 @@ mod tests {
             of(&full, 4, 3)
         };
         close(&three([[0.7, -0.92, 0.41], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), &[[0.1, 0.9], [0.1, 0.9], [0.5, 0.0]]);
+        // The tribonacci constant is larger than any coefficient of its polynomial.
+        let pair = [-0.419_643_377_607_080_6, 0.606_290_729_207_199_4];
+        let tribonacci = three([[1.0, 1.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+        close(&tribonacci, &[[1.839_286_755_214_161, 0.0], pair, pair]);
+        // Four of five states: (l - 0.5)(l + 0.3) beside a pair, which feeds them.
+        let four = [[0.2, -0.82, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [5.0, 0.0, 0.2, 0.15], [0.0, 7.0, 1.0, 0.0]];
+        let full: Vec<f64> =
+            (0..25).map(|k| if k / 5 == 0 || k % 5 == 0 { 9.0 } else { four[k / 5 - 1][k % 5 - 1] }).collect();
+        close(&of(&full, 5, 0), &[[0.1, 0.9], [0.1, 0.9], [0.5, 0.0], [-0.3, 0.0]]);
         close(&three([[0.2, 0.0, 0.0], [0.0, -0.9, 0.0], [0.0, 0.0, 0.5]]), &[[-0.9, 0.0], [0.5, 0.0], [0.2, 0.0]]);
     }
 }

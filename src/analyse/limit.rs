@@ -404,5 +404,15 @@ mod tests {
         futures.question = &far;
         let farther = futures.crossings(&futures.family.members);
         assert!(!farther.is_empty() && farther.iter().all(|c| away(c) > 1.2));
+
+        // The whole answer: by eps, where there is a crossing; the width is the largest distance between two members' crossings.
+        let question = AfterVisitQuestion { eps: vec![1e-2, 1e-3], refinements: 0, ..near.clone() };
+        let there = Failure::state(&all[2].state);
+        let answer = after_visit(&system, &question, |eps| Ok((eps < 5e-3).then(|| there.clone()))).unwrap();
+        let [row] = &answer.rows[..] else { panic!("{:?}", answer.rows) };
+        assert_eq!((row.eps, row.distance, &row.crossing, &row.nearest), (1e-3, 0.0, &there, &all[2].record()));
+        assert_eq!(answer.members, all.iter().map(Candidate::record).collect::<Vec<_>>());
+        let width = all.iter().flat_map(|a| all.iter().map(|b| (a.state - b.state).norm())).fold(0.0, f64::max);
+        assert_eq!(answer.width, width);
     }
 }

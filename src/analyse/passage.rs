@@ -499,6 +499,8 @@ mod tests {
         assert_eq!(seen(&[[0.0, 0.3, 0.05], [0.02, 0.05, -0.3], [0.04, -0.2, -0.2]]), None);
         // The layer is left before the visit, and not after it.
         assert_eq!(seen(&[[0.0, 0.3, 0.3], [0.5, 0.2, 0.2], [0.0, 0.05, 0.05], [0.02, -0.3, -0.3]]), None);
+        // Two states near are one visit.
+        assert!(seen(&[[0.0, 0.05, 0.0], [0.0, 0.05, 0.0], [0.04, -0.3, -0.3]]).is_some());
         // Downwards as well; the first place counts.
         let place = seen(&[[0.0, 0.05, 0.0], [-0.06, 0.15, 0.2], [0.0, 0.0, 0.0], [0.06, 1.0, 1.0]]).unwrap();
         assert!((place[0] + 0.03).abs() < 1e-15 && (place[1] - 0.1).abs() < 1e-15, "{place:?}");

@@ -324,4 +324,64 @@ mod tests {
         let Verdict::Noisy { contrast: Some(contrast), .. } = found.verdict else { panic!("{found:?}") };
         assert!(contrast.points == 2000 && contrast.value > 0.95, "{contrast:?}");
     }
+
+    #[test]
+    fn a_slow_spiral_is_a_ring_until_its_change_can_be_seen() {
+        // Over 3000 turns the distance changes by 3 % and by 26 %; the run began long before.
+        for (gamma, name) in [(1e-5, "quasi-periodic"), (1e-4, "spiralling"), (-1e-4, "spiralling")] {
+            let section: Vec<_> = (0..3000)
+                .map(|i| {
+                    let (r, a) = (0.2 * crate::num::elementary::exp(-gamma * f64::from(i)), 2.3 * f64::from(i));
+                    let u = [0.4 + r * crate::num::elementary::cos(a), 0.1 + 0.5 * r * crate::num::elementary::sin(a)];
+                    SectionPoint { t: 1e6 + f64::from(i), u, upward: true }
+                })
+                .collect();
+            let e = classify(&section, &Question::default(), &Thresholds::default());
+            let cycle = e.verdict.cycle().unwrap();
+            assert_eq!((e.name.as_str(), cycle.period, cycle.captured_at), (name, 1, 1e6), "{e:?}");
+            assert!((cycle.approach.unwrap().per_time / gamma - 1.0).abs() < 0.05, "{e:?}");
+            // What is written of it is read again.
+            let text = serde_json::to_string(&e).unwrap();
+            assert_eq!(serde_json::from_str::<Evidence>(&text).unwrap(), e);
+        }
+    }
+
+    #[test]
+    fn what_tells_regular_from_irregular_is_weighed() {
+        let exponent = |value: f64| Some(Exponent { value, standard_error: 0.01, duration: 1e3 });
+        let verdict = |points: &[[f64; 2]], lyapunov| {
+            let section: Vec<_> =
+                points.iter().enumerate().map(|(i, u)| SectionPoint { t: i as f64, u: *u, upward: true }).collect();
+            classify(&section, &Question { lyapunov, ..Question::default() }, &Thresholds::default()).name
+        };
+        let mut x = 0.4;
+        let mut irregular = || {
+            let before = x;
+            x = 3.97 * x * (1.0 - x);
+            [before, x]
+        };
+        let irregular: Vec<[f64; 2]> = (0..600).map(|_| irregular()).collect();
+        // On a line there is no ring.
+        let regular: Vec<[f64; 2]> =
+            (0..600).map(|i| [1.0 + crate::num::elementary::sin(2.0 * f64::from(i)), 0.0]).collect();
+        // An exponent counts from three of its errors on.
+        for (points, lyapunov, want) in [
+            (&irregular[..], None, "chaotic"),
+            (&irregular[..], exponent(0.5), "chaotic"),
+            (&irregular[..], exponent(0.031), "chaotic"),
+            (&irregular[..], exponent(0.029), "undecided"),
+            (&regular[..], None, "quasi-periodic"),
+            (&regular[..], exponent(0.0), "quasi-periodic"),
+            (&regular[..], exponent(0.5), "quasi-periodic"),
+            // Below 200 points neighbours say nothing: one against one.
+            (&regular[..150], exponent(0.5), "undecided"),
+            (&regular[..150], exponent(0.0), "quasi-periodic"),
+            (&irregular[..150], exponent(0.0), "undecided"),
+            // Below 100 nothing says anything but the exponent.
+            (&irregular[..90], None, "too-few"),
+            (&irregular[..90], exponent(0.5), "chaotic"),
+        ] {
+            assert_eq!(verdict(points, lyapunov), want, "{} {lyapunov:?}", points.len());
+        }
+    }
 }
