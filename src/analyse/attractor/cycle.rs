@@ -642,4 +642,74 @@ mod tests {
         assert!(return_time(&[]).is_nan() && return_time(&[1.0]).is_nan());
         assert!(return_time(&[1.0; 4]).is_nan() && return_time(&[4.0, 3.0, 2.0]).is_nan());
     }
+
+    /// What is found in points at one place after another; the last has phase 0.
+    fn found(points: &[Point], extent: f64) -> (usize, Vec<f64>, usize) {
+        let turns = Turns::find(points, &[], extent, &Thresholds::default());
+        let n = points.len();
+        let from_centres = (0..n).map(|i| distance(&points[i], &turns.centres[(n - 1 - i) % turns.period]));
+        assert_eq!(turns.distances, from_centres.collect::<Vec<_>>());
+        (turns.period, turns.spreads, turns.block)
+    }
+
+    #[test]
+    fn the_last_part_of_a_run_decides_and_a_block_is_a_tenth_of_its_turns() {
+        // The last quarter, of short runs thirty points at least, of long ones six hundred at most. On a ring that turns by the golden ratio, in whose last
+        // part the first two fifths are half as far out again as the rest; before it, twice as far.
+        for (n, window, block) in [(100, 30, 10), (1000, 250, 100), (4000, 600, 200)] {
+            let points: Vec<Point> = (0..n)
+                .map(|i| {
+                    let r = if i < n - window {
+                        2.0
+                    } else if i < n - 3 * window / 5 {
+                        1.5
+                    } else {
+                        1.0
+                    };
+                    let a = TAU * 0.618_033_988_749_894_9 * i as f64;
+                    [r * cos(a), r * sin(a)]
+                })
+                .collect();
+            let (period, spreads, blocks) = found(&points, 4.0);
+            assert_eq!((period, blocks), (1, block), "{n}");
+            assert!((spreads[0] - 1.5).abs() < 0.2, "{n}: {spreads:?}");
+        }
+    }
+
+    #[test]
+    fn dots_are_as_many_as_stay_apart() {
+        let dots = |n: usize, places: &[Point]| -> Vec<Point> { (0..n).map(|i| places[i % places.len()]).collect() };
+        let six = |near: f64| [[0.0, 0.0], [1.0, 0.0], [1.0, near], [0.0, 1.0], [0.5, 2.0], [-0.5, 1.0]];
+        // 120 points of six dots are too few for a window of thirty each, and enough turns all the same; 1000 are enough.
+        for (n, block) in [(120, 10), (1000, 16)] {
+            // A dot is 0.002 of the extent, and two must fit between two of them: 0.008.
+            let (period, spreads, blocks) = found(&dots(n, &six(0.009)), 2.0);
+            assert!((period, blocks) == (6, block) && spreads.iter().all(|s| *s < 1e-15), "{n}: {period} {spreads:?}");
+            assert_eq!(found(&dots(n, &six(0.007)), 2.0).0, 1);
+        }
+        // Five turns within the last half are needed: of six dots, 60 points.
+        assert_eq!((found(&dots(59, &six(0.5)), 2.0).0, found(&dots(60, &six(0.5)), 2.0).0), (1, 6));
+        // Two clusters, each to and fro: three radii of the wider one must lie between them.
+        for (radius, period) in [(0.32, 2), (0.35, 1)] {
+            let points: Vec<Point> = (0..1000)
+                .map(|i| [f64::from(i % 2), if i / 2 % 2 == 0 { radius } else { -radius } * f64::from(i % 2)])
+                .collect();
+            assert_eq!(found(&points, 1.5).0, period, "{radius}");
+        }
+    }
+
+    #[test]
+    fn a_ring_that_creeps_is_no_cycle_and_islands_are() {
+        let five = |n: i32, creep: f64, radius: f64| -> Vec<Point> {
+            (0..n)
+                .map(|i| {
+                    let (a, b) = (TAU * (0.2 + creep) * f64::from(i), TAU * 0.077 * f64::from(i));
+                    [cos(a) + radius * cos(b), sin(a) + radius * sin(b)]
+                })
+                .collect()
+        };
+        // Next to a resonance each of five phases goes along the ring; around it each turns about its centre.
+        assert_eq!(found(&five(4000, 1e-4, 0.0), 3.0).0, 1);
+        assert_eq!(found(&five(4000, 0.0, 0.05), 3.0).0, 5);
+    }
 }
