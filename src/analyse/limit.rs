@@ -388,7 +388,7 @@ mod tests {
         let first: Vec<_> = all.iter().filter(|c| c.side == Side::Minus).copied().collect();
         assert_eq!((all.len(), first.len()), (8, 4));
         // Three refinements, each of a half of the interval's logarithm, leave an eighth between neighbours.
-        for place in [0.6, 1.4, 1.6, 2.4] {
+        for place in [0.55, 1.45, 1.55, 2.45] {
             let time = 1.2 * pow(1.25, place);
             let only = FunnelGrid { shortest: time, longest: time, times: 1, ..grid };
             let there = futures.family.members_on(&system, &near.settings, &only, Some(Side::Minus)).unwrap();

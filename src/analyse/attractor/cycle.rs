@@ -461,20 +461,20 @@ mod tests {
 
     #[test]
     fn a_phase_is_seen_round_and_turns_as_it_does() {
-        // Two phases around two centres, the later one a tenth of a circle ahead; before the last ten turns something else.
-        let centres = [[5.0, -3.0], [-20.0, 7.0]];
-        for (rotation, scale) in [(0.3, 1.0), (-0.3, 1e-3), (0.1, 1e3), (-0.4, 1.0)] {
-            let points: Vec<Point> = (0..26)
+        // Three phases around three centres, each a tenth of a circle ahead of the next; before the last ten turns something else.
+        let centres = [[5.0, -3.0], [-20.0, 7.0], [0.0, 9.0]];
+        for (rotation, scale) in [(0.3, 1.0), (-0.3, 1e-3), (0.1, 1e3), (-0.45, 1.0)] {
+            let points: Vec<Point> = (0..36)
                 .map(|i| {
-                    let phase = (25 - i) % 2;
-                    let angle = rotation * f64::from(i / 2) + 0.1 * f64::from(phase);
+                    let phase = (35 - i) % 3;
+                    let angle = rotation * f64::from(i / 3) + 0.1 * f64::from(phase);
                     let junk = if i < 6 { 100.0 } else { 0.0 };
                     ellipse([centres[phase as usize][0] + junk, centres[phase as usize][1]], angle, scale)
                 })
                 .collect();
             let turns = around(&points, &[], &centres, 10);
-            for phase in 0..2 {
-                let round = turns.round(phase, 6, 26).unwrap();
+            for phase in 0..3 {
+                let round = turns.round(phase, 6, 36).unwrap();
                 assert_eq!(round.len(), 10);
                 // Second moments one: ten points at the distance sqrt(2/10).
                 assert!(round.iter().all(|q| (q[0] * q[0] + q[1] * q[1] - 0.2).abs() < 1e-10), "{round:?}");
@@ -516,6 +516,8 @@ mod tests {
         assert!((spiral.ends[0] + 0.415).abs() < 1e-12 && (spiral.ends[1] + 0.775).abs() < 1e-12, "{:?}", spiral.ends);
         // On a line it is judged by time.
         let line = at(&std::array::from_fn::<f64, 40, _>(|i| if i % 2 == 0 { 0.3 * 1.01 } else { 0.3 / 1.01 }));
+        let three: Vec<Point> = (0..42).map(|i| [[0.3, 0.5, 0.7][i % 3], 0.0]).collect();
+        assert!(around(&three, &[], &[[0.0; 2]; 3], 14).ring(0, 42).thickness < 1e-12);
         let flat = around(&line, &[], &[[0.0; 2]], 40).ring(0, 40);
         assert!((flat.thickness / (0.01 * std::f64::consts::SQRT_2) - 1.0).abs() < 0.01, "{}", flat.thickness);
     }
@@ -547,6 +549,10 @@ mod tests {
         // Too few in the dot to have settled; a block that joins.
         assert_eq!(captured(&[vec![0.5; 30], vec![1e-3; 4]].concat()), None);
         assert_eq!(captured(&[vec![0.5; 30], vec![1e-3; 5]].concat()).map(|c| c.2), Some(Some(30)));
+        // A block of two phases is twice as long.
+        let two = at(&[vec![0.5; 37], vec![1e-3; 63]].concat());
+        let found = around(&two, &[], &[[0.0; 2]; 2], 10).captured(1.0, &th).unwrap();
+        assert_eq!((found.from, found.blocks, found.settled), (37, 3, Some(37)));
         // All along one smooth curve: as many blocks as there are.
         let smooth: Vec<f64> = (0..47).map(|i| 0.5 - 0.001 * f64::from(i)).collect();
         assert_eq!(captured(&smooth), Some((7, 4, None)));

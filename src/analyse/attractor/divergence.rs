@@ -200,6 +200,21 @@ mod tests {
     }
 
     #[test]
+    fn points_that_return_exactly_are_passed_over() {
+        let (mut x, mut y) = (0.1, 0.1);
+        let mut orbit: Vec<[f64; 2]> = (0..3000)
+            .map(|_| {
+                (x, y) = (1.0 - 1.4 * x * x + y, 0.3 * x);
+                [x, y]
+            })
+            .collect();
+        let before = divergence(&orbit, 1.0).unwrap();
+        orbit.extend_from_within(100..140);
+        let after = divergence(&orbit, 1.0).unwrap();
+        assert!((after.per_return - before.per_return).abs() < 0.02, "{before:?} {after:?}");
+    }
+
+    #[test]
     fn two_far_points_change_nothing() {
         let mut r = RandomStream::new(3, 0);
         let mut points: Vec<[f64; 2]> = (0..3000).map(|_| [r.uniform(), r.uniform()]).collect();
@@ -210,7 +225,12 @@ mod tests {
     #[test]
     fn nearest_is_nearest_in_any_box() {
         let mut r = RandomStream::new(5, 0);
-        for (low, size) in [([-7.0, 4.0], [0.1, 1.0]), ([3.0, -9.0], [1.0, 0.3]), ([0.0, 0.0], [300.0, 2000.0])] {
+        for (low, size) in [
+            ([0.1, -0.2], [1.0, 2.0]),
+            ([-7.0, 4.0], [0.1, 1.0]),
+            ([3.0, -9.0], [1.0, 0.3]),
+            ([0.0, 0.0], [300.0, 2000.0]),
+        ] {
             let points: Vec<[f64; 2]> =
                 (0..300).map(|_| std::array::from_fn(|k| low[k] + size[k] * r.uniform())).collect();
             let n = points.len() - HORIZON;

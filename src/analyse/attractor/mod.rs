@@ -384,4 +384,22 @@ mod tests {
             assert_eq!(verdict(points, lyapunov), want, "{} {lyapunov:?}", points.len());
         }
     }
+
+    #[test]
+    fn a_ring_after_chaos_begins_where_the_chaos_ends() {
+        use crate::num::elementary::{cos, sin};
+        let (mut x, mut y) = (0.1, 0.1);
+        let chaos: Vec<[f64; 2]> = (0..1000)
+            .map(|_| {
+                (x, y) = (1.0 - 1.4 * x * x + y, 0.3 * x);
+                [x, y]
+            })
+            .collect();
+        let ring = (0..3000).map(|i| 2.3 * f64::from(i)).map(|a| [0.4 + 0.2 * cos(a), 0.1 + 0.1 * sin(a)]);
+        let e = judge(chaos.into_iter().chain(ring), |_| true);
+        let cycle = e.verdict.cycle().unwrap();
+        // Known to within a block of turns.
+        assert!(e.name == "quasi-periodic" && (1000.0..1200.0).contains(&cycle.captured_at), "{e:?}");
+        assert!((cycle.rotation.unwrap() - 2.3 / std::f64::consts::TAU).abs() < 1e-3, "{e:?}");
+    }
 }

@@ -238,6 +238,15 @@ mod tests {
         let rate = Rate { per_time: 3e-5, standard_error: 1e-7, from: 0.0, to: 1.0 };
         let falling = Cycle { approach: Some(rate), ..cycle.clone() };
         let lyapunov = Some(Exponent { value: 0.5, standard_error: 0.0125, duration: 1e3 });
+        let contrast = super::super::Contrast {
+            value: 0.25,
+            interval: [0.2, 0.3],
+            free: [0.9, 0.95],
+            free_runs: 3,
+            island_share: 0.1,
+            outside: 0.0,
+            points: 1000,
+        };
         for (verdict, text) in [
             (Verdict::Periodic(cycle.clone()), "period 3, captured at t = 120"),
             (Verdict::Periodic(settled), "period 3, captured at t = 120, settled at t = 250"),
@@ -251,6 +260,10 @@ mod tests {
             (
                 Verdict::Noisy { contrast: None, around: Some(cycle) },
                 "noisy, in clouds of radius 2.5e-1 around period 3",
+            ),
+            (
+                Verdict::Noisy { contrast: Some(contrast), around: None },
+                "noisy, islands 0.75 [0.70, 0.80] times as dense as the sea, at most 0.10 without noise",
             ),
             (Verdict::Escaped { last_crossing: 7.4 }, "left the section at t = 7"),
             (Verdict::TooFew { points: 12 }, "too few crossings (12)"),
