@@ -563,7 +563,7 @@ mod tests {
     #[test]
     fn a_cloud_reaches_back_as_far_as_it_stays_near() {
         let th = Thresholds::default();
-        let mut distances = vec![0.05; 51];
+        let mut distances = [0.05; 51];
         (distances[20], distances[30]) = (0.11, 0.1);
         let from = |d: &[f64]| around(&at(d), &[], &[[0.0; 2]], 10).cloud(1.0, &th).map(|c| c.from);
         // Thirty points of a phase are a window; as far out as the linear neighbourhood reaches is still in it.

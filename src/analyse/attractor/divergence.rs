@@ -196,6 +196,8 @@ mod tests {
         let d = divergence(&orbit, 2.5).unwrap();
         assert!((d.per_return - std::f64::consts::LN_2).abs() < 0.03, "{d:?}");
         assert_eq!(d.per_time, d.per_return / 2.5);
+        // Neighbours are some 5e-4 apart, and distances saturate at 0.19: 2^8.6 times that.
+        assert!((7..=10).contains(&d.returns_fitted), "{d:?}");
         assert!(d.standard_error > 0.0 && d.standard_error < 0.05, "{d:?}");
     }
 
@@ -244,7 +246,7 @@ mod tests {
         }
         // All in one place, or one nowhere: no box.
         assert_eq!(nearest(&[[1.0, 1.0]; 50]), None);
-        let mut broken = vec![[1.0, 1.0]; 50];
+        let mut broken = [[1.0, 1.0]; 50];
         broken[3] = [f64::INFINITY, 0.0];
         assert_eq!(nearest(&broken), None);
     }
