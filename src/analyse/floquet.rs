@@ -489,4 +489,22 @@ mod tests {
         }
         close(&three([[0.2, 0.0, 0.0], [0.0, -0.9, 0.0], [0.0, 0.0, 0.5]]), &[[-0.9, 0.0], [0.5, 0.0], [0.2, 0.0]]);
     }
+
+    #[test]
+    fn a_pair_of_complex_multipliers_has_the_rate_of_its_modulus() {
+        /// With d = r^2 - 1: (d, z)' = ((-0.02, -0.3), (0.3, -0.02)) (d, z), angle' = 1.
+        struct Ring;
+        impl VectorField<3> for Ring {
+            fn eval<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+                let square = x[0] * x[0] + x[1] * x[1];
+                let d = square - S::one();
+                let g = (-d.scale(0.02) - x[2].scale(0.3)) / square.scale(2.0);
+                SVector::from([g * x[0] - x[1], g * x[1] + x[0], d.scale(0.3) - x[2].scale(0.02)])
+            }
+        }
+        let plane = Plane { axis: 1, value: 0.0, upward: true };
+        let guess = SVector::from([1.1, 0.0, 0.05]);
+        let o = closed_orbit::<3, 12, _>(&Ring, plane, 1, guess, &Settings::default()).unwrap();
+        assert!((o.rate - 0.02).abs() < 1e-8 && o.multipliers[0][1] != 0.0, "{o:?}");
+    }
 }
