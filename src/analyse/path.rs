@@ -31,7 +31,8 @@ const MOST_HALVINGS: u32 = 10;
 
 impl<const D: usize> PathRecorder<D> {
     /// A recorder that starts at `x0`; `chord` is the largest distance between polyline and interpolant, in the
-    /// state's units.
+    /// state's units, where they are compared: at the thirds of a step and the middles of its parts. Elsewhere it may be somewhat larger; a third
+    /// of a step whose middle alone lies on its chord, an S, passes for straight.
     pub fn new<const N: usize>(x0: &SVector<f64, N>, chord: f64) -> Self {
         Self::starting(0.0, x0, chord)
     }

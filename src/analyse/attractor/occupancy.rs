@@ -240,7 +240,7 @@ impl Grid {
     fn cell(&self, q: &[f64; 2]) -> usize {
         let side = self.cells + 2;
         let [a, b]: [usize; 2] = std::array::from_fn(|k| {
-            // The upper edge of the box belongs to its last cell.
+            // The upper edge of the box belongs to its last cell, and what is less than a cell beyond it.
             let c = ((q[k] - self.low[k]) / self.width[k]).floor();
             if c < 0.0 {
                 0
