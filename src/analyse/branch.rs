@@ -488,4 +488,273 @@ mod tests {
         let error = closed_orbit(&FoldMap, &[0.3, 0.0], -1.0, NEWTON).unwrap_err();
         assert!(error.contains("start"), "{error}");
     }
+
+    /// Zeros of a function f(x, p), given with its slope in x, as closed orbits; not defined where it is `None`.
+    struct Zeros<F>(F);
+    impl<F: Fn(f64, f64) -> Option<[f64; 2]>> ReturnMap for Zeros<F> {
+        fn states(&self) -> usize {
+            2
+        }
+        fn axis(&self) -> usize {
+            1
+        }
+        fn returned(&self, u: &[f64], p: f64, _: bool) -> Result<Returned, String> {
+            let [f, slope] = (self.0)(u[0], p).ok_or("nothing there")?;
+            let point = vec![u[0] + f, 0.0];
+            let derivative = vec![1.0 + slope, 0.0, 0.0, 0.0];
+            Ok(Returned { point: point.clone(), time: 1.0, derivative, same: vec![point], opposite: Vec::new() })
+        }
+    }
+
+    /// An orbit of which only this is known.
+    fn with(parameter: f64, multipliers: &[[f64; 2]]) -> Orbit {
+        Orbit {
+            parameter,
+            point: vec![0.0; 2],
+            period: 2.0,
+            multipliers: multipliers.to_vec(),
+            residual: 0.0,
+            iterations: 0,
+            same: Vec::new(),
+            opposite: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_rate_is_the_logarithm_of_the_largest_multiplier_over_the_period() {
+        let rate = |m: &[[f64; 2]]| with(0.0, m).rate();
+        assert!((rate(&[[-0.25, 0.0], [0.1, 0.0]]).unwrap() - std::f64::consts::LN_2).abs() < 1e-15);
+        assert!((rate(&[[2.4, 3.2], [2.4, -3.2]]).unwrap() + std::f64::consts::LN_2).abs() < 1e-15);
+        // Neighbours that arrive in finite time have none.
+        assert_eq!((rate(&[[0.0; 2]; 2]), rate(&[])), (None, None));
+        assert!(with(0.0, &[[0.6, 0.7]]).attracts() && !with(0.0, &[[0.6, -0.9]]).attracts());
+    }
+
+    #[test]
+    fn what_counts_as_closed() {
+        let newton = Newton { closed: 1e-9, iterations: 20 };
+        let cases = [
+            (1e-9, f64::INFINITY, true),
+            (1.1e-9, 1.0, false),
+            // Stuck, and not far off.
+            (1e-7, 1.9e-7, true),
+            (1e-7, 2.1e-7, false),
+            (1.1e-7, 1.1e-7, false),
+        ];
+        for (residual, before, want) in cases {
+            assert_eq!(settled(residual, before, newton), want, "{residual} {before}");
+        }
+    }
+
+    #[test]
+    fn a_multiplier_that_differs_from_one_by_rounding_is_one() {
+        /// Its derivative less one has the rows 1e8 (1, 1) and 1e8 (1, 1) but for the last bit: of rank one, as far as can be told.
+        struct Rounded;
+        impl ReturnMap for Rounded {
+            fn states(&self) -> usize {
+                3
+            }
+            fn axis(&self) -> usize {
+                2
+            }
+            fn returned(&self, u: &[f64], _: f64, _: bool) -> Result<Returned, String> {
+                let point = vec![u[0] + 1.0, u[1] + 2.0, 0.0];
+                let derivative = vec![1e8 + 1.0, 1e8, 0.0, 1e8, 1e8 + 1.0 + 1.5e-8, 0.0, 0.0, 0.0, 0.0];
+                Ok(Returned { point, time: 1.0, derivative, same: Vec::new(), opposite: Vec::new() })
+            }
+        }
+        let error = closed_orbit(&Rounded, &[0.0; 3], 0.0, NEWTON).unwrap_err();
+        assert!(error.contains("multiplier 1"), "{error}");
+    }
+
+    #[test]
+    fn an_orbit_lists_its_start_and_not_its_end() {
+        // Twice around by the logistic map: the second of two passages is the start again.
+        struct Twice;
+        impl ReturnMap for Twice {
+            fn states(&self) -> usize {
+                2
+            }
+            fn axis(&self) -> usize {
+                1
+            }
+            fn returned(&self, u: &[f64], p: f64, _: bool) -> Result<Returned, String> {
+                let once = Logistic.returned(u, p, true)?;
+                let twice = Logistic.returned(&once.point, p, true)?;
+                let derivative = vec![once.derivative[0] * twice.derivative[0], 0.0, 0.0, 0.0];
+                let same = vec![once.point, twice.point.clone()];
+                Ok(Returned { point: twice.point, time: 2.0, derivative, same, opposite: Vec::new() })
+            }
+        }
+        let p = 3.2;
+        let orbit = closed_orbit(&Twice, &[0.5, 0.0], p, NEWTON).unwrap();
+        // The cycle of two: x = (p + 1 -+ sqrt((p - 3)(p + 1)))/(2 p), with the multiplier 4 + 2 p - p^2.
+        let root = sqrt((p - 3.0) * (p + 1.0));
+        let ends = [-root, root].map(|r| (p + 1.0 + r) / (2.0 * p));
+        assert_eq!(orbit.same.len(), 2);
+        for (got, want) in orbit.same.iter().zip(ends) {
+            assert!((got[0] - want).abs() < 1e-11, "{orbit:?}");
+        }
+        assert!((orbit.multipliers[0][0] - (4.0 + 2.0 * p - p * p)).abs() < 1e-10 && orbit.attracts(), "{orbit:?}");
+    }
+
+    #[test]
+    fn steps_along_a_straight_branch_are_as_long_as_they_should_be() {
+        // x = p, from 1 to 5: of the state's scale 2 and the parameter's 4.
+        let line = Zeros(|x: f64, p: f64| Some([0.5 * (p - x), -0.5]));
+        let first = closed_orbit(&line, &[1.0, 0.0], 1.0, NEWTON).unwrap();
+        let course = Course { from: 1.0, to: 5.0, longest: 0.1, most: 200, newton: NEWTON };
+        let branch = follow(&line, first, &course, &mut |_| true);
+        assert_eq!(branch.end, End::Reached);
+        assert!(branch.bifurcations.is_empty());
+        let n = branch.orbits.len();
+        let mut want = 0.025;
+        for (k, pair) in branch.orbits.windows(2).enumerate() {
+            let (dx, dp) = ((pair[1].point[0] - pair[0].point[0]) / 2.0, (pair[1].parameter - pair[0].parameter) / 4.0);
+            let length = sqrt(dx * dx + dp * dp);
+            match k {
+                // The first is a step in the parameter; the orbit is not where it was, and is found.
+                0 => assert!((dp - want).abs() < 1e-12 && pair[1].iterations == 1, "{pair:?}"),
+                // What follows a straight line needs no search.
+                _ if k + 2 < n => {
+                    assert!((length - want).abs() < 1e-9 && pair[1].iterations == 0, "{k}: {length} {want}")
+                }
+                _ => assert!(length <= 0.1 && pair[1].iterations == 0 && pair[1].parameter == 5.0, "{pair:?}"),
+            }
+            want = (1.5 * want).min(0.1);
+        }
+        // The way is sqrt 5 long, 0.056 + 0.178 of it in the steps that grow.
+        assert_eq!(n, 1 + 4 + 21);
+    }
+
+    #[test]
+    fn a_circle_of_orbits_is_gone_around_by_quick_newton_iterations() {
+        // x^2 + p^2 = 25 from (5, 0) by the fold at p = 5 to (-5, 0).
+        let circle = Zeros(|x: f64, p: f64| Some([0.1 * (25.0 - x * x - p * p), -0.2 * x]));
+        let first = closed_orbit(&circle, &[4.9, 0.0], 0.0, NEWTON).unwrap();
+        let course = Course { from: 0.0, to: 6.0, longest: 0.05, most: 400, newton: NEWTON };
+        let branch = follow(&circle, first, &course, &mut |_| true);
+        assert_eq!(branch.end, End::TurnedBack);
+        for (k, pair) in branch.orbits.windows(2).enumerate() {
+            let [x, p] = [pair[1].point[0], pair[1].parameter];
+            assert!((x * x + p * p - 25.0).abs() < 1e-10, "{pair:?}");
+            // Quadratic convergence: the rows of the matrix are those of the equations.
+            assert!(pair[1].iterations <= 4, "{k}: {}", pair[1].iterations);
+            let (dx, dp) = ((x - pair[0].point[0]) / 6.0, (p - pair[0].parameter) / 6.0);
+            assert!(sqrt(dx * dx + dp * dp) < 0.0501, "{pair:?}");
+        }
+        let last = branch.orbits.last().unwrap();
+        assert!(last.parameter < 0.0 && last.parameter > -0.31 && last.point[0] < -4.9, "{last:?}");
+        let [fold] = &branch.bifurcations[..] else { panic!("{:?}", branch.bifurcations) };
+        assert!(
+            fold.change == Change::Fold && (fold.parameter - 5.0).abs() < 0.05 && fold.uncertainty < 0.05,
+            "{fold:?}"
+        );
+    }
+
+    #[test]
+    fn a_branch_ends_where_its_orbits_do_or_where_it_is_told() {
+        let ray = Zeros(|x: f64, p: f64| (p <= 1.0).then_some([-0.5 * x, -0.5]));
+        let course = Course { from: 0.0, to: 4.0, longest: 0.1, most: 100, newton: NEWTON };
+        let first = || closed_orbit(&ray, &[0.0, 0.0], 0.0, NEWTON).unwrap();
+        let branch = follow(&ray, first(), &course, &mut |_| true);
+        assert_eq!(branch.end, End::Lost("nothing there".into()));
+        // As near to the end as two of the shortest steps.
+        let left = 1.0 - branch.orbits.last().unwrap().parameter;
+        assert!((0.0..2.0 * SHORTEST * 0.1 * 4.0).contains(&left), "{left}");
+
+        let branch = follow(&ray, first(), &Course { most: 4, ..course }, &mut |_| true);
+        assert_eq!((branch.end, branch.orbits.len()), (End::Enough, 4));
+        let mut told = 0;
+        let mut third = |_: &Orbit| {
+            told += 1;
+            told < 3
+        };
+        let branch = follow(&ray, first(), &course, &mut third);
+        assert_eq!((branch.end, branch.orbits.len()), (End::Interrupted, 4));
+    }
+
+    #[test]
+    fn steps_are_short_where_multipliers_change_fast() {
+        for steepness in [40.0, 4000.0] {
+            let steep = Zeros(|x: f64, p: f64| Some([(steepness * p - 1.0) * x, steepness * p - 1.0]));
+            let first = closed_orbit(&steep, &[0.0, 0.0], -1.0, NEWTON).unwrap();
+            let course = Course { from: -1.0, to: 1.0, longest: 0.1, most: 200, newton: NEWTON };
+            let branch = follow(&steep, first, &course, &mut |_| true);
+            assert_eq!(branch.end, End::Reached);
+            let within = &branch.orbits[..branch.orbits.len() - 1];
+            assert!(within.windows(2).all(|pair| !jumps(&pair[0], &pair[1])));
+            // The multiplier passes -1 and then 1.
+            let [doubling, branching] = &branch.bifurcations[..] else { panic!("{:?}", branch.bifurcations) };
+            assert_eq!((doubling.change, branching.change), (Change::PeriodDoubling, Change::Branching));
+            assert!((doubling.parameter * steepness + 1.0).abs() < 1e-7, "{doubling:?}");
+            let off = (branching.parameter - 1.0 / steepness).abs();
+            assert!(off <= branching.uncertainty && branching.uncertainty < 0.5 / steepness, "{branching:?}");
+        }
+    }
+
+    #[test]
+    fn a_jump_is_three_quarters_of_a_unit_or_of_a_large_multiplier() {
+        // (3, 4) has the modulus 5: three quarters are 3.75.
+        let cases = [
+            ([0.5, 0.0], [-0.2, 0.0], false),
+            ([0.5, 0.0], [-0.3, 0.0], true),
+            ([0.1, 0.5], [0.1, -0.2], false),
+            ([0.1, 0.5], [0.1, -0.3], true),
+            ([3.0, 4.0], [6.7, 4.0], false),
+            ([3.0, 4.0], [6.8, 4.0], true),
+            ([3.0, 4.0], [3.0, 0.3], false),
+            ([3.0, 4.0], [3.0, 0.2], true),
+            ([3.0, 4.0], [5.6, 6.6], false),
+            ([3.0, 4.0], [5.7, 6.7], true),
+        ];
+        for (m, n, want) in cases {
+            assert_eq!(jumps(&with(0.0, &[m]), &with(1.0, &[n])), want, "{m:?} {n:?}");
+            // Any of several.
+            assert_eq!(jumps(&with(0.0, &[[0.5, 0.0], m]), &with(1.0, &[[0.5, 0.0], n])), want);
+        }
+    }
+
+    #[test]
+    fn changes_lie_between_the_members_that_differ() {
+        let of = |m: &[[f64; 2]], n: &[[f64; 2]], folded| -> Vec<(Change, f64, f64)> {
+            // Where the map cannot tell where a multiplier passes -1, doublings too.
+            let nothing = Zeros(|_: f64, _: f64| None);
+            let found = changes(&nothing, &with(3.0, m), &with(8.0, n), folded, NEWTON);
+            found.iter().map(|b| (b.change, b.parameter, b.uncertainty)).collect()
+        };
+        let one = |change| vec![(change, 5.5, 2.5)];
+        assert_eq!(of(&[[-0.9, 0.0]], &[[-1.1, 0.0]], false), one(Change::PeriodDoubling));
+        assert_eq!(of(&[[0.9, 0.0]], &[[1.1, 0.0]], false), one(Change::Branching));
+        assert_eq!(of(&[[0.9, 0.0]], &[[1.1, 0.0]], true), one(Change::Fold));
+        let pair = |a: f64, b: f64| [[a, b], [a, -b]];
+        assert_eq!(of(&pair(0.1, 0.9), &pair(0.1, 1.1), false), one(Change::Torus));
+        assert_eq!(of(&pair(0.7, 0.6), &pair(0.8, 0.7), false), one(Change::Torus));
+        assert_eq!(of(&pair(0.7, -0.6), &pair(0.7, -0.7), false), []);
+        // A complex pair beyond the circle is neither below -1 nor above 1, and real multipliers make no torus.
+        assert_eq!(of(&pair(1.2, 0.1), &pair(-1.2, 0.1), false), []);
+        assert_eq!(of(&[[0.9, 0.0], [0.5, 0.0]], &[[0.7, 0.0], [0.6, 0.0]], false), []);
+        let both = of(&[[-0.9, 0.0], [0.9, 0.0]], &[[-1.1, 0.0], [1.1, 0.0]], false);
+        assert_eq!(both.iter().map(|b| b.0).collect::<Vec<_>>(), [Change::PeriodDoubling, Change::Branching]);
+    }
+
+    #[test]
+    fn a_doubling_is_found_on_a_curved_way_through_minus_one() {
+        // The multiplier is -p^9: regula falsi without the Illinois variant's halving would take hundreds of trials.
+        let ninth = |p: f64| p * p * p * (p * p * p) * (p * p * p);
+        let curved = Zeros(|x: f64, p: f64| Some([(-ninth(p) - 1.0) * x, -ninth(p) - 1.0]));
+        let at = |p: f64| closed_orbit(&curved, &[0.0, 0.0], p, NEWTON).unwrap();
+        for (a, b) in [(0.5, 3.0), (3.0, 0.5)] {
+            let found = doubling(&curved, &at(a), &at(b), NEWTON).unwrap();
+            assert_eq!(found.change, Change::PeriodDoubling);
+            // The multiplier is at the circle to 1e-7 and its slope there is 9.
+            assert!((found.parameter - 1.0).abs() < 1.2e-8 && found.uncertainty < 1.2e-8, "{found:?}");
+        }
+        // Both on one side: what another multiplier did is not this one's doing.
+        assert_eq!(doubling(&curved, &at(0.5), &at(0.9), NEWTON), None);
+        assert_eq!(doubling(&curved, &at(1.5), &at(1.1), NEWTON), None);
+        // A member that lies on the change itself is where it is.
+        let found = doubling(&curved, &at(1.0), &at(1.25), NEWTON).unwrap();
+        assert!((found.parameter - 1.0).abs() < 1e-12, "{found:?}");
+    }
 }

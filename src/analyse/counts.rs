@@ -256,4 +256,46 @@ mod tests {
             .count();
         assert!((20..=60).contains(&small), "{small} of 400 at the 10 % level");
     }
+
+    #[test]
+    fn permutations_tend_to_the_exact_probability() {
+        // Of the 20 ways to deal three and three outcomes over two rows of three, two are as far apart as this one.
+        let h = homogeneity(&[vec![3, 0], vec![0, 3]], 20_000, 5);
+        assert!((h.chi_square - 6.0).abs() < 1e-12 && h.freedom == 1 && h.permutations == 20_000);
+        assert!((h.p_permutation - 0.1).abs() < 0.009, "{h:?}");
+        // Rows of two and four: one way of fifteen, and chi-square is 6 again.
+        let h = homogeneity(&[vec![2, 0], vec![0, 4]], 20_000, 5);
+        assert!((h.chi_square - 6.0).abs() < 1e-12 && (h.p_permutation - 1.0 / 15.0).abs() < 0.007, "{h:?}");
+        // R: pchisq(6, 1, lower.tail = FALSE).
+        assert!((h.p_asymptotic - 0.014_305_878).abs() < 1e-8, "{h:?}");
+    }
+
+    #[test]
+    fn empty_rows_and_columns_count_for_nothing() {
+        let full = homogeneity(&[vec![5, 5], vec![2, 8]], 500, 1);
+        assert_eq!(homogeneity(&[vec![5, 0, 5], vec![0, 0, 0], vec![2, 0, 8]], 500, 1), full);
+        // 5, 5 and 2, 8 of expected 3.5 and 6.5: 2 (2.25/3.5 + 2.25/6.5).
+        assert!((full.chi_square - 4.5 * (1.0 / 3.5 + 1.0 / 6.5)).abs() < 1e-12 && full.freedom == 1, "{full:?}");
+        assert_eq!(homogeneity(&[vec![1, 2, 3], vec![3, 2, 1], vec![1, 1, 1], vec![2, 2, 2]], 1, 1).freedom, 6);
+        // A row that ends early has nothing in the columns after.
+        assert_eq!(homogeneity(&[vec![5], vec![2, 8]], 1, 1), homogeneity(&[vec![5, 0], vec![2, 8]], 1, 1));
+    }
+
+    #[test]
+    fn simultaneous_intervals_divide_the_risk_among_the_categories() {
+        // Three categories at 95 %: each at 1 - 0.05/3, two-sided.
+        let one = goodman(&[10, 20, 30], 0.95);
+        for (interval, hits) in one.iter().zip([10, 20, 30]) {
+            let alone = wilson(hits, 60, 1.0 - 0.05 / 3.0);
+            assert!((0..2).all(|k| (interval[k] - alone[k]).abs() < 1e-12), "{interval:?} {alone:?}");
+        }
+        // Wilson's interval ends where the share is z standard errors away: (p - h)^2 = z^2 p (1 - p)/n.
+        let z = normal_quantile(0.975);
+        for p in wilson(15, 40, 0.95) {
+            assert!(((p - 0.375) * (p - 0.375) - z * z * p * (1.0 - p) / 40.0).abs() < 1e-12, "{p}");
+        }
+        assert!(goodman(&[], 0.95).is_empty() && normal_quantile(0.0).is_nan());
+        let [low, high] = wilson(20, 20, 0.95);
+        assert!(high == 1.0 && (low - (1.0 - wilson(0, 20, 0.95)[1])).abs() < 1e-12);
+    }
 }

@@ -182,3 +182,52 @@ pub fn agreement<F: VectorField<3>, M: Stepper<3>>(
         })
         .collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::num::Elementary;
+    use crate::num::elementary::exp;
+
+    const GROWTH: f64 = 0.2;
+
+    /// y and z turn about the origin once in 2 pi, farther and farther out.
+    struct Spiral;
+    impl VectorField<3> for Spiral {
+        fn eval<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+            SVector::from([-x[0], x[1].scale(GROWTH) - x[2], x[1] + x[2].scale(GROWTH)])
+        }
+    }
+
+    #[test]
+    fn digits_of_a_known_spiral() {
+        let methods = [(Method::Dopri5, 1e-4), (Method::Dopri5, 1e-10), (Method::Taylor, 1e-17)];
+        let question = DigitsQuestion {
+            start: [0.0, 0.05, 0.0],
+            section: Plane { coordinate: 1, value: 0.0 },
+            t_end: 12.0,
+            near: 0.2,
+            methods: methods.map(|(name, tolerance)| Contender { name, tolerance }).into(),
+            step_cap: StepCap::None,
+            max_steps: 10_000,
+        };
+        let found = digits(&Spiral, &question).unwrap();
+        // y = 0 at pi/2, 3 pi/2, ..., 0.068, 0.128, 0.24 and 0.45 away: two are visits.
+        let moment = |k: usize| std::f64::consts::PI * (k as f64 - 0.5);
+        let away = |k: usize| 0.05 * exp(GROWTH * moment(k));
+        assert_eq!(found.visits.len(), 2);
+        for (v, k) in found.visits.iter().zip(1..) {
+            assert!((v.t - moment(k)).abs() < 1e-14 && (v.distance - away(k)).abs() < 1e-15, "{v:?}");
+        }
+        assert_eq!(found.rows.len(), 12);
+        for (r, i) in found.rows.iter().zip(0..) {
+            let a = r.agreement;
+            assert!(r.contender == question.methods[i / 4] && a.crossing == i % 4 + 1, "{r:?}");
+            assert!((a.t - moment(a.crossing)).abs() < 1e-13, "{r:?}");
+            assert!((a.log10_error - log10(a.error).max(-17.0)).abs() < 1e-15 && a.log10_error >= -17.0, "{r:?}");
+            // Loose, tight, and as good as a double can be.
+            let [low, high] = [[1e-7, 1e-2], [1e-14, 1e-9], [0.0, 1e-15]][i / 4];
+            assert!((low..=high).contains(&a.error), "{r:?}");
+        }
+    }
+}

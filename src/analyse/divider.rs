@@ -135,4 +135,67 @@ mod tests {
         let (q, c) = (DividerWalk::new(&quiet, &range), DividerWalk::new(&chatter, &range));
         assert!((q.freshness() - c.freshness()).abs() < 0.05, "{} {}", q.freshness(), c.freshness());
     }
+
+    fn straight(from: [f64; 3], to: [f64; 3]) -> [Sample; 2] {
+        [Sample { t: 0.0, x: from }, Sample { t: 1.0, x: to }]
+    }
+
+    #[test]
+    fn a_box_is_around_all_paths() {
+        let (a, b) = (straight([1.0, -2.0, 0.5], [3.0, -5.0, 0.5]), straight([2.0, 7.0, 0.5], [-4.0, 0.0, 0.5]));
+        assert_eq!(common_box([&a[..], &b[..]]), [(-4.0, 3.0), (-5.0, 7.0), (0.5, 0.5)]);
+    }
+
+    #[test]
+    fn strides_are_one_wide_to_a_quarter() {
+        // 40 strides along each side, whatever the side's length: 120 around three of them.
+        let range = [(-1.0, 1.0), (5.0, 5.5), (0.0, 80.0)];
+        let corners = [[-1.0, 5.0, 0.0], [1.0, 5.0, 0.0], [1.0, 5.5, 0.0], [1.0, 5.5, 80.0]];
+        let path: Vec<Sample> = corners.iter().map(|x| Sample { t: 0.0, x: *x }).collect();
+        let walk = DividerWalk::new(&path, &range);
+        assert!((96..=121).contains(&walk.ends.len()), "{}", walk.ends.len());
+        for pair in walk.ends.windows(2) {
+            assert!((1.0..1.5626).contains(&squared(pair[0], pair[1])), "{pair:?}");
+        }
+        assert_eq!(walk.freshness(), 1.0);
+        let there_and_back = DividerWalk::new(&[path.clone(), path.into_iter().rev().collect()].concat(), &range);
+        assert!((there_and_back.freshness() - 0.5).abs() < 0.04, "{}", there_and_back.freshness());
+    }
+
+    #[test]
+    fn a_place_is_visited_if_an_earlier_stride_ended_near() {
+        // Against all ends one by one; a hundred in a box of six strides, on both sides of zero.
+        let mut random = crate::num::random::RandomStream::new(7, 0);
+        let ends: Vec<[f64; 3]> = (0..100).map(|_| [(); 3].map(|()| random.uniform_in(-3.0, 3.0))).collect();
+        let mut cells: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
+        for (k, end) in ends.iter().enumerate() {
+            cells.entry(end.map(|x| x.floor() as i64)).or_default().push(k);
+        }
+        let walk = DividerWalk { ends, cells };
+        let mut seen = [0; 2];
+        for (k, place) in walk.ends.iter().enumerate() {
+            for before in [0, k.saturating_sub(STILL_LEAVING), k, k + 1, 100] {
+                let want = walk.ends[..before].iter().any(|e| squared(*e, *place) < 1.0);
+                assert_eq!(walk.visited(*place, before), want, "{k} {before}");
+                seen[usize::from(want)] += 1;
+            }
+        }
+        assert!(seen[0] > 100 && seen[1] > 100, "{seen:?}");
+    }
+
+    #[test]
+    fn paths_share_what_is_within_a_stride() {
+        let range = [(0.0, 1.0); 3];
+        let line = |y: f64| DividerWalk::new(&straight([0.01, y, 0.5], [0.99, y, 0.5]), &range);
+        let (a, beside, apart) = (line(0.5), line(0.5 + 0.5 / STRIDES), line(0.5 + 2.0 / STRIDES));
+        let n = a.ends.len();
+        assert_eq!(a.compare(&beside), Shared { strides: [n; 2], both: [n; 2], overlap: 1.0 });
+        assert_eq!(a.compare(&apart), Shared { strides: [n; 2], both: [0; 2], overlap: 0.0 });
+        // Half as long: all of it, and half of the other.
+        let half = DividerWalk::new(&straight([0.01, 0.5, 0.5], [0.5, 0.5, 0.5]), &range);
+        let shared = a.compare(&half);
+        assert!(shared.both[1] == shared.strides[1] && shared.both[0].abs_diff(shared.strides[1]) <= 1, "{shared:?}");
+        let want = (shared.both[0] + shared.both[1]) as f64 / (shared.strides[0] + shared.strides[1]) as f64;
+        assert_eq!(shared.overlap, want);
+    }
 }

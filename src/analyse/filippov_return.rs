@@ -242,3 +242,104 @@ where
         opposite: seen.opposite,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::Tolerance;
+    use crate::num::Elementary;
+
+    /// s' = 1, y' = q'(s) with q(s) = s (s^2 - 1)(s^2 - 4), on both sides of an edge at a value of s or y: a system that is discontinuous in name only. y - q(s) stays what
+    /// it is, so a return of a plane of y is a root of a polynomial.
+    struct Quintic {
+        edge: f64,
+        of: usize,
+    }
+    impl PiecewiseSmooth<2> for Quintic {
+        fn switching<S: Elementary>(&self, x: &SVector<S, 2>) -> S {
+            x[self.of] - S::from_f64(self.edge)
+        }
+        fn plus<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+            let s2 = x[0] * x[0];
+            SVector::from([S::one(), (s2 * s2).scale(5.0) - s2.scale(15.0) + S::one().scale(4.0)])
+        }
+        fn minus<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+            self.plus(x)
+        }
+    }
+
+    fn settings(tolerance: f64) -> Settings {
+        let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
+        Settings { tolerance, longest_return: 6.0, ..Settings::default() }
+    }
+
+    #[test]
+    fn returns_of_a_polynomial_are_its_roots() {
+        // Before the edge and after it the method is exact and its dense output, by which passages are found, is not: the passage is landed on. Where the edge
+        // is crossed, the dense output says.
+        for (edge, value, tolerance) in [(9.0, 0.0, 1e-5), (9.0, 0.7, 1e-5), (-9.0, -3.0, 1e-5), (-0.3, 0.7, 1e-12)] {
+            let plane = Plane { axis: 1, value, upward: true };
+            let start = SVector::from([-2.0, value]);
+            // Upwards at -2, 0, 2 with the slopes 24, 4, 24; the derivative is the slope at the start over that at the end.
+            for (returns, s, derivative) in [(1, 0.0, 6.0), (2, 2.0, 1.0)] {
+                let r =
+                    return_map(&Quintic { edge, of: 0 }, plane, returns, &start, &settings(tolerance), true).unwrap();
+                assert!((r.point[0] - s).abs() < 1e-9 && r.point[1] == value, "{r:?}");
+                assert!((r.time - (s + 2.0)).abs() < 1e-9, "{r:?}");
+                assert!((r.derivative[0] - derivative).abs() < 1e-5 && r.derivative[1..] == [0.0; 3], "{r:?}");
+                assert_eq!((r.same.len(), r.opposite.len()), (returns, returns));
+                assert!(r.opposite.iter().zip([-1.0, 1.0]).all(|(x, s)| (x[0] - s).abs() < 1e-3), "{r:?}");
+                let plain =
+                    return_map(&Quintic { edge, of: 0 }, plane, returns, &start, &settings(tolerance), false).unwrap();
+                assert!(plain.derivative.is_empty() && plain.point == r.point);
+            }
+            let none = return_map(&Quintic { edge, of: 0 }, plane, 3, &start, &settings(tolerance), false);
+            assert_eq!(none, Err(Error::NoReturn { from: vec![-2.0, value], within: 6.0 }));
+        }
+    }
+
+    #[test]
+    fn an_orbit_that_almost_touches_the_surface_has_no_derivative() {
+        // Between -1 and 0 the orbit from (-2, 0) is lowest where q' = 0, at s^2 = (15 - sqrt 145)/10.
+        let s2 = 0.1 * (15.0 - crate::num::elementary::sqrt(145.0));
+        let lowest = -crate::num::elementary::sqrt(s2) * (s2 - 1.0) * (s2 - 4.0);
+        let of = |below: f64, derivative| {
+            let plane = Plane { axis: 1, value: 0.0, upward: true };
+            let system = Quintic { edge: lowest - below, of: 1 };
+            return_map(&system, plane, 1, &SVector::from([-2.0, 0.0]), &settings(1e-12), derivative)
+        };
+        // Neighbours at 3e-5, 3e-6 and 3e-7 come 24 times as much lower, and all cross the surface; the map itself is there.
+        assert_eq!(of(1e-7, true), Err(Error::Grazing { distance: 0.01 * (1e-5 * 3.0) }));
+        assert!(of(1e-7, false).is_ok());
+        // The nearest two do not.
+        let r = of(2e-5, true).unwrap();
+        assert!((r.derivative[0] - 6.0).abs() < 1e-4, "{r:?}");
+    }
+
+    #[test]
+    fn a_plane_met_in_sliding_and_a_start_with_many_futures_are_refused() {
+        /// Along y = 0 with the velocity 1; towards it, or away from it.
+        struct Channel(f64);
+        impl PiecewiseSmooth<2> for Channel {
+            fn switching<S: Elementary>(&self, x: &SVector<S, 2>) -> S {
+                x[1]
+            }
+            fn plus<S: Elementary>(&self, _: &SVector<S, 2>) -> SVector<S, 2> {
+                SVector::from([S::one(), -S::from_f64(self.0)])
+            }
+            fn minus<S: Elementary>(&self, _: &SVector<S, 2>) -> SVector<S, 2> {
+                SVector::from([S::one(), S::from_f64(self.0)])
+            }
+        }
+        let of = |towards, y, value| {
+            let plane = Plane { axis: 0, value, upward: true };
+            return_map(&Channel(towards), plane, 1, &SVector::from([0.0, y]), &settings(1e-9), false)
+        };
+        // It lands at 1, and flies before.
+        assert_eq!(of(1.0, 1.0, 2.0), Err(Error::SlidesThere));
+        assert!((of(1.0, 1.0, 0.5).unwrap().point[1] - 0.5).abs() < 1e-12);
+        // On the surface from the start.
+        assert_eq!(of(1.0, 0.0, 2.0), Err(Error::SlidesThere));
+        assert_eq!(of(-1.0, 0.0, 2.0), Err(Error::SetValued { t: 0.0, state: vec![0.0, 0.0] }));
+    }
+}

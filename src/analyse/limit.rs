@@ -322,3 +322,97 @@ where
         statistics: futures.statistics,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::num::Elementary;
+    use crate::system::Caricature;
+
+    #[test]
+    fn steps_are_a_fraction_of_the_layer_and_never_long() {
+        assert_eq!([1e-3, 1.0].map(layer_cap), [4e-3, 0.05]);
+    }
+
+    #[test]
+    fn the_rate_of_a_power_is_its_exponent() {
+        let rate = |power: f64| observed_rate([1e-1, 1e-2, 1e-4].map(|eps| [eps, 3.0 * pow(eps, power)]));
+        for power in [1.0, 2.0, -0.5] {
+            assert!((rate(power) - power).abs() < 1e-12, "{power}: {}", rate(power));
+        }
+        assert!(observed_rate([[0.1, 1.0]]).is_nan() && observed_rate([[0.1, 1.0], [0.1, 2.0]]).is_nan());
+    }
+
+    /// A caricature whose two-fold is elsewhere.
+    #[derive(Clone)]
+    struct Moved(Caricature, [f64; 3]);
+    impl Moved {
+        fn own<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+            SVector::from_fn(|i, _| x[i] - S::from_f64(self.1[i]))
+        }
+    }
+    impl PiecewiseSmooth<3> for Moved {
+        fn switching<S: Elementary>(&self, x: &SVector<S, 3>) -> S {
+            self.0.switching(&self.own(x))
+        }
+        fn plus<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+            self.0.plus(&self.own(x))
+        }
+        fn minus<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+            self.0.minus(&self.own(x))
+        }
+    }
+
+    #[test]
+    fn the_search_finds_a_member_that_is_known() {
+        // Four exit times, each a quarter longer than the one before. Over a wider range members would come by the same places again: the funnel of a
+        // two-fold is self-similar.
+        let longest = 1.2 * 1.25 * 1.25 * 1.25;
+        let grid = FunnelGrid { shortest: 1.2, longest, times: 4, horizon: 12.0, until_two_fold: true, per_step: 1 };
+        let system = Moved(Caricature::with_reinjection(1e-1, 1e-5), [1.0, 2.0, -3.0]);
+        let question = |beyond| AfterVisitQuestion {
+            start: vec![1.2, 2.0, -4.0],
+            t_end: 80.0,
+            eps: Vec::new(),
+            beyond,
+            grid,
+            refinements: 3,
+            finer: 5,
+            settings: Settings::default(),
+        };
+        let (near, far) = (question(0.6), question(1.2));
+        let family = funnel(&system, state::<3>(&near.start).unwrap(), 80.0, &near.settings, &grid).unwrap();
+        assert!((family.point - SVector::from(system.1)).amax() < 1e-9, "{}", family.point);
+        let mut futures = Futures { system: &system, question: &near, family, statistics: Statistics::default() };
+        let all = futures.crossings(&futures.family.members);
+        let first: Vec<_> = all.iter().filter(|c| c.side == Side::Minus).copied().collect();
+        assert_eq!((all.len(), first.len()), (8, 4));
+        // Three refinements, each of a half of the interval's logarithm, leave an eighth between neighbours.
+        for place in [0.59, 1.41, 1.59, 2.41] {
+            let time = 1.2 * pow(1.25, place);
+            let only = FunnelGrid { shortest: time, longest: time, times: 1, ..grid };
+            let there = futures.family.members_on(&system, &near.settings, &only, Some(Side::Minus)).unwrap();
+            let there = futures.crossings(&there)[0].state;
+            let (found, distance) = futures.nearest(&first, &there).unwrap().unwrap();
+            let off = ln(found.exit_time / time).abs() / ln(1.25);
+            assert!(off < 0.045 && found.side == Side::Minus && distance < 0.02, "{place}: {off} {distance}");
+        }
+        assert!(futures.nearest(&[], &all[0].state).unwrap().is_none());
+        // Crossings are looked for at a distance from the two-fold, wherever that is.
+        let away = |c: &Candidate<3>| (c.state - SVector::from(system.1)).norm();
+        assert!(all.iter().all(|c| away(c) > 0.6) && all.iter().any(|c| away(c) < 1.2));
+        futures.question = &far;
+        let farther = futures.crossings(&futures.family.members);
+        assert!(!farther.is_empty() && farther.iter().all(|c| away(c) > 1.2));
+
+        // The whole answer: by eps, where there is a crossing; the width is the largest distance between two members' crossings.
+        let question = AfterVisitQuestion { eps: vec![1e-2, 1e-3], refinements: 0, ..near.clone() };
+        let there = Failure::state(&all[2].state);
+        let answer = after_visit(&system, &question, |eps| Ok((eps < 5e-3).then(|| there.clone()))).unwrap();
+        let [row] = &answer.rows[..] else { panic!("{:?}", answer.rows) };
+        assert_eq!((row.eps, row.distance, &row.crossing, &row.nearest), (1e-3, 0.0, &there, &all[2].record()));
+        assert_eq!(answer.members, all.iter().map(Candidate::record).collect::<Vec<_>>());
+        let width = all.iter().flat_map(|a| all.iter().map(|b| (a.state - b.state).norm())).fold(0.0, f64::max);
+        assert_eq!(answer.width, width);
+    }
+}

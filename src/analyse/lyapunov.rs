@@ -235,4 +235,44 @@ mod tests {
         let values: Vec<f64> = (0..64).map(|i| [0.3, 1.0, -0.5, 0.1, 0.9, -1.0, 0.4, 0.2][i / 8]).collect();
         assert!(blocked_error(&values) > 2.5 * mean(&values).1);
     }
+
+    #[test]
+    fn kicks_change_the_rate_where_the_rate_depends_on_the_state() {
+        /// x1 is the rate at which x2 grows, and changes by kicks only.
+        struct Rate;
+        impl VectorField<2> for Rate {
+            fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+                SVector::from([x[0].scale(0.0), x[0] * x[1]])
+            }
+        }
+        let kick = Kick { every: 0.7, size: 0.05, law: crate::integrate::KickLaw::Normal, seed: 5, stream: 0 };
+        let settings = Settings { transient: 50.0, duration: 20.0, kick: Some(kick), ..Settings::default() };
+        let e = largest_along::<2, 4, _>(&Tangent::<Rate, 1>(&Rate), SVector::from([0.8, 0.0]), 1, &settings).unwrap();
+        // The mean of the rate over (50, 70), the n-th kick coming at 0.7 n.
+        let mut kicker = Kicker::new(kick, 1);
+        let (mut rate, mut want) = (SVector::from([0.8]), 0.0);
+        for n in 0..101 {
+            let [from, to] = [n, n + 1].map(|k| (0.7 * f64::from(k)).clamp(50.0, 70.0));
+            want += rate[0] * (to - from) / 20.0;
+            rate = kicker.apply(rate);
+        }
+        assert!((e.value - want).abs() < 1e-7 && e.duration == 20.0, "{e:?} {want}");
+        assert!(e.standard_error > 1e-3, "{e:?}");
+    }
+
+    #[test]
+    fn fewer_than_eight_blocks_have_no_mean() {
+        let settings = Settings { duration: 640.0, ..Settings::default() };
+        let of = |n: u32| mean_of(&(1..=n).map(f64::from).collect::<Vec<_>>(), &settings);
+        assert!(of(0).value.is_nan() && of(7).value.is_nan());
+        assert_eq!((of(7).duration, of(8).value, of(8).duration), (70.0, 4.5, 80.0));
+        assert_eq!((of(9).value, of(64).value, of(64).duration), (5.0, 32.5, 640.0));
+    }
+
+    #[test]
+    fn a_budget_of_steps_is_kept() {
+        let settings = Settings { max_steps: 10, ..Settings::default() };
+        let error = largest::<2, 4, _>(&Linear, SVector::from([0.0, 0.0]), &settings).unwrap_err();
+        assert!(matches!(error, Failure::TooManySteps { limit: 10, ref state, .. } if state.len() == 2), "{error:?}");
+    }
 }

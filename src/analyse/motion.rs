@@ -158,3 +158,84 @@ impl<const D: usize> FilippovObserver<D> for MotionRecorder<D> {
         Flow::Continue
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::SVector;
+
+    use super::*;
+    use crate::integrate::Interpolant;
+    use crate::integrate::filippov::EventKind;
+
+    /// x = t, in one straight step after another.
+    struct Straight(f64, f64);
+    impl Interpolant<1> for Straight {
+        fn at(&self, s: f64) -> SVector<f64, 1> {
+            SVector::from([self.0 + s * (self.1 - self.0)])
+        }
+        fn degree(&self) -> usize {
+            1
+        }
+    }
+
+    fn step(to: &mut impl FilippovObserver<1>, mode: Mode, from: f64, until: f64) {
+        let straight = Straight(from, until);
+        let step = Step { t0: from, t1: until, x0: [from].into(), x1: [until].into(), interpolant: &straight };
+        assert_eq!(to.step(mode, &step), Flow::Continue);
+    }
+
+    fn event(to: &mut impl FilippovObserver<1>, t: f64) {
+        let kind = EventKind::StartedOnSurface;
+        let _ = to.event(&ModeEvent { t, state: [t].into(), kind, from: None, to: None });
+    }
+
+    fn times(motion: &Motion<1>) -> Vec<(Mode, Vec<f64>)> {
+        assert_eq!(motion.len(), motion.samples().count());
+        assert!(motion.samples().all(|(_, s)| s.x == [s.t]));
+        motion.pieces.iter().map(|(mode, samples)| (*mode, samples.iter().map(|s| s.t).collect())).collect()
+    }
+
+    #[test]
+    fn a_piece_ends_where_the_mode_changes_or_something_happens() {
+        let mut r = MotionRecorder::<1>::new(0.1);
+        assert!(r.kept() == 0 && r.clone().into_motion().is_empty());
+        step(&mut r, Mode::Plus, 0.0, 1.0);
+        step(&mut r, Mode::Plus, 1.0, 2.0);
+        step(&mut r, Mode::Minus, 2.0, 3.0);
+        event(&mut r, 3.0);
+        step(&mut r, Mode::Minus, 3.0, 4.0);
+        assert_eq!(r.kept(), 7);
+        let want = [(Mode::Plus, vec![0.0, 1.0, 2.0]), (Mode::Minus, vec![2.0, 3.0]), (Mode::Minus, vec![3.0, 4.0])];
+        assert_eq!(times(&r.clone().into_motion()), want);
+        let taken = r.take();
+        assert!(times(&taken) == want && taken.len() == 7 && !taken.is_empty() && taken.events.len() == 1);
+        // What comes next belongs to the last piece.
+        assert_eq!(r.kept(), 0);
+        step(&mut r, Mode::Minus, 4.0, 5.0);
+        step(&mut r, Mode::SlidingAttracting, 5.0, 6.0);
+        assert_eq!(r.kept(), 3);
+        let rest = r.into_motion();
+        assert_eq!(times(&rest), [(Mode::Minus, vec![5.0]), (Mode::SlidingAttracting, vec![5.0, 6.0])]);
+        assert!(rest.events.is_empty());
+    }
+
+    #[test]
+    fn samples_at_multiples_know_their_modes() {
+        let mut r = TimedMotion::<1>::new(&[0.0].into(), 0.5);
+        step(&mut r, Mode::Plus, 0.0, 1.0);
+        step(&mut r, Mode::Plus, 1.0, 1.2);
+        event(&mut r, 1.2);
+        step(&mut r, Mode::Plus, 1.2, 1.6);
+        step(&mut r, Mode::Minus, 1.6, 1.9);
+        step(&mut r, Mode::Minus, 1.9, 2.5);
+        step(&mut r, Mode::Minus, 2.5, 3.1);
+        assert_eq!(r.kept(), 7);
+        let want = [(Mode::Plus, vec![0.0, 0.5, 1.0]), (Mode::Plus, vec![1.5]), (Mode::Minus, vec![2.0, 2.5, 3.0])];
+        assert_eq!(times(&r.clone().into_motion()), want);
+        let taken = r.take();
+        assert!(times(&taken) == want && taken.events.len() == 1);
+        assert_eq!(r.kept(), 0);
+        step(&mut r, Mode::Minus, 3.1, 3.6);
+        assert_eq!((r.kept(), times(&r.into_motion())), (1, vec![(Mode::Minus, vec![3.5])]));
+    }
+}

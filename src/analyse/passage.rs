@@ -487,4 +487,112 @@ mod tests {
         let place = l.place().unwrap();
         assert!((place[0] - 0.03).abs() < 1e-15 && (place[1] + 0.15).abs() < 1e-15, "{place:?}");
     }
+
+    #[test]
+    fn a_surface_that_was_not_visited_is_not_left() {
+        let seen = |states: &[[f64; 3]]| {
+            let mut l = Leaving::new(1e-2);
+            states.iter().for_each(|x| l.see(*x));
+            l.place()
+        };
+        // Never within 0.1 of the two-fold in y and z.
+        assert_eq!(seen(&[[0.0, 0.3, 0.05], [0.02, 0.05, -0.3], [0.04, -0.2, -0.2]]), None);
+        // The layer is left before the visit, and not after it.
+        assert_eq!(seen(&[[0.0, 0.3, 0.3], [0.5, 0.2, 0.2], [0.0, 0.05, 0.05], [0.02, -0.3, -0.3]]), None);
+        // Two states near are one visit.
+        assert!(seen(&[[0.0, 0.05, 0.0], [0.0, 0.05, 0.0], [0.04, -0.3, -0.3]]).is_some());
+        // Downwards as well; the first place counts.
+        let place = seen(&[[0.0, 0.05, 0.0], [-0.06, 0.15, 0.2], [0.0, 0.0, 0.0], [0.06, 1.0, 1.0]]).unwrap();
+        assert!((place[0] + 0.03).abs() < 1e-15 && (place[1] - 0.1).abs() < 1e-15, "{place:?}");
+    }
+
+    /// y and z turn about the two-fold once in 2 pi, `GROWTH` per unit time farther out, and x goes by at the speed `drift`: all that happens is known.
+    struct Screw {
+        drift: f64,
+    }
+    const GROWTH: f64 = 0.2;
+    impl VectorField<3> for Screw {
+        fn eval<S: crate::num::Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+            SVector::from([S::from_f64(self.drift), x[1].scale(GROWTH) - x[2], x[1] + x[2].scale(GROWTH)])
+        }
+    }
+
+    /// From (x, 0.05, 0) at eps = 0.01: y = 0 is passed at pi/2, 3 pi/2, ..., 0.068, 0.128, 0.240 and 0.451 from the two-fold.
+    fn screwed(crosses: f64, drift: f64, question: &PassageQuestion) -> Passage {
+        let start = [-crosses * drift, 0.05, 0.0];
+        passage(&Screw { drift }, 1e-2, &PassageQuestion { start, ..question.clone() }).unwrap()
+    }
+
+    #[test]
+    fn what_happens_on_a_known_passage_is_found() {
+        use crate::num::elementary::exp;
+        use std::f64::consts::PI;
+        let near = PassageQuestion::far([0.0; 3], 0.0, 12.0);
+        for (drift, crosses) in [(0.01, 1.0), (0.01, 2.0), (0.01, 8.0), (-0.01, 8.0)] {
+            let far = PassageQuestion { far: 0.2, ..near.clone() };
+            let p = screwed(crosses, drift, &far);
+            // The first within 0.1; the exit is the first beyond 0.3, neither of the two between.
+            assert!((p.visit.unwrap() - 0.5 * PI).abs() < 1e-12, "{p:?}");
+            let [x, y, z] = p.exit.unwrap();
+            assert!((x - drift * (3.5 * PI - crosses)).abs() < 1e-14 && y.abs() < 1e-14, "{p:?}");
+            assert!((z + 0.05 * exp(GROWTH * 3.5 * PI)).abs() < 1e-14, "{p:?}");
+            // x = 0 counts after the visit and beyond 0.1: 0.075 away at 2, 0.25 away at 8.
+            let there = (crosses > 4.0).then_some(0.05 * exp(GROWTH * crosses));
+            let radius = |x: [f64; 3]| sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
+            match there {
+                Some(want) => assert!((radius(p.surface.unwrap()) - want).abs() < 1e-14, "{p:?}"),
+                None => assert_eq!(p.surface, None),
+            }
+            // Far exits go up.
+            assert_eq!(p.far, p.surface.filter(|_| drift > 0.0));
+            assert_eq!(screwed(crosses, drift, &PassageQuestion { far: 0.3, ..near.clone() }).far, None);
+            assert_eq!(screwed(crosses, drift, &near).far, None);
+            if crosses > 4.0 {
+                assert!((p.leaving.unwrap()[0].abs() - 0.03).abs() < 1e-12, "{p:?}");
+            }
+        }
+        // Before its time is over nothing else has happened.
+        let short = screwed(8.0, 0.01, &PassageQuestion { by: 7.0, ..near });
+        assert!(short.visit.is_some() && short.exit.is_none() && short.surface.is_none() && short.leaving.is_none());
+    }
+
+    #[test]
+    fn growth_on_a_known_passage_is_what_the_linear_equation_says() {
+        use crate::num::elementary::{cos, exp, sin};
+        use std::f64::consts::PI;
+        let question = PassageQuestion {
+            offsets: vec![-4.0, 0.0, 10.0],
+            carried: 1e-7,
+            ..PassageQuestion::far([0.0; 3], 0.0, 12.0)
+        };
+        let drift = 0.01;
+        let p = screwed(8.0, drift, &question);
+        // With w = y + i z a disturbance d changes ln w by q = d/w: y = 0 is passed Im q earlier, Re q - GROWTH Im q farther out.
+        let want = |t: f64| -> [f64; 3] {
+            let end = 0.05 * exp(GROWTH * 3.5 * PI);
+            let part = |re: f64, im: f64| f64::max(end * (re - GROWTH * im).abs(), (drift * im).abs());
+            let r = 0.05 * exp(GROWTH * t);
+            [1.0, part(cos(t) / r, -sin(t) / r), part(sin(t) / r, cos(t) / r)]
+        };
+        let close = |got: [f64; 3], want: [f64; 3], by: f64| {
+            assert!(got.iter().zip(want).all(|(g, w)| (g / w - 1.0).abs() < by), "{got:?} {want:?}");
+        };
+        assert_eq!(p.growth.iter().map(|g| g.offset).collect::<Vec<_>>(), question.offsets);
+        for g in &p.growth {
+            close(g.factors, want(0.5 * PI + 0.1 * g.offset), 1e-4);
+        }
+        close(p.carried.unwrap(), want(0.0), 1e-4);
+    }
+
+    #[test]
+    fn the_layer_costs_the_incoming_orbit_hardly_anything() {
+        use crate::system::{Caricature, Smoothed, Transition};
+        let eps = 1e-5;
+        let field = Smoothed { system: Caricature::with_reinjection(1e-1, 1e-5), transition: Transition::Tanh, eps };
+        let mut work = Statistics::default();
+        let (_, x) = approach(&field, SVector::from([0.2, 0.0, -1.0]), eps, 80.0, &mut work).unwrap().unwrap();
+        assert!(x.amax() < HANDOVER && x.amax() > 0.9 * HANDOVER && x[0].abs() < IN_LAYER * eps, "{x}");
+        // Steps that resolve a layer of 1e-5 in sliding would be a million.
+        assert!(work.steps < 5000, "{}", work.steps);
+    }
 }

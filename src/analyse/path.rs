@@ -31,7 +31,8 @@ const MOST_HALVINGS: u32 = 10;
 
 impl<const D: usize> PathRecorder<D> {
     /// A recorder that starts at `x0`; `chord` is the largest distance between polyline and interpolant, in the
-    /// state's units.
+    /// state's units, where they are compared: at the thirds of a step and the middles of its parts. Elsewhere it may be somewhat larger; a third
+    /// of a step whose middle alone lies on its chord, an S, passes for straight.
     pub fn new<const N: usize>(x0: &SVector<f64, N>, chord: f64) -> Self {
         Self::starting(0.0, x0, chord)
     }
@@ -233,5 +234,83 @@ mod tests {
         // No chord is small enough for a step to make more than 3 * 2^10 points of it.
         let per_step = 3 * (1 << MOST_HALVINGS);
         assert!(steps >= 3 && (10_000..10_000 + per_step).contains(&r.len()), "{steps} steps, {} points", r.len());
+    }
+
+    /// y and z as functions of x = s in (0, 1).
+    struct Graph(fn(f64) -> [f64; 2]);
+    impl Interpolant<3> for Graph {
+        fn at(&self, s: f64) -> SVector<f64, 3> {
+            let [y, z] = self.0(s);
+            SVector::from([s, y, z])
+        }
+        fn degree(&self) -> usize {
+            8
+        }
+    }
+
+    fn recorded(graph: &Graph, chord: f64) -> Vec<Sample> {
+        let step = Step { t0: 2.0, t1: 4.0, x0: graph.at(0.0), x1: graph.at(1.0), interpolant: graph };
+        let mut r = PathRecorder::<3>::starting(2.0, &step.x0, chord);
+        assert_eq!(r.step(&step), Flow::Continue);
+        r.into_samples()
+    }
+
+    #[test]
+    fn a_straight_step_needs_no_points_between() {
+        let line = Graph(|s| [3.0 - 7.0 * s, 5.0 + 2.0 * s]);
+        let samples = recorded(&line, 1e-9);
+        assert_eq!(samples, [(2.0, 0.0), (4.0, 1.0)].map(|(t, s)| Sample { t, x: line.at(s).into() }));
+    }
+
+    #[test]
+    fn an_s_whose_middle_lies_on_the_chord_is_followed() {
+        // In either component, and below the chord as well as above.
+        let hundred = |s: f64| s * (1.0 - s) * (1.0 - 2.0 * s);
+        assert!(hundred(0.5) == 0.0 && hundred(0.2) > 0.09);
+        for graph in [
+            Graph(|s| [3.0 + s * (1.0 - s) * (1.0 - 2.0 * s), 5.0]),
+            Graph(|s| [3.0, 5.0 - s * (1.0 - s) * (1.0 - 2.0 * s)]),
+            Graph(|s| [3.0 + s * (1.0 - s), 5.0 - 2.0 * s]),
+        ] {
+            // The middle third is an S itself, 27 times as small, whose middle lies on its chord.
+            let chord = 4e-3;
+            let samples = recorded(&graph, chord);
+            assert!(samples.len() < 60, "{}", samples.len());
+            for w in samples.windows(2) {
+                assert!(w[0].t < w[1].t && w[0].x[0] < w[1].x[0]);
+                for k in 0..=20 {
+                    let share = f64::from(k) / 20.0;
+                    let s = w[0].x[0] + share * (w[1].x[0] - w[0].x[0]);
+                    let on = graph.at(s);
+                    assert!(((s - (w[0].t - 2.0) / 2.0) - share * (w[1].t - w[0].t) / 2.0).abs() < 1e-15);
+                    // Halvings look at the middle; the largest gap of a cubic is a little beside it.
+                    let ends = [w[0].x, w[1].x].map(SVector::from);
+                    let off = (ends[0] + (ends[1] - ends[0]) * share - on).amax();
+                    assert!(off < 1.2 * chord, "{off} at {s}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_taken_is_forgotten_and_kicks_are_kept() {
+        let step = Step { t0: 0.0, t1: 1.0, x0: HalfCircle.at(0.0), x1: HalfCircle.at(1.0), interpolant: &HalfCircle };
+        let mut r = PathRecorder::<2>::new(&step.x0, 10.0);
+        r.step(&step);
+        r.kick(1.0, &step.x1, &SVector::from([7.0, 8.0, 9.0]));
+        assert_eq!(r.len(), 3);
+        let taken = r.take();
+        assert_eq!((taken.len(), taken[2], r.len()), (3, Sample { t: 1.0, x: [7.0, 8.0] }, 0));
+
+        let mut r = TimesRecorder::<4>::new(&step.x0, 0.5);
+        r.step(&step);
+        assert_eq!(r.len(), 3);
+        let taken = r.take();
+        // What the state does not have is zero.
+        assert!(taken.len() == 3 && r.len() == 0 && taken[0].x == [1.0, 0.0, 0.0, 0.0], "{taken:?}");
+        // It goes on where it was.
+        let next = Step { t0: 1.0, t1: 1.6, ..step };
+        assert_eq!(r.record(&next), 1);
+        assert_eq!(r.take()[0].t, 1.5);
     }
 }

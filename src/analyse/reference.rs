@@ -168,3 +168,73 @@ pub(super) fn refine<const N: usize>(
     }
     stepper.at(b)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// x'' = -x.
+    struct Oscillator;
+    impl VectorField<2> for Oscillator {
+        fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+            SVector::from([x[1], -x[0]])
+        }
+    }
+
+    const PLANE: Plane = Plane { coordinate: 0, value: 0.0 };
+
+    fn start() -> ExtendedPoint<2> {
+        SVector::from([1.0, 0.0].map(DoubleDouble::from_f64))
+    }
+
+    fn close(got: DoubleDouble, want: DoubleDouble) {
+        assert!((got - want).abs().to_f64() < 1e-29, "{got:?} {want:?}");
+    }
+
+    #[test]
+    fn crossings_have_thirty_digits() {
+        let orbit = reference(&Oscillator, start(), PLANE, 10, 6.0, false).unwrap();
+        // At pi/2 downwards and at 3 pi/2 upwards, with x' = -1 and 1.
+        assert_eq!((orbit.crossings.len(), orbit.stop), (2, StopReason::EndTime));
+        for (c, (half_turns, direction)) in orbit.crossings.iter().zip([(0.5, Direction::Down), (1.5, Direction::Up)]) {
+            close(c.t, DoubleDouble::PI * DoubleDouble::from_f64(half_turns));
+            close(c.x[0], DoubleDouble::zero());
+            close(c.x[1], DoubleDouble::from_f64(2.0 * half_turns - 2.0));
+            assert_eq!(c.direction, direction);
+        }
+        // A sixth of a turn: cos = 1/2.
+        let half = reference(&Oscillator, start(), Plane { value: 0.5, ..PLANE }, 1, 6.0, false).unwrap();
+        assert_eq!((half.crossings.len(), half.stop), (1, StopReason::Observer));
+        close(half.crossings[0].t * DoubleDouble::from_f64(3.0), DoubleDouble::PI);
+    }
+
+    #[test]
+    fn as_many_crossings_as_asked_for() {
+        for count in 1..4 {
+            let orbit = reference(&Oscillator, start(), PLANE, count, 100.0, false).unwrap();
+            assert_eq!((orbit.crossings.len(), orbit.stop), (count, StopReason::Observer));
+        }
+        let none = reference(&Oscillator, start(), PLANE, 1, 1.5, false).unwrap();
+        assert_eq!((none.crossings.len(), none.stop), (0, StopReason::EndTime));
+    }
+
+    #[test]
+    fn the_first_wanted_crossing_is_found_if_there_is_time() {
+        let mut work = Statistics::default();
+        let mut upward = |t_end| {
+            let wanted = |c: &ExtendedCrossing<2>| c.direction == Direction::Up;
+            first_crossing(&Oscillator, (DoubleDouble::zero(), start()), PLANE, wanted, t_end, &mut work).unwrap()
+        };
+        close(upward(20.0).unwrap().t, DoubleDouble::PI * DoubleDouble::from_f64(1.5));
+        assert_eq!(upward(4.0), None);
+        assert!(work.steps > 0);
+    }
+
+    #[test]
+    fn the_extent_is_the_largest_component() {
+        for x in [[1.0, -3.0], [-3.0, 1.0], [3.0, 0.0]] {
+            let x = SVector::from(x.map(DoubleDouble::from_f64));
+            assert_eq!(ExtendedCrossing { t: DoubleDouble::zero(), x, direction: Direction::Up }.extent(), 3.0);
+        }
+    }
+}

@@ -86,3 +86,41 @@ impl<const N: usize, const D: usize> Observer<N> for SectionRecorder<D> {
         if self.crossings.len() < MOST_POINTS { Flow::Continue } else { Flow::Stop }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::SVector;
+
+    use super::*;
+    use crate::integrate::Interpolant;
+
+    /// Once around the unit circle in one step, from the angle 0.
+    struct Circle;
+    impl Interpolant<3> for Circle {
+        fn at(&self, s: f64) -> SVector<f64, 3> {
+            use crate::num::elementary::{cos, sin};
+            let a = std::f64::consts::TAU * s;
+            SVector::from([cos(a), sin(a), 3.0 * s])
+        }
+        fn degree(&self) -> usize {
+            8
+        }
+    }
+
+    #[test]
+    fn passages_have_their_moment_their_place_and_their_sense() {
+        let step = Step { t0: 2.0, t1: 6.0, x0: Circle.at(0.0), x1: Circle.at(1.0), interpolant: &Circle };
+        let mut r = SectionRecorder::<3>::new(0, 0.5);
+        assert_eq!(r.step(&step), Flow::Continue);
+        // cos = 1/2 at a sixth of the turn, going down, and at five sixths, going up.
+        let want = [(1.0 / 6.0, Direction::Down), (5.0 / 6.0, Direction::Up)];
+        assert_eq!(r.crossings().len(), 2);
+        for (c, (s, direction)) in r.crossings().iter().zip(want) {
+            assert!((c.t - (2.0 + 4.0 * s)).abs() < 1e-12 && c.direction == direction, "{c:?}");
+            assert!((SVector::from(c.x) - Circle.at(s)).amax() < 1e-12, "{c:?}");
+        }
+        assert_eq!([Direction::Down, Direction::Up].map(Direction::word), ["down", "up"]);
+        let taken = r.take();
+        assert!(taken.len() == 2 && r.crossings().is_empty() && r.into_crossings().is_empty());
+    }
+}

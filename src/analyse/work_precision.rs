@@ -181,4 +181,13 @@ mod tests {
         more["colour"] = "red".into();
         assert!(serde_json::from_value::<WorkPrecisionQuestion>(more).is_err());
     }
+
+    #[test]
+    fn errors_are_weighed_component_by_component() {
+        // 0.5/(1 + 1) and 2/(4 + 1); and the other way around.
+        assert_eq!(weighted_error(&[1.5, -2.0], &[1.0, -4.0], 1.0), 0.4);
+        assert_eq!(weighted_error(&[-2.0, 1.5], &[-4.0, 1.0], 1.0), 0.4);
+        assert_eq!(weighted_error(&[3.0], &[0.0], 0.5), 6.0);
+        assert_eq!(weighted_error(&[1.0, 2.0], &[1.0, 2.0], 0.0), 0.0);
+    }
 }

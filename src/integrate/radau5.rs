@@ -39,18 +39,11 @@ impl Tableau {
     fn new() -> Self {
         let r = sqrt(6.0);
         let c = [(4.0 - r) / 10.0, (4.0 + r) / 10.0, 1.0];
-        // Hairer & Wanner (1996), table IV.5.6.
-        let a = Matrix3::new(
-            (88.0 - 7.0 * r) / 360.0,
-            (296.0 - 169.0 * r) / 1800.0,
-            (-2.0 + 3.0 * r) / 225.0,
-            (296.0 + 169.0 * r) / 1800.0,
-            (88.0 + 7.0 * r) / 360.0,
-            (-2.0 - 3.0 * r) / 225.0,
-            (16.0 - r) / 36.0,
-            (16.0 + r) / 36.0,
-            1.0 / 9.0,
-        );
+        // Hairer & Wanner (1996), table IV.5.6, but for its last row: two are what an eigenvector takes.
+        let a = [
+            [(88.0 - 7.0 * r) / 360.0, (296.0 - 169.0 * r) / 1800.0, (-2.0 + 3.0 * r) / 225.0],
+            [(296.0 + 169.0 * r) / 1800.0, (88.0 + 7.0 * r) / 360.0, (-2.0 - 3.0 * r) / 225.0],
+        ];
         // det(z - A^-1): the denominator of the stability function, the (2, 3)-Pade approximation of exp.
         let mut real = 3.6;
         for _ in 0..8 {
@@ -62,8 +55,10 @@ impl Tableau {
 
         // An eigenvector is orthogonal to the rows of A - 1/lambda: their cross product, scaled to end in 1.
         let eigenvector = |lambda: Complex<f64>| {
-            let m = a.map(|x| Complex::new(x, 0.0)) - Matrix3::identity() * lambda.inv();
-            let v = m.row(0).transpose().cross(&m.row(1).transpose());
+            let row = |i: usize| {
+                Vector3::from_fn(|j, _| Complex::new(a[i][j], 0.0) - if i == j { lambda.inv() } else { Complex::ZERO })
+            };
+            let v = row(0).cross(&row(1));
             [v[0] / v[2], v[1] / v[2], Complex::new(1.0, 0.0)]
         };
         let v_real = eigenvector(Complex::new(real, 0.0));

@@ -267,6 +267,72 @@ mod tests {
         }
     }
 
+    fn run(system: System, switch: SwitchSpec, t_end: f64) -> Classification {
+        Classification::of(crate::job::cases::run(
+            system,
+            switch,
+            t_end,
+            Observation::Section { coordinate: 0, value: 0.0 },
+        ))
+    }
+
+    /// A run rests on itself; a kicked one on its eight twins too; one without section on nothing, and is refused.
+    #[test]
+    fn what_a_verdict_rests_on() {
+        use crate::integrate::{Kick, KickLaw};
+        let mut question = run(crate::job::cases::decays(2), SwitchSpec::tanh(1e-2), 9.0);
+        let runs = |question: &Classification| -> Vec<Value> { question.rests_on().iter().map(|q| q.json()).collect() };
+        assert_eq!(runs(&question), [Run(question.run.clone()).json()]);
+        let free = question.clone();
+        question.run.schedule.kick = Some(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 9, stream: 5 });
+        let kicked = runs(&question);
+        assert_eq!((kicked.len(), &kicked[1]), (9, &Run(free.run).json()));
+        question.run.observe = Observation::Path { chord: 1.0 };
+        assert!(runs(&question).is_empty());
+        assert!(question.ask(&Desk::quiet()).unwrap_err().to_string().contains("--section"));
+    }
+
+    /// Decays at the rates 1 and 2; a hysteretic one is followed for less long; x' = x^2 leaves and has none.
+    #[test]
+    fn exponents_are_those_of_the_runs_system() {
+        use crate::job::cases;
+        let desk = Desk::quiet();
+        let hysteretic = SwitchSpec::hysteretic(1e-2, crate::system::Relaxation::Single);
+        for (switch, duration) in [(SwitchSpec::tanh(1e-2), 10_000.0), (hysteretic, 2000.0)] {
+            let question = run(cases::decays(2), switch, 9.0);
+            let exponent = question.exponent(&desk, vec![1.0, 1.0]).unwrap().unwrap();
+            assert!((exponent.value + 1.0).abs() < 1e-5 && exponent.duration == duration, "{exponent:?}");
+        }
+        let leaving = run(cases::smooth(&["x", "y"], "x + 1", &["x*x", "-y"]), SwitchSpec::tanh(1e-2), 0.5);
+        assert_eq!(leaving.exponent(&desk, vec![1.0, 1.0]).unwrap(), None);
+    }
+
+    /// Three oscillators of frequencies that have no common measure, seen in the positions of two of them: nothing captures that.
+    #[test]
+    fn structures_are_what_was_not_captured_after_the_transient() {
+        let system = crate::job::cases::smooth(
+            &["x", "u", "p", "y", "v", "q"],
+            "x + 9",
+            &["y", "1.207*v", "1.618*q", "-x", "-1.207*u", "-1.618*p"],
+        );
+        let mut question = run(system, SwitchSpec::tanh(1e-2), 7500.0);
+        question.run.method.tolerance = Tolerance { rtol: 1e-6, atol: 1e-6 };
+        let twins = question.noise_free_twins();
+        let shifts: Vec<f64> = twins.iter().map(|twin| twin.start[0] - 1.0).collect();
+        assert!(shifts.iter().enumerate().all(|(k, s)| (s - 1e-9 * k as f64).abs() < 1e-15), "{shifts:?}");
+        let free = question.noise_free_structure(&Desk::quiet()).unwrap();
+        assert_eq!(free.len(), 8);
+        // Two passages a turn.
+        let wanted = 6500.0 / std::f64::consts::PI;
+        for loose in free {
+            assert!(
+                loose.iter().all(|p| p.t > 1000.0) && (loose.len() as f64 / wanted - 1.0).abs() < 0.01,
+                "{}",
+                loose.len()
+            );
+        }
+    }
+
     #[test]
     fn one_state_has_no_section_to_judge() {
         let error = evidence("[\"y\"]", "[\"-y\"]", vec![1.0]).unwrap_err();

@@ -52,3 +52,28 @@ fn path(desk: &Desk<'_>, run: &RunSpec) -> Result<Vec<Sample>, JobError> {
         _ => Err(JobError::Other("only paths can be compared as paths; leave out --section".into())),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::cases;
+    use crate::job::spec::{Observation, SwitchSpec};
+
+    /// A path shares everything with itself; a section is no path.
+    #[test]
+    fn only_paths_are_compared() {
+        let field = ["v", "-x", "-z"];
+        let run = |observe| {
+            cases::run(cases::smooth(&["x", "v", "z"], "x + 9", &field), SwitchSpec::tanh(1e-2), 20.0, observe)
+        };
+        let path = run(Observation::Path { chord: 1e-3 });
+        let answer = PathComparison(path.clone(), path.clone()).compute(&Desk::quiet(), &()).unwrap();
+        let [a, b] = answer.fact::<[f64; 2]>("freshness").unwrap();
+        assert!(a == b && a > 0.0 && a <= 1.0, "{a} {b}");
+        let section = run(Observation::Section { coordinate: 0, value: 0.0 });
+        for pair in [PathComparison(path.clone(), section.clone()), PathComparison(section, path)] {
+            let said = pair.compute(&Desk::quiet(), &()).unwrap_err().to_string();
+            assert!(said.contains("only paths can be compared"), "{said}");
+        }
+    }
+}

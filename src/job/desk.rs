@@ -216,9 +216,13 @@ mod tests {
         assert_eq!((COUNT.load(Ordering::Relaxed), held(&desk)), (8, 1));
         drop(held_by_us);
 
-        // A desk that begins with them reads none of them, and computes only what is missing.
+        // A desk that begins with them reads none of them (one is damaged and not missed), and computes only what is missing.
         let next = Desk::new(Some(Store::new(folder.path())), &());
+        let path = Store::new(folder.path()).path(&key(&*questions[3]));
+        let whole = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &whole[1..]).unwrap();
         next.gather(&questions);
+        std::fs::write(&path, &whole).unwrap();
         assert_eq!((COUNT.load(Ordering::Relaxed), held(&next)), (8, 0));
         next.gather(&[Arc::new(Fibonacci(8, &COUNT)) as _]);
         assert_eq!(COUNT.load(Ordering::Relaxed), 9);

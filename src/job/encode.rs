@@ -513,6 +513,60 @@ mod tests {
         assert_eq!(bits(&[other]), base);
     }
 
+    /// Beyond all numbers and below them, and the blank, in every form.
+    #[test]
+    fn infinities_come_back() {
+        let t = table(vec![f64::INFINITY, f64::NEG_INFINITY, f64::NAN, -0.0], vec!["inf".into(); 4]);
+        let answer = Answer { stop: Stop::StepBudget, ..Answer::of_tables(vec![t.clone()]) };
+        let file = json(&answer, &Value::Null);
+        let (_, back) = from_json(&file).unwrap();
+        assert_eq!((back.hash(), back.stop), (answer.hash(), Stop::StepBudget));
+        assert_eq!(back.table("a table").unwrap().numbers("x")[..2], [f64::INFINITY, f64::NEG_INFINITY]);
+        assert_eq!(bits(&[from_csv(&csv(&t, &Value::Null)).unwrap().1]), bits(std::slice::from_ref(&t)));
+        // A number is a number, inf or -inf; nothing else is one, and inf is no whole number.
+        let text = String::from_utf8(file).unwrap();
+        for (from, to) in [
+            ("[\"-inf\",", "[\"-infinity\","),
+            ("[\"-inf\",", "["),
+            ("[null,", "[[],"),
+            (",-1]", ",null]"),
+            (",-1]", ",\"inf\"]"),
+            (",-1]", ",-1,0]"),
+            ("\"inf\",-1]", "0,-1]"),
+        ] {
+            assert!(text.contains(from), "{from}: {text}");
+            let said = from_json(text.replace(from, to).as_bytes()).unwrap_err().to_string();
+            assert!(said.contains("table a table, row"), "{from} {to}: {said}");
+        }
+    }
+
+    /// Columns of different lengths, a word that is not there, a kind that nobody knows, bytes behind the end.
+    #[test]
+    fn bits_that_are_no_table_are_refused() {
+        let t = table(vec![1.0, 2.0], vec!["up".into(), "down".into()]);
+        let whole = bits(std::slice::from_ref(&t));
+        let at = |what: &[u8]| whole.windows(what.len()).rposition(|w| w == what).unwrap();
+        let changed = |at: usize, to: u8| {
+            let mut bytes = whole.clone();
+            bytes[at] = to;
+            bytes
+        };
+        let mut short = t.clone();
+        short.columns[2].cells = Cells::Integers(vec![7]);
+        let codes = at(b"down") + 4;
+        assert_eq!(whole[codes..codes + 8], [0, 0, 0, 0, 1, 0, 0, 0]);
+        for (bytes, word) in [
+            (bits(&[short]), "different lengths"),
+            (changed(codes + 4, 2), "not in its vocabulary"),
+            (changed(at(b"1i") + 1, b'j'), "no known kind"),
+            ([&whole[..], &[0]].concat(), "more than it speaks of"),
+            (whole[..whole.len() - 1].to_vec(), "holds"),
+        ] {
+            let said = from_bits(&bytes).unwrap_err().to_string();
+            assert!(said.contains(word), "{word}: {said}");
+        }
+    }
+
     #[test]
     fn csv_as_it_looks() {
         let t = table(vec![0.1, f64::NAN, 1e300], vec!["up".into(), String::new(), "a,b".into()]);

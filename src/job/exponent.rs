@@ -126,3 +126,94 @@ impl Question for LargestExponent {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::Tolerance;
+    use crate::integrate::filippov::{ExitRule, Side};
+    use crate::job::cases;
+    use crate::system::{Caricature, Relaxation};
+
+    fn question(system: System, switch: SwitchSpec, duration: f64) -> LargestExponent {
+        let tolerance = Tolerance { rtol: 1e-9, atol: 1e-9 };
+        let start = vec![1.0; system.dimension()];
+        let settings = lyapunov::Settings { tolerance, transient: 20.0, duration, ..lyapunov::Settings::default() };
+        LargestExponent { system, switch, start, settings }
+    }
+
+    fn hysteretic() -> SwitchSpec {
+        SwitchSpec::hysteretic(1e-2, Relaxation::Single)
+    }
+
+    /// Decays at the rates 1, 2, 3 ... : neighbours approach each other at the lowest. phi, where it is a state, follows h, which is far from 0.
+    #[test]
+    fn the_slowest_of_many_decays_is_the_exponent() {
+        for n in 1..=9 {
+            for switch in [SwitchSpec::tanh(1e-2), hysteretic()].into_iter().take(if n < 9 { 2 } else { 1 }) {
+                let answer = question(cases::decays(n), switch, 10.0).compute(&Desk::quiet(), &()).unwrap();
+                let exponent: Exponent = answer.fact("exponent").unwrap_or_else(|e| panic!("{n} {switch:?}: {e}"));
+                assert!((exponent.value + 1.0).abs() < 1e-5, "{n} {switch:?}: {exponent:?}");
+                assert_eq!((exponent.duration, answer.stop), (10.0, Stop::Finished));
+            }
+        }
+    }
+
+    /// The compiled equations and those of the same system's file.
+    #[test]
+    fn the_caricature_is_its_file() {
+        let compiled = System::from(Caricature::with_reinjection(0.1, 1e-5));
+        let recorded = cases::of(&compiled.definition().to_toml().replace("\"-y\"", "\"0 - y\""));
+        assert!(compiled.compiled().is_some() && recorded.compiled().is_none());
+        for switch in [SwitchSpec::tanh(1e-2), hysteretic()] {
+            let [a, b] = [&compiled, &recorded].map(|system| {
+                let question =
+                    LargestExponent { start: vec![0.2, 0.0, -1.0], ..question(system.clone(), switch, 30.0) };
+                question.compute(&Desk::quiet(), &()).unwrap().fact::<Exponent>("exponent").unwrap()
+            });
+            assert!((a.value - b.value).abs() < 1e-4, "{a:?} {b:?}");
+        }
+    }
+
+    #[test]
+    fn what_has_no_exponent_says_why() {
+        let said = |q: LargestExponent| q.compute(&Desk::quiet(), &()).unwrap().fact::<String>("failure").unwrap();
+        let few = LargestExponent { start: vec![1.0], ..question(cases::decays(2), SwitchSpec::tanh(1e-2), 9.0) };
+        assert!(said(few).contains("1 numbers, the system 2 states"));
+        let exit = ExitRule::AtOnce { side: Side::Plus };
+        let filippov = question(cases::decays(2), SwitchSpec::Filippov { exit, funnel: None }, 9.0);
+        assert!(said(filippov).contains("no tangent flow"));
+        assert!(said(question(cases::decays(10), SwitchSpec::tanh(1e-2), 9.0)).contains("not for 10"));
+        assert!(said(question(cases::decays(9), hysteretic(), 9.0)).contains("not for 10"));
+        // x' = x^2 leaves at t = 1.
+        let leaving = cases::smooth(&["x"], "x + 1", &["x*x"]);
+        assert!(!said(question(leaving, SwitchSpec::tanh(1e-2), 9.0)).is_empty());
+    }
+
+    #[test]
+    fn phi_begins_on_the_side_of_the_start() {
+        let system = cases::smooth(&["x", "y"], "y - 1", &["-x", "-y"]);
+        for (y, phi) in [(1.5, 1.0), (0.5, 0.0), (1.0, 0.0)] {
+            let question = LargestExponent { start: vec![0.0, y], ..question(system.clone(), hysteretic(), 9.0) };
+            assert_eq!(question.phi(), phi, "{y}");
+        }
+    }
+
+    /// Asked to stop at a third of the time; and before eight of the 64 blocks are done.
+    #[test]
+    fn an_interrupted_mean_says_so() {
+        struct Until(f64);
+        impl Watch for Until {
+            fn reached(&self, t: f64) -> bool {
+                t < self.0
+            }
+        }
+        let turning =
+            |duration| question(cases::smooth(&["x", "v"], "x + 9", &["v", "-x"]), SwitchSpec::tanh(1e-2), duration);
+        let third = turning(3000.0).compute(&Desk::quiet(), &Until(1000.0)).unwrap();
+        assert_eq!(third.stop, Stop::Interrupted);
+        let exponent: Exponent = third.fact("exponent").unwrap();
+        assert!((900.0..2500.0).contains(&exponent.duration) && exponent.value.abs() < 1e-2, "{exponent:?}");
+        assert_eq!(turning(30_000.0).compute(&Desk::quiet(), &Until(1.0)), Err(JobError::Interrupted));
+    }
+}

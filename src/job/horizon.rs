@@ -157,6 +157,84 @@ mod tests {
         assert_eq!(horizon(1e-32), 20.0);
     }
 
+    fn decay(precision: Option<u16>, order: Option<u16>, rtol: f64) -> Horizon {
+        let mut run = run(Method::TaylorExtended, rtol);
+        (run.system, run.start, run.t_end) = (crate::job::cases::decays(2), vec![3.0, 1.0], 0.25);
+        (run.method.precision, run.method.order) = (precision, order);
+        Horizon { run, within: 1e-9 }
+    }
+
+    /// The next precision; of the highest the one below.
+    #[test]
+    fn every_precision_has_another_to_compare_with() {
+        for (precision, rtol, bits, other) in [
+            (None, 1e-20, 106, 192),
+            (Some(106), 1e-20, 106, 192),
+            (Some(384), 1e-20, 384, 512),
+            (Some(512), 1e-20, 512, 384),
+        ] {
+            let answer = decay(precision, Some(30), rtol).compute(&Desk::quiet(), &()).unwrap();
+            let fact = |name: &str| answer.fact::<u16>(name).unwrap();
+            assert_eq!([fact("precision"), fact("other_precision"), fact("order")], [bits, other, 30]);
+            assert_eq!(fact("other_order"), 38);
+        }
+    }
+
+    /// Of the order 4 against the solution, which the other precision has to all its digits, and against the order 12: in units of 1 + the largest state.
+    #[test]
+    fn differences_are_in_units_of_one_and_the_state() {
+        let mut horizon = decay(None, Some(4), 1e-6);
+        // Half of the largest difference: some lie above it.
+        let all = horizon.compute(&Desk::quiet(), &()).unwrap().tables.remove(0);
+        let largest = |name: &str| all.numbers(name).iter().fold(0.0_f64, |a, b| a.max(*b));
+        horizon.within = 0.5 * largest("by_precision").max(largest("by_order"));
+        let answer = horizon.compute(&Desk::quiet(), &()).unwrap();
+        let [own, other] = [4, 12].map(|order| {
+            let run = horizon.variant(106, Some(order), horizon.run.method.tolerance);
+            Desk::quiet().ask(&*run).unwrap().tables[0].clone()
+        });
+        let table = &answer.tables[0];
+        let mut first_beyond = None;
+        for (row, t) in table.numbers("t").iter().enumerate() {
+            let of = |table: &Table| ["a1", "a2"].map(|name| table.numbers(name)[row]);
+            let (state, size) = (of(&own), 1.0 + of(&own)[0]);
+            let far = |b: [f64; 2]| (state[0] - b[0]).abs().max((state[1] - b[1]).abs()) / size;
+            let wanted = [far([3.0 * (-t).exp(), (-2.0 * t).exp()]), far(of(&other))];
+            for (column, wanted) in ["by_precision", "by_order"].into_iter().zip(wanted) {
+                let found = table.numbers(column)[row];
+                assert!((found - wanted).abs() < 1e-15, "{column} {t}: {found:e} {wanted:e}");
+            }
+            if table.numbers("by_precision")[row].max(table.numbers("by_order")[row]) > horizon.within {
+                first_beyond = first_beyond.or(Some(row));
+            }
+        }
+        let last = first_beyond.expect("half of the largest is less") - 1;
+        assert_eq!(answer.fact::<f64>("horizon").unwrap(), table.numbers("t")[last]);
+    }
+
+    #[test]
+    fn an_interrupted_horizon_says_so() {
+        struct Impatient;
+        impl crate::job::Progress for Impatient {
+            fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn crate::job::JobWatch + 'a> {
+                Box::new(Impatient)
+            }
+        }
+        impl crate::job::JobWatch for Impatient {
+            fn done(self: Box<Self>, _: &str) {}
+        }
+        impl Watch for Impatient {
+            fn reached(&self, t: f64) -> bool {
+                t < 0.1
+            }
+        }
+        // Some ten thousand steps of the order 4; the others have few and are not asked.
+        let horizon = decay(None, Some(4), 1e-20);
+        let answer = horizon.compute(&Desk::new(None, &Impatient), &()).unwrap();
+        assert_eq!(answer.stop, Stop::Interrupted);
+        assert!(answer.rows() < Horizon::SAMPLES, "{}", answer.rows());
+    }
+
     #[test]
     fn other_methods_have_none() {
         let error = Horizon { run: run(Method::Lsoda, 1e-9), within: 1e-9 }.compute(&Desk::quiet(), &()).unwrap_err();

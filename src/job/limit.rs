@@ -152,3 +152,76 @@ impl Question for AfterVisit {
             .with_fact("width", &found.width))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::filippov::{FunnelGrid, Settings};
+    use crate::job::question::key;
+    use crate::job::{Store, cases};
+    use crate::system::Caricature;
+
+    fn caricature() -> System {
+        Caricature::with_reinjection(0.1, 1e-5).into()
+    }
+
+    /// Free at t = 2, sliding at t = 9, before the visit at t = 13.196: distances of first order in eps. A file's equations say the same.
+    #[test]
+    fn distances_before_the_visit_halve_with_eps() {
+        let (eps, times) = (vec![4e-3, 2e-3], vec![2.0, 9.0]);
+        let compared = ConvergenceQuestion { start: vec![0.2, 0.0, -1.0], times, eps, settings: Settings::default() };
+        let recorded = cases::of(&caricature().definition().to_toml().replace("\"-y\"", "\"0 - y\""));
+        let tables = [caricature(), recorded].map(|system| {
+            let question = SmoothingLimit { system, compared: compared.clone() };
+            question.compute(&Desk::quiet(), &()).unwrap().tables.remove(0)
+        });
+        let table = &tables[0];
+        assert_eq!(
+            (table.numbers("eps"), table.numbers("t")),
+            (&[4e-3, 4e-3, 2e-3, 2e-3][..], &[2.0, 9.0, 2.0, 9.0][..])
+        );
+        assert_eq!(table.words("mode").collect::<Vec<_>>(), ["free", "sliding", "free", "sliding"]);
+        let distance = table.numbers("distance");
+        for k in 0..2 {
+            assert!((distance[k] / distance[k + 2] - 2.0).abs() < 0.2, "{distance:?}");
+        }
+        assert!(distance.iter().zip(tables[1].numbers("distance")).all(|(a, b)| (a - b).abs() < 1e-6 * a));
+    }
+
+    /// Passages that are known already, one of which never came so far.
+    #[test]
+    fn where_smoothed_orbits_cross_is_their_passages_far_place() {
+        let grid =
+            FunnelGrid { shortest: 0.1, longest: 1.0, times: 3, horizon: 5.0, until_two_fold: true, per_step: 1 };
+        let mut question = AfterVisit {
+            system: caricature(),
+            compared: AfterVisitQuestion {
+                start: vec![0.2, 0.0, -1.0],
+                t_end: 80.0,
+                eps: vec![1e-2, 3e-3],
+                beyond: 0.6,
+                grid,
+                refinements: 1,
+                finer: 3,
+                settings: Settings::default(),
+            },
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::new(folder.path());
+        let passages = question.passages().unwrap();
+        for (passage, x) in passages.iter().zip([1.0, f64::NAN]) {
+            assert_eq!((passage.followed.far, passage.followed.by), (0.6, 80.0));
+            let mut table = Table::new("passage", ["far_x", "far_y", "far_z"].map(Column::numbers));
+            table.push([x.into(), 2.0.into(), 3.0.into()]);
+            store.put(&key(passage), passage, &Answer::of_tables(vec![table])).unwrap();
+        }
+        let desk = Desk::new(Some(store), &());
+        let crossings = vec![(1e-2, Some(vec![1.0, 2.0, 3.0])), (3e-3, None)];
+        assert_eq!(question.smoothed(&desk).unwrap(), crossings);
+        let keys: Vec<_> = question.rests_on().iter().map(|q| key(&**q)).collect();
+        assert_eq!(keys, passages.iter().map(|p| key(p)).collect::<Vec<_>>());
+        question.compared.start.pop();
+        assert!(question.rests_on().is_empty());
+        assert!(question.compute(&desk, &()).unwrap_err().to_string().contains("2 components, not three"));
+    }
+}

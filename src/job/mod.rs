@@ -79,3 +79,42 @@ pub use recording::{Data, Recording};
 pub use run::Run;
 pub use store::Store;
 pub use table::{Column, Entry, Table};
+
+/// What the tests of this room ask about.
+#[cfg(test)]
+mod cases {
+    use super::spec::*;
+    use crate::integrate::{Schedule, StepCap, Tolerance};
+    use crate::system::{Definition, System};
+
+    /// The system x' = `field` on both sides of h = 0.
+    pub fn smooth(states: &[&str], h: &str, field: &[&str]) -> System {
+        of(&format!("states = {states:?}\nh = {h:?}\nplus = {field:?}\nminus = {field:?}"))
+    }
+
+    /// The system of a file.
+    pub fn of(text: &str) -> System {
+        System::new(Definition::from_toml(text, "f").unwrap())
+    }
+
+    /// a1' = -a1, a2' = -2 a2 and so on, so many states: the k-th is exp(-k t). h stays above 0.
+    pub fn decays(states: usize) -> System {
+        let names: Vec<String> = (1..=states).map(|k| format!("a{k}")).collect();
+        let field: Vec<String> = (1..=states).map(|k| format!("-{k}*a{k}")).collect();
+        of(&format!("states = {names:?}\nh = \"a1 + 1\"\nplus = {field:?}\nminus = {field:?}"))
+    }
+
+    /// A run from all ones by Dormand-Prince to twelve digits.
+    pub fn run(system: System, switch: SwitchSpec, t_end: f64, observe: Observation) -> RunSpec {
+        let method = MethodSpec {
+            name: Method::Dopri5,
+            tolerance: Tolerance { rtol: 1e-12, atol: 1e-12 },
+            step_cap: StepCap::None,
+            max_steps: 1_000_000,
+            precision: None,
+            order: None,
+        };
+        let start = vec![1.0; system.dimension()];
+        RunSpec { system, switch, start, t_end, method, schedule: Schedule::default(), observe }
+    }
+}

@@ -428,3 +428,269 @@ impl ReturnMap for Map<'_> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+    use std::sync::Mutex;
+
+    use super::*;
+    use crate::integrate::filippov::{ExitRule, Side};
+    use crate::job::cases;
+    use crate::system::Relaxation;
+
+    fn question(system: System, switch: SwitchSpec, axis: usize) -> ClosedOrbit {
+        ClosedOrbit {
+            start: vec![0.3; system.dimension()],
+            system,
+            switch,
+            settle: 0.0,
+            plane: Plane { axis, value: 0.0, upward: true },
+            returns: None,
+            tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
+            longest_return: 100.0,
+            along: None,
+        }
+    }
+
+    /// Turns about the origin at unit speed, r' = side (mu r - r^3): the circle r^2 = mu has the multiplier exp(-4 pi mu side). Beside it decays at the
+    /// rates 1, 2, 3 ..., whose multipliers are exp(-2 pi k).
+    fn circle(states: usize) -> System {
+        let decays = 1..=states - 2;
+        let names: Vec<String> =
+            ["x".into(), "y".into()].into_iter().chain(decays.clone().map(|k| format!("a{k}"))).collect();
+        let turn = ["side*x*(mu - x*x - y*y) - y".into(), "side*y*(mu - x*x - y*y) + x".into()];
+        let field: Vec<String> = turn.into_iter().chain(decays.map(|k| format!("-{k}*a{k}"))).collect();
+        let text = format!("states = {names:?}\nh = 'x'\nplus = {field:?}\nminus = {field:?}\n");
+        cases::of(&format!("{text}[parameters]\nmu = 0.1\nside = 1\n"))
+    }
+
+    fn switches() -> [SwitchSpec; 3] {
+        let exit = ExitRule::AtOnce { side: Side::Plus };
+        let hysteretic = SwitchSpec::hysteretic(1e-2, Relaxation::Single);
+        [SwitchSpec::tanh(1e-2), hysteretic, SwitchSpec::Filippov { exit, funnel: None }]
+    }
+
+    #[test]
+    fn a_circle_is_found_in_two_to_eight_states() {
+        let known = (-0.4 * PI).exp();
+        for n in 2..=8 {
+            for switch in switches() {
+                let answer = question(circle(n), switch, 1).compute(&Desk::quiet(), &()).unwrap();
+                let fact = |name: &str| answer.fact::<f64>(name).unwrap();
+                let near = |a: f64, b: f64, by: f64| assert!((a - b).abs() < by, "{n} {switch:?}: {a} {b}");
+                near(fact("period"), 2.0 * PI, 1e-6);
+                near(fact("largest_modulus"), known, 1e-4);
+                near(fact("rate"), 0.2, 1e-4);
+                assert!(fact("residual") < 1e-7 && fact("iterations") >= 1.0 && fact("returns") == 1.0);
+                let multipliers: Vec<[f64; 2]> = answer.fact("multipliers").unwrap();
+                let phi = usize::from(matches!(switch, SwitchSpec::Hysteretic { .. }));
+                assert_eq!(multipliers.len(), n - 1 + phi);
+                let decays = (1..n - 1).map(|k| (-2.0 * PI * k as f64).exp());
+                let all = std::iter::once(known).chain(decays).chain([0.0]);
+                for (m, known) in multipliers.iter().zip(all) {
+                    near(m[0], known, 1e-4);
+                    near(m[1], 0.0, 1e-4);
+                }
+                // Upwards through y = 0 at the right, downwards at the left.
+                let orbit = answer.table("orbit").unwrap();
+                assert_eq!(orbit.words("direction").collect::<Vec<_>>(), ["up", "down"]);
+                let point: Vec<f64> = answer.fact("point").unwrap();
+                assert_eq!((point.len(), point[0]), (n + phi, orbit.numbers("x")[0]));
+                near(orbit.numbers("x")[0], 0.1_f64.sqrt(), 1e-6);
+                near(orbit.numbers("x")[1], -(0.1_f64.sqrt()), 1e-6);
+                assert_eq!(orbit.numbers("phi").len(), 2 * phi);
+            }
+        }
+        // The other way through the plane.
+        let mut down = question(circle(2), SwitchSpec::tanh(1e-2), 1);
+        (down.plane.upward, down.start) = (false, vec![-0.3, 0.0]);
+        let answer = down.compute(&Desk::quiet(), &()).unwrap();
+        let orbit = answer.table("orbit").unwrap();
+        assert_eq!(orbit.words("direction").collect::<Vec<_>>(), ["down", "up"]);
+        assert!(orbit.numbers("x")[0] < 0.0 && orbit.numbers("x")[1] > 0.0);
+    }
+
+    /// Hears how far a branch has come; refuses after so many.
+    struct Heard(Mutex<Vec<f64>>, usize);
+
+    impl Watch for Heard {
+        fn reached(&self, t: f64) -> bool {
+            let mut heard = self.0.lock().unwrap();
+            heard.push(t);
+            heard.len() < self.1
+        }
+    }
+
+    fn along(side: f64, from: f64, to: f64) -> ClosedOrbit {
+        let along = Along { parameter: "mu".into(), from, to, steps: 4, most: 100 };
+        let system = circle(2).with("side", side).unwrap();
+        ClosedOrbit { along: Some(along), ..question(system, SwitchSpec::tanh(1e-2), 1) }
+    }
+
+    /// Attracting and repelling, up and down in mu.
+    #[test]
+    fn a_branch_of_circles_has_known_multipliers() {
+        for (side, from, to) in [(1.0, 0.1, 0.3), (-1.0, 0.1, 0.2), (1.0, 0.2, 0.1)] {
+            let heard = Heard(Mutex::default(), 1000);
+            let answer = along(side, from, to).compute(&Desk::quiet(), &heard).unwrap();
+            assert_eq!((answer.stop, answer.fact("end")), (Stop::Finished, Ok(End::Reached)));
+            let branch = answer.table("branch").unwrap();
+            let names: Vec<&str> = branch.columns.iter().map(|c| c.name.as_str()).collect();
+            assert_eq!(names, ["mu", "period", "stability", "x", "y", "multiplier1_re", "multiplier1_im"]);
+            let mu = branch.numbers("mu");
+            assert!(mu.len() > 4 && mu[0] == from && mu[mu.len() - 1] == to, "{mu:?}");
+            assert!(
+                mu.windows(2).all(|w| (w[1] - w[0]).signum() == (to - from).signum()
+                    && (w[1] - w[0]).abs() < 0.26 * (to - from).abs()),
+                "{mu:?}"
+            );
+            let known = if side > 0.0 { "stable" } else { "unstable" };
+            assert!(branch.words("stability").all(|word| word == known));
+            for (row, mu) in mu.iter().enumerate() {
+                let near = |name: &str, b: f64| {
+                    let a = branch.numbers(name)[row];
+                    assert!((a - b).abs() < 1e-5, "{name} at {mu}: {a} {b}");
+                };
+                near("period", 2.0 * PI);
+                near("x", mu.sqrt());
+                near("y", 0.0);
+                near("multiplier1_re", (-4.0 * PI * mu * side).exp());
+                near("multiplier1_im", 0.0);
+            }
+            let changes = answer.table("bifurcations").unwrap();
+            assert!(changes.is_empty() && changes.columns[1].name == "mu");
+            // Told of each orbit but the first, in shares of the way.
+            let heard = heard.0.into_inner().unwrap();
+            let shares: Vec<f64> = mu[1..].iter().map(|mu| ((mu - from) / (to - from)).min(1.0)).collect();
+            assert!(
+                heard.len() == shares.len() && heard.iter().zip(shares).all(|(a, b)| (a - b).abs() < 1e-12),
+                "{heard:?}"
+            );
+        }
+        let cut = along(1.0, 0.1, 0.3).compute(&Desk::quiet(), &Heard(Mutex::default(), 2)).unwrap();
+        assert_eq!((cut.stop, cut.fact("end")), (Stop::Interrupted, Ok(End::Interrupted)));
+        assert_eq!(cut.table("branch").unwrap().len(), 3);
+    }
+
+    /// On the unit circle z is cos 2 theta: it passes 0 twice a turn in each direction, upwards at (1, -1)/sqrt 2 and opposite. What settles there is seen to come back at the
+    /// second passage.
+    #[test]
+    fn returns_are_counted_in_the_settled_motion() {
+        let field = ["x*(1 - x*x - y*y) - y", "y*(1 - x*x - y*y) + x", "-z + x*x - y*y - 4*x*y"];
+        let system = cases::smooth(&["x", "y", "z"], "x + 9", &field);
+        let question = ClosedOrbit { settle: 40.0, ..question(system, SwitchSpec::tanh(1e-2), 2) };
+        let answer = question.compute(&Desk::quiet(), &()).unwrap();
+        assert_eq!(answer.fact("returns"), Ok(2));
+        assert!((answer.fact::<f64>("period").unwrap() - 2.0 * PI).abs() < 1e-6);
+        let orbit = answer.table("orbit").unwrap();
+        assert_eq!(orbit.words("direction").collect::<Vec<_>>(), ["up", "up", "down", "down"]);
+        let (x, y) = (orbit.numbers("x"), orbit.numbers("y"));
+        assert!((0..2).all(|k| (x[k] + y[k]).abs() < 1e-6) && (x[0] + x[1]).abs() < 1e-6, "{x:?} {y:?}");
+        assert!((0..4).all(|k| (x[k].abs() - 0.5_f64.sqrt()).abs() < 1e-6));
+        for (upward, word) in [(true, "upwards within t = 40"), (false, "downwards within t = 40")] {
+            let plane = Plane { axis: 2, value: 5.0, upward };
+            let missed = ClosedOrbit { plane, ..question.clone() };
+            let said = missed.compute(&Desk::quiet(), &()).unwrap_err().to_string();
+            assert!(said.contains(word), "{said}");
+        }
+        struct Never;
+        impl crate::job::Progress for Never {
+            fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn crate::job::JobWatch + 'a> {
+                Box::new(Never)
+            }
+        }
+        impl crate::job::JobWatch for Never {
+            fn done(self: Box<Self>, _: &str) {}
+        }
+        impl Watch for Never {
+            fn reached(&self, _: f64) -> bool {
+                false
+            }
+        }
+        let long = ClosedOrbit { settle: 4000.0, ..question };
+        assert_eq!(long.compute(&Desk::new(None, &Never), &()), Err(JobError::Interrupted));
+    }
+
+    /// Without settling: the start, moved onto the plane, with phi on its side of h = 0.
+    #[test]
+    fn a_hysteretic_guess_has_phi() {
+        for (x, phi) in [(0.5, 1.0), (-0.5, 0.0), (0.0, 0.0)] {
+            let mut question = question(circle(3), switches()[1], 1);
+            (question.start, question.plane.value) = (vec![x, 7.0, 8.0], 2.0);
+            assert_eq!(question.guess(&Desk::quiet()).unwrap(), (vec![x, 2.0, 8.0, phi], 1));
+            assert_eq!((question.states(), question.names()), (4, ["x", "y", "a1", "phi"].map(String::from).to_vec()));
+        }
+        let phi = question(cases::smooth(&["x", "phi"], "x", &["phi", "-x"]), switches()[1], 1);
+        assert_eq!(phi.names(), ["x", "phi", "phi_"]);
+        let smoothed = question(circle(3), switches()[0], 1);
+        assert_eq!((smoothed.states(), smoothed.names().len()), (3, 3));
+    }
+
+    #[test]
+    fn the_parameter_may_be_the_width() {
+        let at = |switch: SwitchSpec, system: System, value: f64| {
+            let along = Along { parameter: "eps".into(), from: 1e-3, to: 1e-2, steps: 1, most: 9 };
+            ClosedOrbit { along: Some(along), ..question(system, switch, 1) }.at(value)
+        };
+        let [smoothed, _, filippov] = switches();
+        let hysteretic =
+            |eps| SwitchSpec::Hysteretic { eps, eps_prime: 0.3, relaxation: Relaxation::Single, phi0: 0.7 };
+        for (switch, wanted) in [(smoothed, SwitchSpec::tanh(0.5)), (hysteretic(0.1), hysteretic(0.5))] {
+            assert_eq!(at(switch, circle(2), 0.5).unwrap(), (circle(2), wanted));
+            for value in [0.0, -1.0, f64::NAN] {
+                assert!(at(switch, circle(2), value).unwrap_err().to_string().contains("above 0"), "{value}");
+            }
+        }
+        assert!(at(filippov, circle(2), 0.5).unwrap_err().to_string().contains("no eps"));
+        // A system's own parameter of that name comes first.
+        let own = cases::of(
+            "states = ['x', 'y']\nh = 'x'\nplus = ['y', '-eps*x']\nminus = ['y', '-x']\n[parameters]\neps = 2",
+        );
+        assert_eq!(at(smoothed, own.clone(), 0.5).unwrap(), (own.with("eps", 0.5).unwrap(), smoothed));
+    }
+
+    #[test]
+    fn wrong_questions_are_refused() {
+        let along =
+            |parameter: &str, from, to, steps| Some(Along { parameter: parameter.into(), from, to, steps, most: 9 });
+        let [smoothed, _, filippov] = switches();
+        let good = question(circle(2), smoothed, 1);
+        assert_eq!(good.validate(), Ok(()));
+        let of = |n: usize| question(cases::decays(n), smoothed, 0);
+        for (wrong, field, word) in [
+            (of(1), "system", "2 to 8 states"),
+            (of(9), "system", "2 to 8 states"),
+            (question(circle(2), smoothed, 2), "section", "count from 0"),
+            (ClosedOrbit { along: along("nu", 0.1, 0.2, 4), ..good.clone() }, "along", "name a parameter"),
+            (ClosedOrbit { along: along("mu", 0.1, f64::NAN, 4), ..good.clone() }, "along", "name a parameter"),
+            (ClosedOrbit { along: along("eps", 0.1, -0.1, 4), ..good.clone() }, "along", "name a parameter"),
+            (ClosedOrbit { along: along("eps", 0.0, 0.1, 4), ..good.clone() }, "along", "name a parameter"),
+            (
+                ClosedOrbit { along: along("eps", 0.1, 0.2, 4), switch: filippov, ..good.clone() },
+                "along",
+                "name a parameter",
+            ),
+            (ClosedOrbit { along: along("mu", 0.1, 0.1, 4), ..good.clone() }, "along", "two ends"),
+            (ClosedOrbit { along: along("mu", 0.1, 0.2, 0), ..good.clone() }, "along", "at least one step"),
+            (ClosedOrbit { returns: Some(0), ..good.clone() }, "returns", "at least once"),
+        ] {
+            match wrong.compute(&Desk::quiet(), &()) {
+                Err(JobError::Spec(error)) => {
+                    assert!(error.field == field && error.rule.contains(word), "{field}, {word}: {error}");
+                }
+                other => panic!("{field}, {word}: {other:?}"),
+            }
+        }
+    }
+
+    /// A search that leaves the finite numbers, and one that finds nothing: in words, of the orbit's states alone.
+    #[test]
+    fn a_search_that_fails_says_why() {
+        let leaving = cases::smooth(&["x", "y"], "x + 9", &["x*x*x", "x"]);
+        let said = question(leaving, switches()[0], 1).compute(&Desk::quiet(), &()).unwrap_err().to_string();
+        assert!(!said.is_empty());
+        let failure = Failure::NotFinite { t: 1.0, state: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0] };
+        assert_eq!(without_tangents(failure, 2), Failure::NotFinite { t: 1.0, state: vec![1.0, 2.0] });
+    }
+}

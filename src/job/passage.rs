@@ -195,3 +195,98 @@ impl Question for Leaving {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::filippov::{ExitRule, Side};
+    use crate::job::cases;
+    use crate::system::{Caricature, Relaxation};
+
+    /// The caricature by its compiled equations, and by a file's that say the same in other words.
+    fn caricatures() -> [System; 2] {
+        let compiled = System::from(Caricature::with_reinjection(0.1, 1e-5));
+        let recorded = cases::of(&compiled.definition().to_toml().replace("\"-y\"", "\"0 - y\""));
+        assert!(compiled.compiled().is_some() && recorded.compiled().is_none());
+        [compiled, recorded]
+    }
+
+    fn leaving(system: System, switch: SwitchSpec, starts: &[[f64; 3]], by: f64) -> Table {
+        let runs = starts.iter().map(|start| (*start, Schedule::default())).collect();
+        let question = Leaving { system, switch, runs, tolerance: 1e-9, longest_step: 1.0, by };
+        question.compute(&Desk::quiet(), &()).unwrap().tables.remove(0)
+    }
+
+    /// On a straight line that passes the origin at time 1/2 and has x = 3 eps at 4/5; and one that passes it at no time.
+    #[test]
+    fn orbits_leave_at_three_widths() {
+        let line = cases::smooth(&["x", "y", "z"], "x", &["0.01", "1", "0"]);
+        for switch in [SwitchSpec::tanh(1e-3), SwitchSpec::hysteretic(1e-3, Relaxation::Single)] {
+            let starts = [[-0.005, -0.5, 0.0], [-0.005, -0.5, 1.0], [-0.005, -0.5, 1e-3]];
+            let table = leaving(line.clone(), switch, &starts, 1.0);
+            assert_eq!(table.numbers("eps"), [1e-3; 3]);
+            for (row, z) in [(0, 0.0), (2, 1e-3)] {
+                for (name, wanted) in [("left_x", 0.003), ("left_y", 0.3), ("left_z", z)] {
+                    assert!((table.numbers(name)[row] - wanted).abs() < 1e-9, "{name}: {}", table.numbers(name)[row]);
+                }
+            }
+            assert!(["left_x", "left_y", "left_z"].iter().all(|name| table.numbers(name)[1].is_nan()));
+            assert!(leaving(line.clone(), switch, &starts[..1], 0.7).numbers("left_x")[0].is_nan(), "too late");
+        }
+        let [a, b] = caricatures().map(|system| leaving(system, SwitchSpec::tanh(1e-2), &[[0.2, 0.0, -1.0]], 40.0));
+        for name in ["left_x", "left_y", "left_z"] {
+            let (a, b) = (a.numbers(name)[0], b.numbers(name)[0]);
+            assert!((a - b).abs() < 1e-6, "{name}: {a} {b}");
+        }
+    }
+
+    /// What happened in its columns, what did not blank; what was carried from the start before all that was made near the visit.
+    #[test]
+    fn a_passage_is_two_tables() {
+        let question = TwoFoldPassage {
+            system: Caricature::with_reinjection(0.1, 1e-5).into(),
+            transition: Transition::Tanh,
+            eps: 1e-3,
+            followed: PassageQuestion::far([0.2, 0.0, -1.0], 0.6, 80.0),
+        };
+        let found = Passage {
+            visit: Some(13.0),
+            leaving: Some([1.0, 2.0, 3.0]),
+            exit: Some([4.0, 5.0, 6.0]),
+            far: Some([7.0, 8.0, 9.0]),
+            growth: vec![passage::Disturbed { offset: -2.0, factors: [10.0, 11.0, 12.0] }],
+            carried: Some([13.0, 14.0, 15.0]),
+            ..Passage::default()
+        };
+        let tables = question.tables(&found);
+        let names = |t: &Table| t.columns.iter().map(|c| c.name.clone()).collect::<Vec<_>>().join(" ");
+        assert_eq!(
+            names(&tables[0]),
+            "eps t_visit left_x left_y left_z surface_x surface_y surface_z exit_x exit_y exit_z far_x far_y far_z"
+        );
+        let cells = |t: &Table, row: usize| {
+            t.rows()[row].iter().map(|c| format!("{:?}", c.value())).collect::<Vec<_>>().join(" ")
+        };
+        assert_eq!(cells(&tables[0], 0), "0.001 13.0 1.0 2.0 3.0 NaN NaN NaN 4.0 5.0 6.0 7.0 8.0 9.0");
+        assert_eq!(names(&tables[1]), "eps offset across along_y along_z");
+        assert_eq!(cells(&tables[1], 0), "0.001 -inf 13.0 14.0 15.0");
+        assert_eq!(cells(&tables[1], 1), "0.001 -2.0 10.0 11.0 12.0");
+        let nothing = question.tables(&Passage::default());
+        assert!(nothing[1].is_empty() && nothing[0].rows()[0][1..].iter().all(|c| c.value().is_nan()));
+    }
+
+    #[test]
+    fn a_filippov_motion_leaves_by_its_rule() {
+        let exit = ExitRule::AtOnce { side: Side::Plus };
+        let leaving = Leaving {
+            system: Caricature::with_reinjection(0.1, 1e-5).into(),
+            switch: SwitchSpec::Filippov { exit, funnel: None },
+            runs: vec![([0.2, 0.0, -1.0], Schedule::default())],
+            tolerance: 1e-9,
+            longest_step: 1.0,
+            by: 9.0,
+        };
+        let error = leaving.compute(&Desk::quiet(), &()).unwrap_err();
+        assert!(error.is_bad_question() && error.to_string().contains("exit rule's choice"), "{error}");
+    }
+}

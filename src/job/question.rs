@@ -113,3 +113,158 @@ impl JobError {
         matches!(self, JobError::Spec(_) | JobError::Dimension(_))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::analyse::digits::DigitsQuestion;
+    use crate::analyse::floquet::Plane;
+    use crate::analyse::limit::{AfterVisitQuestion, ConvergenceQuestion};
+    use crate::analyse::lyapunov;
+    use crate::analyse::passage::PassageQuestion;
+    use crate::analyse::reference;
+    use crate::integrate::filippov::{FunnelGrid, Settings};
+    use crate::integrate::{StepCap, Tolerance};
+    use crate::job::spec::{Observation, SwitchSpec};
+    use crate::job::sweep::Fate;
+    use crate::job::*;
+    use crate::system::{Caricature, System, Transition};
+
+    /// One of each kind: stores and files know it by this name, and it is what makes two questions of one shape different.
+    #[test]
+    fn every_kind_of_question_has_a_name_of_its_own() {
+        let system = System::from(Caricature::with_reinjection(0.1, 1e-5));
+        let run = cases::run(system.clone(), SwitchSpec::tanh(1e-3), 9.0, Observation::Times { every: 1.0 });
+        let (start, eps) = (vec![0.2, 0.0, -1.0], vec![1e-3]);
+        let grid =
+            FunnelGrid { shortest: 0.1, longest: 1.0, times: 3, horizon: 5.0, until_two_fold: true, per_step: 1 };
+        let tolerance = Tolerance { rtol: 1e-9, atol: 1e-9 };
+        let questions: [(AnyQuestion, &str); 12] = [
+            (Arc::new(Run(run.clone())), "run"),
+            (Arc::new(Classification::of(run.clone())), "classification"),
+            (Arc::new(Fate(Classification::of(run.clone()))), "fate"),
+            (Arc::new(PathComparison(run.clone(), run.clone())), "path-comparison"),
+            (Arc::new(Horizon { run: run.clone(), within: 1e-9 }), "horizon"),
+            (
+                Arc::new(LargestExponent {
+                    system: system.clone(),
+                    switch: run.switch,
+                    start: start.clone(),
+                    settings: lyapunov::Settings::default(),
+                }),
+                "largest-exponent",
+            ),
+            (
+                Arc::new(ClosedOrbit {
+                    system: system.clone(),
+                    switch: run.switch,
+                    start: start.clone(),
+                    settle: 0.0,
+                    plane: Plane { axis: 1, value: 0.0, upward: true },
+                    returns: None,
+                    tolerance,
+                    longest_return: 9.0,
+                    along: None,
+                }),
+                "closed-orbit",
+            ),
+            (
+                Arc::new(MethodDigits {
+                    system: system.clone(),
+                    eps: 1e-3,
+                    compared: DigitsQuestion {
+                        start: [0.2, 0.0, -1.0],
+                        section: reference::Plane { coordinate: 1, value: 0.0 },
+                        t_end: 9.0,
+                        near: 0.1,
+                        methods: Vec::new(),
+                        step_cap: StepCap::None,
+                        max_steps: 9,
+                    },
+                }),
+                "method-digits",
+            ),
+            (
+                Arc::new(SmoothingLimit {
+                    system: system.clone(),
+                    compared: ConvergenceQuestion {
+                        start: start.clone(),
+                        times: vec![1.0],
+                        eps: eps.clone(),
+                        settings: Settings::default(),
+                    },
+                }),
+                "smoothing-limit",
+            ),
+            (
+                Arc::new(AfterVisit {
+                    system: system.clone(),
+                    compared: AfterVisitQuestion {
+                        start,
+                        t_end: 9.0,
+                        eps,
+                        beyond: 0.1,
+                        grid,
+                        refinements: 1,
+                        finer: 3,
+                        settings: Settings::default(),
+                    },
+                }),
+                "after-visit",
+            ),
+            (
+                Arc::new(TwoFoldPassage {
+                    system: system.clone(),
+                    transition: Transition::Tanh,
+                    eps: 1e-3,
+                    followed: PassageQuestion::far([0.2, 0.0, -1.0], 0.1, 9.0),
+                }),
+                "two-fold-passage",
+            ),
+            (
+                Arc::new(Leaving {
+                    system,
+                    switch: run.switch,
+                    runs: Vec::new(),
+                    tolerance: 1e-9,
+                    longest_step: 1.0,
+                    by: 9.0,
+                }),
+                "leaving",
+            ),
+        ];
+        let mut keys = BTreeSet::new();
+        for (question, kind) in &questions {
+            assert_eq!(question.kind(), *kind);
+            assert!(question.json().as_object().is_some_and(|asked| !asked.is_empty()), "{kind}");
+            keys.extend([key(&**question).as_str().to_owned(), question_hash(&**question).as_str().to_owned()]);
+        }
+        assert_eq!(keys.len(), 2 * questions.len());
+    }
+
+    /// A key is of the kind, of what is asked, and of the version; a question's digest, of the first two.
+    #[test]
+    fn a_key_is_of_kind_question_and_version() {
+        #[derive(Debug)]
+        struct Asked(&'static str, u64);
+        impl Question for Asked {
+            fn kind(&self) -> &'static str {
+                self.0
+            }
+            fn json(&self) -> Value {
+                json!(self.1)
+            }
+            fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+                Err(JobError::Interrupted)
+            }
+        }
+        let text = |numerics: &str| format!("{{\"kind\":\"a\",{numerics}\"question\":1}}");
+        assert_eq!(question_hash(&Asked("a", 1)), Hash::of(text("").as_bytes()));
+        assert_eq!(key(&Asked("a", 1)), Hash::of(text(&format!("\"numerics\":\"{NUMERICS}\",")).as_bytes()));
+        for other in [Asked("b", 1), Asked("a", 2)] {
+            assert!(key(&other) != key(&Asked("a", 1)) && question_hash(&other) != question_hash(&Asked("a", 1)));
+        }
+    }
+}

@@ -478,11 +478,84 @@ mod tests {
             let recording = simulate(&run, &()).unwrap();
             assert!(!recording.data.is_empty());
             let answer = recording.to_answer(&run);
+            assert_eq!(recording.data.len(), answer.tables[0].len());
             assert_eq!(Recording::of_answer(&run, &answer).unwrap(), recording, "{:?}", run.switch);
             // And through the bytes that a store keeps.
             let tables = crate::job::encode::from_bits(&crate::job::encode::bits(&answer.tables)).unwrap();
             assert_eq!(Recording::of_answer(&run, &Answer { tables, ..answer }).unwrap(), recording);
         }
+    }
+
+    /// Every kind of event and every mode, on either side.
+    #[test]
+    fn every_event_comes_back_from_its_table() {
+        let run = run(SwitchSpec::Filippov { exit: ExitRule::All, funnel: None }, Observation::Path { chord: 1e-2 });
+        let rule = ExitRule::AfterTime { time: 0.3, side: Side::Minus };
+        let kinds = [Side::Plus, Side::Minus].into_iter().flat_map(|side| {
+            [
+                EventKind::Crossing { to: side },
+                EventKind::Landing { from: side },
+                EventKind::Grazing { side },
+                EventKind::LeftByTangency { to: side },
+                EventKind::StartedOnSurface,
+                EventKind::EnteredRepelling,
+                EventKind::TwoFoldReached { leg: 0.25, error: 1e-9 },
+                EventKind::Exit { to: side, time: 0.3, arc: 0.7, rule },
+                EventKind::ExitAtBoundary { to: side, time: 0.1, arc: 0.2, rule },
+            ]
+        });
+        let mode = |i: usize| MODES.get(i % 5).map(|(mode, _)| *mode);
+        let events: Vec<ModeEvent<3>> = kinds
+            .enumerate()
+            .map(|(i, kind)| ModeEvent {
+                t: i as f64,
+                state: SVector::from([i as f64, -1.0, 2.0]),
+                kind,
+                from: mode(i),
+                to: mode(i + 1),
+            })
+            .collect();
+        let piece = |(i, mode): (usize, Mode)| (mode, vec![Sample { t: i as f64, x: [1.0, 2.0, i as f64] }; i + 1]);
+        let pieces = MODES.iter().map(|(mode, _)| *mode).enumerate().map(piece).collect();
+        let recording = Recording {
+            data: Data::Motion(Motion { pieces, events }),
+            t: 20.0,
+            x: [1.0, 2.0, 3.0],
+            statistics: Statistics::default(),
+            most_steps_in_segment: 7,
+            stop: StopReason::SetValued,
+        };
+        let answer = recording.to_answer(&run);
+        assert_eq!(Recording::of_answer(&run, &answer).unwrap(), recording);
+        assert_eq!((recording.data.len(), answer.stop), (10, Stop::SetValued));
+    }
+
+    /// On a straight line through both surfaces: x = 0 at time 1, y = 0 at time 2.
+    #[test]
+    fn two_surfaces_have_their_signs_beside_each_point() {
+        let field = "plus = ['1', '2', '3']\nminus = ['1', '2', '3']\n";
+        let system =
+            crate::job::cases::of(&format!("states = ['x', 'y', 'z']\nh = 'x'\n{field}[second]\nh = 'y'\n{field}"));
+        let exit = ExitRule::AtOnce { side: Side::Plus };
+        let mut run = run(SwitchSpec::Filippov { exit, funnel: None }, Observation::Times { every: 0.5 });
+        (run.system, run.start, run.t_end) = (system, vec![-1.0, -4.0, 0.0], 3.0);
+        let answer = crate::job::simulate::answer(&run, &()).unwrap();
+        let points = &answer.tables[0];
+        for ((t, signs), z) in points.numbers("t").iter().zip(points.words("signs")).zip(points.numbers("z")) {
+            let sign = |h: f64| {
+                if h.abs() < 1e-6 {
+                    '0'
+                } else if h > 0.0 {
+                    '+'
+                } else {
+                    '-'
+                }
+            };
+            assert_eq!(signs, format!("{}{}", sign(t - 1.0), sign(t - 2.0)), "at {t}");
+            assert!((z - 3.0 * t).abs() < 1e-9);
+        }
+        let events: Vec<&str> = answer.table("events").unwrap().words("signs").collect();
+        assert_eq!(events, ["0-", "+0"]);
     }
 
     #[test]

@@ -97,6 +97,10 @@ mod tests {
     use crate::system::{Definition, System};
 
     fn ending(passages: &[[f64; 2]]) -> Ending {
+        ending_of(&passages.iter().map(|p| (*p, "up")).collect::<Vec<_>>())
+    }
+
+    fn ending_of(passages: &[([f64; 2], &str)]) -> Ending {
         let text = "states = ['x', 'y']\nh = 'x'\nplus = ['1', '1']\nminus = ['1', '1']";
         let system = System::new(Definition::from_toml(text, "f").unwrap());
         let run = RunSpec {
@@ -110,11 +114,39 @@ mod tests {
         };
         let names = ["t", "x", "y"].map(Column::numbers);
         let mut table = Table::new("section", names.into_iter().chain([Column::words("direction")]));
-        for [t, x] in passages {
-            table.push([(*t).into(), (*x).into(), 0.0.into(), "up".into()]);
+        for ([t, x], direction) in passages {
+            table.push([(*t).into(), (*x).into(), 0.0.into(), (*direction).into()]);
         }
         let answer = Answer::of_tables(vec![table]).with_fact("state", &[3.0, 4.0]);
         Ending::of(&run, &answer, 1e-3).unwrap()
+    }
+
+    /// By hand: a triangle of sides 3, 4, 5, in shares of 1 + 3.
+    #[test]
+    fn distances_are_in_shares_of_the_first() {
+        assert_eq!(distance(&[3.0, 0.0], &[0.0, -4.0]), 1.25);
+        assert_eq!(distance(&[-3.0, 0.5], &[-3.0, 0.5]), 0.0);
+        let quiet = |x: f64| Ending::Quiet { state: vec![3.0, x] };
+        assert!(quiet(1.0).is_like(&quiet(1.3), 0.1) && !quiet(1.0).is_like(&quiet(1.5), 0.1));
+    }
+
+    /// A turn counts when it came back twice, in passages of the last one's direction after half of the time (50).
+    #[test]
+    fn a_turn_is_seen_three_times() {
+        let turns =
+            |from: f64, n: usize| -> Vec<[f64; 2]> { (0..n).map(|k| [from + k as f64, (k % 3) as f64]).collect() };
+        assert_eq!(ending(&turns(51.0, 9)).word(), "period 3");
+        for n in [3, 4, 5, 6, 7, 8] {
+            assert_eq!(ending(&turns(51.0, n)), Ending::Irregular, "{n} passages");
+        }
+        // The ones before half of the time do not count: five and four.
+        assert_eq!(ending(&turns(46.0, 9)), Ending::Irregular);
+        let Ending::Periodic { points } = ending(&turns(51.0, 10)) else { panic!() };
+        assert_eq!(points, [[1.0, 0.0], [2.0, 0.0], [0.0, 0.0]], "the last turn");
+        // One like the last in the other direction is another point.
+        let down = |k: usize| if k % 2 == 0 { "up" } else { "down" };
+        let passages: Vec<([f64; 2], &str)> = (0..9).map(|k| ([51.0 + k as f64, (k % 2) as f64], down(k))).collect();
+        assert_eq!(ending_of(&passages).word(), "period 1");
     }
 
     #[test]

@@ -565,3 +565,167 @@ impl<F: VectorField<N>, const N: usize> WithStepper<N> for Drive<'_, F, N> {
         Ok(drive_part(field, x0, &course, part, &mut stepper, &mut observer, watch)?.within_budget()?)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::filippov::Side;
+    use crate::integrate::{Kick, KickLaw, Schedule};
+    use crate::job::cases;
+    use crate::system::Relaxation;
+
+    const EVERY: Observation = Observation::Times { every: 0.25 };
+
+    fn switches() -> [SwitchSpec; 3] {
+        let exit = ExitRule::AtOnce { side: Side::Plus };
+        let hysteretic = SwitchSpec::hysteretic(1e-2, Relaxation::Single);
+        [SwitchSpec::tanh(1e-2), hysteretic, SwitchSpec::Filippov { exit, funnel: None }]
+    }
+
+    /// What is given away in parts: all rows, and how many each part had.
+    fn in_parts(run: &RunSpec) -> (Streamed, Vec<Vec<crate::job::Entry>>, Vec<usize>) {
+        let (mut rows, mut parts) = (Vec::new(), Vec::new());
+        let mut take = |table: &Table| {
+            parts.push(table.len());
+            rows.extend(table.rows());
+            true
+        };
+        (stream(run, &mut take, &()).unwrap(), rows, parts)
+    }
+
+    /// Decays at the rates 1, 2, 3 ...: as a whole, given away in parts, and computed in parts.
+    #[test]
+    fn runs_have_one_to_eight_states() {
+        for n in 1..=8 {
+            for switch in switches() {
+                let run = cases::run(cases::decays(n), switch, 1.0, EVERY);
+                let whole = answer(&run, &()).unwrap();
+                let points = &whole.tables[0];
+                assert_eq!(points.numbers("t"), [0.0, 0.25, 0.5, 0.75, 1.0]);
+                for k in 1..=n {
+                    let state = points.numbers(&format!("a{k}"));
+                    let right = |(t, x): (&f64, &f64)| (x - (-(k as f64) * t).exp()).abs() < 1e-10;
+                    assert!(points.numbers("t").iter().zip(state).all(right), "{n} {switch:?}: {state:?}");
+                }
+                let state: Vec<f64> = whole.fact("state").unwrap();
+                assert_eq!((state.len(), state[n - 1]), (n, points.numbers(&format!("a{n}"))[4]));
+                let (end, rows, parts) = in_parts(&run);
+                // Blanks are not equal to each other, but look alike.
+                assert_eq!((format!("{rows:?}"), parts), (format!("{:?}", points.rows()), vec![5]));
+                assert_eq!((end.t, end.rows, end.stop), (1.0, 5, Stop::Finished));
+                assert_eq!(Some(&end.statistics), whole.statistics.as_ref());
+                if let SwitchSpec::Filippov { .. } = switch {
+                    continue;
+                }
+                // a1 is 1/2 at ln 2, between the first restart and the second.
+                let schedule = Schedule { restart_every: Some(0.4), kick: None };
+                let observe = Observation::Section { coordinate: 0, value: 0.5 };
+                let run = RunSpec { schedule, observe, ..run };
+                let (rows, t, state) = part(&run, Part { from: 0, to: 2 }, &()).unwrap();
+                assert!((rows.numbers("t")[0] - 2.0_f64.ln()).abs() < 1e-8 && rows.len() == 1 && t == 0.8, "{rows:?}");
+                assert_eq!(state.len(), n + usize::from(matches!(switch, SwitchSpec::Hysteretic { .. })));
+                assert!((state[n - 1] - (-0.8 * n as f64).exp()).abs() < 1e-10);
+            }
+        }
+        for switch in switches() {
+            let many = cases::run(cases::decays(9), switch, 1.0, Observation::Section { coordinate: 0, value: 0.5 });
+            let said = [
+                answer(&many, &()).unwrap_err(),
+                part(&many, Part::WHOLE, &()).unwrap_err(),
+                stream(&many, &mut |_| true, &()).unwrap_err(),
+            ];
+            assert!(said.iter().all(|e| e.to_string().contains("up to eight states")), "{said:?}");
+        }
+    }
+
+    #[test]
+    fn recordings_are_of_three_states() {
+        let section = Observation::Section { coordinate: 0, value: 0.5 };
+        let run = |n: usize| cases::run(cases::decays(n), SwitchSpec::tanh(1e-2), 10.0, section);
+        for n in [2, 4] {
+            for found in [simulate(&run(n), &()), simulate_until(&run(n), &|_| true, &())] {
+                assert!(found.unwrap_err().to_string().contains("three states are looked at"));
+            }
+        }
+        let (whole, all) = (simulate(&run(3), &()).unwrap(), simulate_until(&run(3), &|_| false, &()).unwrap());
+        assert_eq!(whole, all);
+        // a2 = 1/16 at 2 ln 2: the first step's end after that.
+        let until = simulate_until(&run(3), &|x| x[1] < 0.0625, &()).unwrap();
+        assert_eq!((until.stop, until.data.len()), (StopReason::Observer, 1));
+        assert!(until.x[1] < 0.0625 && until.t < 2.0 && whole.t == 10.0);
+    }
+
+    /// A ball that falls to x = 0 from either side, passing once in two units of time: parts are cut inside pieces of its motion.
+    #[test]
+    fn parts_are_the_whole() {
+        let ball = cases::of("states = ['x', 'v']\nh = 'x'\nplus = ['v', '-1']\nminus = ['v', '1']");
+        let turning = cases::smooth(&["x", "v"], "x + 9", &["v", "-x"]);
+        let [tanh, _, filippov] = switches();
+        let times = Observation::Times { every: 1e-3 };
+        let chord = |chord| Observation::Path { chord };
+        for (system, switch, observe, pieces) in [
+            (turning.clone(), tanh, times, 0),
+            (turning, tanh, chord(3e-8), 0),
+            (ball.clone(), filippov, times, 10),
+            (ball, filippov, chord(1e-7), 10),
+        ] {
+            let start = vec![0.5, 0.0];
+            let run = RunSpec { start, ..cases::run(system, switch, 20.0, observe) };
+            let whole = answer(&run, &()).unwrap();
+            let (end, rows, parts) = in_parts(&run);
+            let (last, full) = parts.split_last().unwrap();
+            assert!(full.len() >= 2 && full.iter().all(|n| (PART..3 * PART).contains(n)) && *last < PART, "{parts:?}");
+            assert!(whole.tables[0].integers("piece").last().is_none_or(|last| *last == pieces));
+            // Blanks are not equal to each other, but look alike.
+            assert!(format!("{rows:?}") == format!("{:?}", whole.tables[0].rows()), "{observe:?}");
+            assert_eq!((end.rows as usize, end.stop), (rows.len(), Stop::Finished));
+            // Enough is enough.
+            let mut parts = 0;
+            let mut take = |_: &Table| {
+                parts += 1;
+                parts < 2
+            };
+            let cut = stream(&run, &mut take, &()).unwrap();
+            assert_eq!(cut.stop, Stop::Found);
+            assert!(cut.t < end.t && cut.rows < end.rows);
+        }
+    }
+
+    /// Passages of a circle at unit speed through y = 0: one each pi.
+    #[test]
+    fn sections_are_given_away_in_parts() {
+        let circle = cases::smooth(&["x", "y"], "x + 9", &["x*(1 - x*x - y*y) - y", "y*(1 - x*x - y*y) + x"]);
+        let section = Observation::Section { coordinate: 1, value: 0.0 };
+        let mut run = cases::run(circle, SwitchSpec::tanh(1e-2), 30_000.0, section);
+        run.method.tolerance = crate::integrate::Tolerance { rtol: 1e-3, atol: 1e-3 };
+        let (end, rows, parts) = in_parts(&run);
+        assert!(parts.len() == 2 && parts[0] == PART && end.rows as usize == rows.len(), "{parts:?}");
+        assert!(rows == answer(&run, &()).unwrap().tables[0].rows());
+    }
+
+    /// A kick is two points of a path at one time, as far from each other as it is large.
+    #[test]
+    fn kicks_are_seen_in_a_path() {
+        let kick = Some(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 1, stream: 2 });
+        let mut run = cases::run(cases::decays(3), SwitchSpec::tanh(1e-2), 1.0, Observation::Path { chord: 1.0 });
+        run.schedule = Schedule { restart_every: None, kick };
+        let path = &answer(&run, &()).unwrap().tables[0];
+        let t = path.numbers("t");
+        let kicked: Vec<usize> = (1..t.len()).filter(|k| t[*k] == t[k - 1]).collect();
+        assert_eq!(kicked.len(), 3, "{t:?}");
+        for (k, time) in kicked.into_iter().zip([0.3, 0.6, 0.9]) {
+            let apart = ["a1", "a2", "a3"].map(|name| path.numbers(name)[k] - path.numbers(name)[k - 1]);
+            let size = apart.iter().map(|d| d * d).sum::<f64>().sqrt();
+            assert!((t[k] - time).abs() < 1e-12 && (size - 1e-3).abs() < 1e-12, "{size} at {}", t[k]);
+        }
+    }
+
+    #[test]
+    fn a_funnel_has_no_parts() {
+        let funnel = FunnelSpec { shortest: 0.1, longest: 1.0, times: 3, horizon: 5.0, until_two_fold: true };
+        let switch = SwitchSpec::Filippov { exit: ExitRule::All, funnel: Some(funnel) };
+        let run = cases::run(cases::decays(3), switch, 1.0, Observation::Path { chord: 1e-2 });
+        let said = stream(&run, &mut |_| true, &()).unwrap_err().to_string();
+        assert!(said.contains("not given away in parts"), "{said}");
+    }
+}

@@ -269,6 +269,43 @@ mod tests {
         assert_eq!(store.entries().unwrap(), []);
     }
 
+    /// An entry is its question's by its key, its kind, and what is asked: each by itself.
+    #[test]
+    fn an_entry_is_its_questions_in_everything() {
+        #[derive(Debug)]
+        struct Cube(f64);
+        impl Question for Cube {
+            fn kind(&self) -> &'static str {
+                "cube"
+            }
+            fn json(&self) -> Value {
+                Square(self.0).json()
+            }
+            fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+                Square(self.0).compute(desk, watch)
+            }
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::new(folder.path());
+        let (question, answer) = (Square(3.0), Answer::of_tables(Vec::new()).with_fact("of", &3.0));
+        let (ours, others) = (key(&question), key(&Square(4.0)));
+        let another = |kept: Kept| matches!(kept, Kept::Damaged(why) if why.contains("another question"));
+        store.put(&ours, &Cube(3.0), &answer).unwrap();
+        assert!(another(store.get(&ours, &question)), "of another kind");
+        store.put(&ours, &Square(4.0), &answer).unwrap();
+        assert!(another(store.get(&ours, &question)), "another is asked");
+        store.put(&others, &question, &answer).unwrap();
+        fs::copy(store.path(&others), store.path(&ours)).unwrap();
+        assert!(another(store.get(&ours, &question)), "under another key");
+        store.put(&ours, &question, &answer).unwrap();
+        assert_eq!(store.get(&ours, &question), Kept::Answer(answer));
+        // What is there and no file cannot be read; it is not nothing.
+        fs::remove_file(store.path(&others)).unwrap();
+        assert_eq!(store.get(&others, &question), Kept::Nothing);
+        fs::create_dir(store.path(&others)).unwrap();
+        assert!(matches!(store.get(&others, &question), Kept::Damaged(_)));
+    }
+
     #[test]
     fn what_was_interrupted_is_not_kept() {
         #[derive(Debug)]

@@ -299,6 +299,9 @@ mod tests {
             table.push([x.into(), mode.into(), Entry::Integer(n)]);
         }
         assert_eq!(table.len(), 3);
+        assert!(!table.is_empty() && table.columns.iter().all(|c| !c.is_empty() && c.len() == 3));
+        let none = Table::new("t", [Column::numbers("x")]);
+        assert!(none.is_empty() && none.columns[0].is_empty() && Table::new("t", []).is_empty());
         assert_eq!(table.numbers("x"), [0.5, 1.5, 2.5]);
         assert_eq!(table.integers("n"), [1, 2, 3]);
         assert_eq!(table.words("mode").collect::<Vec<_>>(), ["up", "down", "up"]);
@@ -306,6 +309,9 @@ mod tests {
         assert!(table.numbers("mode").is_empty() && table.column("y").is_none());
         let Cells::Words(words) = &table.columns[1].cells else { panic!() };
         assert_eq!(words.vocabulary, ["up", "down"]);
+        // Words are the same if they are in the same rows, and first appear in the same order.
+        let same = |codes: [u32; 3], a: &str| Words::new(vec![a.into(), "down".into()], codes.to_vec()) == *words;
+        assert!(same([0, 1, 0], "up") && !same([0, 1, 1], "up") && !same([0, 1, 0], "left"));
     }
 
     #[test]

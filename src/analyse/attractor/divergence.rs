@@ -180,4 +180,74 @@ mod tests {
             assert_eq!(distance(&points[i], &points[j]), least);
         }
     }
+
+    #[test]
+    fn rates_are_per_return_and_per_time() {
+        // Doubling of the circle, exactly ln 2 a return, as a curve in the plane; the digits of chance keep it from ending at 0.
+        let mut r = RandomStream::new(9, 0);
+        let mut x: f64 = 0.3;
+        let orbit: Vec<[f64; 2]> = (0..4000)
+            .map(|_| {
+                x = (2.0 * x + 1e-9 * r.uniform()).fract();
+                let a = std::f64::consts::TAU * x;
+                [crate::num::elementary::cos(a) - 7.0, 3.0 + crate::num::elementary::sin(a)]
+            })
+            .collect();
+        let d = divergence(&orbit, 2.5).unwrap();
+        assert!((d.per_return - std::f64::consts::LN_2).abs() < 0.03, "{d:?}");
+        assert_eq!(d.per_time, d.per_return / 2.5);
+        // Neighbours are some 5e-4 apart, and distances saturate at 0.19: 2^8.6 times that.
+        assert!((7..=10).contains(&d.returns_fitted), "{d:?}");
+        assert!(d.standard_error > 0.0 && d.standard_error < 0.05, "{d:?}");
+    }
+
+    #[test]
+    fn points_that_return_exactly_are_passed_over() {
+        let (mut x, mut y) = (0.1, 0.1);
+        let mut orbit: Vec<[f64; 2]> = (0..3000)
+            .map(|_| {
+                (x, y) = (1.0 - 1.4 * x * x + y, 0.3 * x);
+                [x, y]
+            })
+            .collect();
+        let before = divergence(&orbit, 1.0).unwrap();
+        orbit.extend_from_within(100..140);
+        let after = divergence(&orbit, 1.0).unwrap();
+        assert!((after.per_return - before.per_return).abs() < 0.02, "{before:?} {after:?}");
+    }
+
+    #[test]
+    fn two_far_points_change_nothing() {
+        let mut r = RandomStream::new(3, 0);
+        let mut points: Vec<[f64; 2]> = (0..3000).map(|_| [r.uniform(), r.uniform()]).collect();
+        (points[0], points[1]) = ([20.0, 20.0], [20.0, 20.0]);
+        assert!(divergence(&points, 1.0).unwrap().skill.abs() < 0.1);
+    }
+
+    #[test]
+    fn nearest_is_nearest_in_any_box() {
+        let mut r = RandomStream::new(5, 0);
+        for (low, size) in [
+            ([0.1, -0.2], [1.0, 2.0]),
+            ([-7.0, 4.0], [0.1, 1.0]),
+            ([3.0, -9.0], [1.0, 0.3]),
+            ([0.0, 0.0], [300.0, 2000.0]),
+        ] {
+            let points: Vec<[f64; 2]> =
+                (0..300).map(|_| std::array::from_fn(|k| low[k] + size[k] * r.uniform())).collect();
+            let n = points.len() - HORIZON;
+            let pairs = nearest(&points).unwrap();
+            assert_eq!(pairs.len(), n);
+            for (i, j) in pairs {
+                let others = (0..n).filter(|k| k.abs_diff(i) > THEILER);
+                let least = others.map(|k| distance(&points[i], &points[k])).fold(f64::INFINITY, f64::min);
+                assert_eq!(distance(&points[i], &points[j]), least);
+            }
+        }
+        // All in one place, or one nowhere: no box.
+        assert_eq!(nearest(&[[1.0, 1.0]; 50]), None);
+        let mut broken = [[1.0, 1.0]; 50];
+        broken[3] = [f64::INFINITY, 0.0];
+        assert_eq!(nearest(&broken), None);
+    }
 }

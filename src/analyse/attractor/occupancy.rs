@@ -240,7 +240,7 @@ impl Grid {
     fn cell(&self, q: &[f64; 2]) -> usize {
         let side = self.cells + 2;
         let [a, b]: [usize; 2] = std::array::from_fn(|k| {
-            // The upper edge of the box belongs to its last cell.
+            // The upper edge of the box belongs to its last cell, and what is less than a cell beyond it.
             let c = ((q[k] - self.low[k]) / self.width[k]).floor();
             if c < 0.0 {
                 0
@@ -307,5 +307,91 @@ mod tests {
         let full: Vec<_> = (0..3).map(|k| sea(40_000, 1.0, k)).collect();
         assert_eq!(contrast(&sea(4000, 1.0, 8), &full, &Thresholds::default()), None);
         assert_eq!(contrast(&sea(4000, 1.0, 8), &full[..1], &Thresholds::default()), None);
+    }
+
+    #[test]
+    fn directions_are_kept_apart() {
+        // Upwards the hole is empty, downwards it is as full as the rest: on each other they would have no island.
+        let half = |n: usize, stream: u64| -> Vec<SectionPoint> {
+            let open = sea(n, 1.0, stream).into_iter().filter(|p| !p.upward);
+            sea(n, 0.0, stream + 100).into_iter().filter(|p| p.upward).chain(open).collect()
+        };
+        let free: Vec<_> = (0..4).map(|k| half(20_000, k)).collect();
+        let found = contrast(&half(6000, 9), &free, &Thresholds::default()).unwrap();
+        assert!(found.value > 0.9 && (found.island_share - 0.045).abs() < 0.015, "{found:?}");
+        assert!((found.points, found.free_runs) == (6000, 4) && found.outside < 0.02, "{found:?}");
+    }
+
+    #[test]
+    fn what_lies_outside_is_told() {
+        let free: Vec<_> = (0..4).map(|k| sea(20_000, 0.0, k)).collect();
+        let mut section = sea(4000, 0.0, 9);
+        // A quarter of the points far away, in every direction.
+        for (k, p) in section.iter_mut().step_by(4).enumerate() {
+            p.u = [[9.0, 0.0], [-9.0, 0.0], [0.3, 9.0], [0.3, -9.0]][k % 4];
+        }
+        let found = contrast(&section, &free, &Thresholds::default()).unwrap();
+        assert!((found.outside - 0.25).abs() < 0.02 && found.value > 0.95, "{found:?}");
+    }
+
+    #[test]
+    fn a_grid_has_a_ring_of_cells_for_all_that_is_outside() {
+        // 4 by 4 cells of 1 by 10 from (-2, 20), in a ring: rows of six.
+        let grid = Grid::around(&[[-2.0, 60.0], [2.0, 20.0], [0.0, 30.0]], 4);
+        for (q, row, column) in [
+            ([-2.0, 20.0], 1, 1),
+            ([-1.5, 35.0], 1, 2),
+            ([0.5, 59.0], 3, 4),
+            // The upper edges belong to the last cells.
+            ([2.0, 60.0], 4, 4),
+            ([-9.0, 25.0], 0, 1),
+            ([9.0, 25.0], 5, 1),
+            ([-1.5, 0.0], 1, 0),
+            ([-1.5, 99.0], 1, 5),
+        ] {
+            assert_eq!(grid.cell(&q), row * 6 + column, "{q:?}");
+        }
+        assert_eq!(grid.count(&[[0.5, 59.0], [0.5, 51.0], [2.0, 60.0]]).iter().sum::<u32>(), 3);
+        assert_eq!(grid.count(&[[0.5, 59.0], [0.5, 51.0]])[3 * 6 + 4], 2);
+    }
+
+    #[test]
+    fn islands_are_the_holes_that_are_large_enough() {
+        // Visited cells of a picture, on a grid of 8 by 8: a hole of four cells, one of two, and a bay that is open.
+        let picture = ["########", "#..##..#", "#..#####", "########", "##.....#", "####...#", "########", "###.####"];
+        let cells = |wanted: u8| -> Vec<[f64; 2]> {
+            let all = (0..64).map(|k| (k / 8, k % 8)).filter(|(a, b)| picture[*a].as_bytes()[*b] == wanted);
+            all.map(|(a, b)| [a as f64 + 0.5, b as f64 + 0.5]).collect()
+        };
+        let grid = Grid { low: [0.0; 2], width: [1.0; 2], cells: 8 };
+        let visited = cells(b'#');
+        assert_eq!(visited.len(), 64 - 4 - 2 - 8 - 1);
+        for (fewest, islands) in [(1, 14.0), (2, 14.0), (3, 12.0), (4, 12.0), (5, 8.0), (8, 8.0)] {
+            let map = Map::of(&grid, &visited, fewest).unwrap();
+            assert_eq!(map.area, [islands, 49.0], "{fewest}");
+            // The open bay is outside, the others are islands or nothing.
+            assert_eq!(map.counts(&grid, &cells(b'.')), [islands, 0.0]);
+            assert_eq!(map.counts(&grid, &visited), [0.0, 49.0]);
+            // Two points in islands and one in the sea, by area.
+            let want = 1.0 - (2.0 / islands) / (1.0 / 49.0);
+            assert!((map.of_counts([2.0, 1.0]).unwrap() - want).abs() < 1e-12);
+        }
+        assert!(Map::of(&grid, &visited, 9).is_none());
+    }
+
+    #[test]
+    fn bands_are_visited_in_turn() {
+        let mut r = RandomStream::new(4, 0);
+        let places = [[0.0, 0.0], [1.0, 0.2], [0.4, 1.0]];
+        let mut near = |i: usize| places[i].map(|c| c + 0.05 * r.uniform());
+        let th = Thresholds::default();
+        let in_turn: Vec<[f64; 2]> = (0..300).map(|i| near(i % 3)).collect();
+        assert_eq!(bands(&in_turn, &th), 3);
+        assert_eq!(bands(&(0..300).map(|i| near(i % 2)).collect::<Vec<_>>(), &th), 2);
+        // Two here, one there, and back: no order by threes; by fours there is.
+        assert_eq!(bands(&(0..300).map(|i| near([0, 0, 1, 2][i % 4])).collect::<Vec<_>>(), &th), 1);
+        assert_eq!(bands(&(0..300).map(|i| near((i / 2) % 3)).collect::<Vec<_>>(), &th), 1);
+        // Thirty of each are asked for.
+        assert_eq!((bands(&in_turn[..89], &th), bands(&in_turn[..90], &th), bands(&[], &th)), (1, 3, 1));
     }
 }

@@ -217,3 +217,58 @@ pub struct Evidence {
 fn number_or_none<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn verdicts_read_as_they_should() {
+        let cycle = Cycle {
+            period: 3,
+            points: Vec::new(),
+            duration: 6.0,
+            radius: 0.25,
+            captured_at: 120.4,
+            settled_at: None,
+            approach: None,
+            rotation: None,
+        };
+        let settled = Cycle { settled_at: Some(250.0), ..cycle.clone() };
+        let rate = Rate { per_time: 3e-5, standard_error: 1e-7, from: 0.0, to: 1.0 };
+        let falling = Cycle { approach: Some(rate), ..cycle.clone() };
+        let lyapunov = Some(Exponent { value: 0.5, standard_error: 0.0125, duration: 1e3 });
+        let contrast = super::super::Contrast {
+            value: 0.25,
+            interval: [0.2, 0.3],
+            free: [0.9, 0.95],
+            free_runs: 3,
+            island_share: 0.1,
+            outside: 0.0,
+            points: 1000,
+        };
+        for (verdict, text) in [
+            (Verdict::Periodic(cycle.clone()), "period 3, captured at t = 120"),
+            (Verdict::Periodic(settled), "period 3, captured at t = 120, settled at t = 250"),
+            (
+                Verdict::Spiralling(falling),
+                "spiralling onto period 3, captured at t = 120, not settled, radius 0.250, rate 3.0e-5",
+            ),
+            (Verdict::QuasiPeriodic(cycle.clone()), "quasi-periodic around period 3 since t = 120, radius 0.250"),
+            (Verdict::Chaotic { lyapunov, bands: 1 }, "chaotic, largest exponent 0.5000 +- 0.0125"),
+            (Verdict::Undecided { lyapunov: None }, "undecided"),
+            (
+                Verdict::Noisy { contrast: None, around: Some(cycle) },
+                "noisy, in clouds of radius 2.5e-1 around period 3",
+            ),
+            (
+                Verdict::Noisy { contrast: Some(contrast), around: None },
+                "noisy, islands 0.75 [0.70, 0.80] times as dense as the sea, at most 0.10 without noise",
+            ),
+            (Verdict::Escaped { last_crossing: 7.4 }, "left the section at t = 7"),
+            (Verdict::TooFew { points: 12 }, "too few crossings (12)"),
+        ] {
+            assert_eq!(verdict.to_string(), text);
+        }
+    }
+}

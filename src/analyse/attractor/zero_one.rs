@@ -106,4 +106,57 @@ mod tests {
     fn too_short_is_no_answer() {
         assert_eq!(zero_one(&[1.0; 99]), None);
     }
+
+    #[test]
+    fn a_slow_oscillation_and_a_shifted_one_are_regular() {
+        // A seventh of the slowest frequency tried; with a mean a hundred times its size.
+        for shift in [0.0, 100.0] {
+            let phi: Vec<f64> = (0..1000).map(|i| shift + 0.01 * sin(0.15 * f64::from(i))).collect();
+            assert!(zero_one(&phi).unwrap().abs() < 0.1, "{shift}: {:?}", zero_one(&phi));
+        }
+    }
+
+    #[test]
+    fn correlations_of_short_sequences_by_hand() {
+        assert!((correlation_with_index(&[5.0, 7.0, 9.0, 11.0]) - 1.0).abs() < 1e-15);
+        assert!((correlation_with_index(&[3.0, 2.0, 1.0]) + 1.0).abs() < 1e-15);
+        assert_eq!(correlation_with_index(&[1.0, -1.0, -1.0, 1.0]), 0.0);
+        // Deviations -1.5, -0.5, 0.5, 1.5 and -0.75, 0.25, 1.25, -0.75 have the products' sum 0.5.
+        let want = 0.5 / sqrt(5.0 * 2.75);
+        assert!((correlation_with_index(&[0.0, 1.0, 2.0, 0.0]) - want).abs() < 1e-15);
+        assert_eq!(correlation_with_index(&[4.0; 5]), 0.0);
+    }
+
+    #[test]
+    fn it_is_what_its_definition_says() {
+        // Displacements as sums over the stretch itself, squared and averaged; the median over the same frequencies.
+        let mut x = 0.1;
+        let mut chaotic = || {
+            x = 3.8 * x * (1.0 - x);
+            x
+        };
+        let phi: Vec<f64> = (0..120).map(|i| 3.0 + sin(1.3 * f64::from(i)) + 0.4 * chaotic()).collect();
+        let average = phi.iter().sum::<f64>() / 120.0;
+        let mut random = RandomStream::new(0x0001, 0x0001);
+        let mut ks: Vec<f64> = (0..FREQUENCIES)
+            .map(|_| {
+                let c = random.uniform_in(0.2 * std::f64::consts::PI, 0.8 * std::f64::consts::PI);
+                let displacement = |m: usize| -> f64 {
+                    let square = |j: usize| {
+                        let part = |wave: fn(f64) -> f64| -> f64 {
+                            (j..j + m).map(|k| (phi[k] - average) * wave((k + 1) as f64 * c)).sum()
+                        };
+                        let (p, q) = (part(cos), part(sin));
+                        p * p + q * q
+                    };
+                    (0..108).map(square).sum::<f64>() / 108.0
+                };
+                correlation_with_index(&(1..=12).map(displacement).collect::<Vec<_>>())
+            })
+            .collect();
+        let want = median(&mut ks);
+        let got = zero_one(&phi).unwrap();
+        assert!((got - want).abs() < 1e-9 && want > 0.02 && want < 0.98, "{got} {want}");
+        assert_eq!((zero_one(&phi[..100]).is_some(), zero_one(&[2.0; 100])), (true, Some(0.0)));
+    }
 }

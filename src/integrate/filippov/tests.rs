@@ -4,9 +4,10 @@
 use nalgebra::{SVector, vector};
 
 use super::flow::desingularised;
-use super::two_fold::SlidingAtTwoFold;
+use super::two_fold::{AlongCurve, SlidingAtTwoFold};
 use super::*;
 use crate::integrate::Watch;
+use crate::integrate::step::Interpolant;
 use crate::num::Elementary;
 use crate::num::random::RandomStream;
 use crate::system::{Bound, PiecewiseSmooth, System};
@@ -261,6 +262,12 @@ fn the_local_analysis_is_that_of_the_field_itself() {
                     "no farther than the limit"
                 );
             }
+            // As a step its ends are those of its times, whichever side of the two-fold they are on.
+            let [from, to] = [curve.time(-0.5 * curve.radius), curve.time(0.25 * curve.radius)];
+            let step = AlongCurve { curve, from, to, limit: curve.radius };
+            for (theta, part) in [(0.0, -0.5), (-from / (to - from), 0.0), (1.0, 0.25)] {
+                assert!((step.at(theta) - curve.at(part * curve.radius)).amax() < 1e-9, "{theta}");
+            }
             // Where the curve may be used it is in the sliding regions.
             let limit = local.departure_limit(&s, curve).unwrap();
             assert!(limit <= curve.radius);
@@ -269,7 +276,7 @@ fn the_local_analysis_is_that_of_the_field_itself() {
             let repelling = curve.rate > 0.0;
             let (time, error) = local.time_to_arrive(&s, &curve.at(on), repelling).unwrap();
             near(time / curve.time(on), -1.0, 1e-3, "time to arrive");
-            near(error, time.abs() * on / local.radius, 1e-2, "its error");
+            near(error / (time.abs() * on / local.radius), 1.0, 1e-2, "its error");
             let other = [weak, strong][1 - curve.index];
             let beside = curve.at(on) + other.vector * across;
             if other.rate * curve.rate > 0.0 {
@@ -284,6 +291,57 @@ fn the_local_analysis_is_that_of_the_field_itself() {
         }
     }
     assert!(sliding > 10 && spirals > 3 && backwards > 2, "{sliding} {spirals} {backwards}");
+}
+
+/// Its invariant curve is the line y = z in the surface, along which F = -y (0, 1, 1); L+h = -y (1 + 2 y) is zero there at the two-fold and, after it, at y = -1/2.
+#[derive(Clone)]
+struct Straight;
+
+impl PiecewiseSmooth<3> for Straight {
+    fn switching<S: Elementary>(&self, x: &SVector<S, 3>) -> S {
+        x[0]
+    }
+    fn plus<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+        // f+ = -(1, 1) - (1 + 2 y) f-, so that q f+ - p f- = -y (1, 1) on the line, where p = -y (1 + 2 y) and q = y.
+        let rest = S::one() + x[1].scale(2.0);
+        let along = S::from_f64(-1.0);
+        vector![-(x[1] * rest), along - rest.scale(0.5), along - rest.scale(-0.25)]
+    }
+    fn minus<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+        vector![x[2], S::from_f64(0.5), S::from_f64(-0.25)]
+    }
+}
+
+#[test]
+fn a_curve_is_used_only_where_it_slides() {
+    let local = SlidingAtTwoFold::near(&Straight, &vector![0.0, 0.01, 0.02]).unwrap();
+    let curve = local.through.as_ref().unwrap();
+    let zero = std::f64::consts::FRAC_1_SQRT_2;
+    assert!(curve.radius > zero, "the series itself knows of no fold: {}", curve.radius);
+    let limit = local.departure_limit(&Straight, curve).unwrap();
+    assert!(limit < zero && limit > 0.4 * zero, "{limit}");
+}
+
+/// A two-fold with rates -0.3, along the sliding direction, and -0.6: from order 2 on the curve has no series.
+#[test]
+fn a_resonance_ends_the_series() {
+    let square = [0.0, 0.0, 0.1, 0.0];
+    let field = |slopes: [f64; 2], values: [f64; 2]| {
+        [slopes[0], slopes[1], square[2], square[3], values[0], values[1], 0.0, 0.0]
+    };
+    let system = Curved {
+        centre: [0.0; 3],
+        bend: 0.0,
+        fields: [field([1.0, 0.0], [-0.15, -0.45]), field([0.0, 1.0], [0.45, 0.15])],
+    };
+    let local = SlidingAtTwoFold::near(&system, &vector![0.0, 0.01, 0.02]).unwrap();
+    let [weak, strong] = local.directions.unwrap();
+    near(weak.rate, -0.3, 1e-14, "weak");
+    near(strong.rate, -0.6, 1e-14, "strong");
+    let curve = local.through.unwrap();
+    assert_eq!(curve.index, 0);
+    // The invariance equation is kept to 1e-12 as far as the square of the distance allows, and no term of a small divisor spoils that.
+    assert!(curve.radius > 1e-9 && curve.radius < 1e-4, "{}", curve.radius);
 }
 
 /// A two-fold moved to `centre`.

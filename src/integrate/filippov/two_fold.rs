@@ -269,10 +269,8 @@ fn invariant_curve<P: PiecewiseSmooth<N>, const N: usize>(
         let wanted = slope(s) * (mu * s);
         (f - wanted).amax() <= 1e-12 * wanted.amax().max(1e-3 * mu.abs())
     };
-    for _ in 0..100 {
-        if holds(radius) && holds(-radius) && holds(0.5 * radius) && holds(-0.5 * radius) {
-            break;
-        }
+    // After a resonance only the tangent may be left, which holds to the square of the distance.
+    while radius > 1e-12 && !(holds(radius) && holds(-radius) && holds(0.5 * radius) && holds(-0.5 * radius)) {
         radius *= 0.9;
     }
     curve.radius = radius;

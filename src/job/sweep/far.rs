@@ -82,6 +82,34 @@ mod tests {
         }
     }
 
+    /// The smallest y at which (alpha - beta y) 2 y^2 is what the constants can take away. tanh weighs them from 0 to 1; perturbed, it exceeds that by
+    /// e = |sigma| sqrt(eps) = 0.1: of v and 1 are left at least (1 + e) times the smaller, less e times the larger.
+    #[test]
+    fn the_corner_is_where_the_push_is_enough() {
+        let perturbed = SwitchSpec::Smoothed { eps: 0.04, transition: Transition::PerturbedTanh { sigma: -0.5 } };
+        for (switch, v_plus, v_minus, taken) in [
+            (SwitchSpec::tanh(0.04), -1.2, -1.4, 1.4),
+            (SwitchSpec::tanh(0.04), -1.5, 0.5, 1.5),
+            (perturbed, -1.2, -1.4, 1.1 * 1.4 + 0.1),
+            (perturbed, 20.0, 0.5, 0.1 * 20.0 - 1.1),
+        ] {
+            let caricature = Caricature { v_plus, v_minus, ..Caricature::with_reinjection(0.1, 1e-3) };
+            let corner = corner(&RunSpec { system: caricature.into(), switch, ..run(0.1, 1e-3) }).unwrap();
+            let push = |y: f64| (0.1 - 1e-3 * y) * 2.0 * y * y;
+            assert!((push(corner) - taken).abs() < 1e-12, "{taken}: {} at {corner}", push(corner));
+            assert!(corner > 0.0 && corner < 10.0, "the smallest: {corner}");
+        }
+        // Nothing is taken away: the whole quadrant.
+        let caricature = Caricature { v_plus: 0.5, v_minus: 2.0, ..Caricature::with_reinjection(0.1, 1e-3) };
+        assert!(corner(&RunSpec { system: caricature.into(), ..run(0.1, 1e-3) }).unwrap() < 1e-50);
+        for (alpha, beta) in [(0.0, 1e-5), (-0.1, 1e-5), (0.1, 0.0), (0.1, -1e-5)] {
+            assert_eq!(corner(&run(alpha, beta)), None, "{alpha} {beta}");
+        }
+        let printed = MinusSign::PrintedInEquation5;
+        let printed = Caricature { first_component_of_minus: printed, ..Caricature::with_reinjection(0.1, 1e-5) };
+        assert_eq!(corner(&RunSpec { system: printed.into(), ..run(0.1, 1e-5) }), None);
+    }
+
     #[test]
     fn without_room_there_is_no_far_state() {
         assert_eq!(corner(&run(1e-3, 1e-4)), None);

@@ -165,3 +165,60 @@ impl Fate {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analyse::attractor::{Cycle, Rate};
+    use crate::analyse::lyapunov::Exponent;
+    use crate::integrate::Statistics;
+    use crate::job::cases;
+    use crate::job::spec::Observation;
+
+    /// Each verdict's word, and where its numbers go.
+    #[test]
+    fn an_outcome_is_its_verdict_in_a_row() {
+        let system = cases::smooth(&["x", "v"], "x + 9", &["v", "-x"]);
+        let section = Observation::Section { coordinate: 0, value: 0.0 };
+        let run = cases::run(system, SwitchSpec::tanh(1e-2), 20.0, section);
+        let evidence = Classification::of(run).ask(&Desk::quiet()).unwrap();
+        let statistics = Some(Statistics { steps: 77, ..Statistics::default() });
+        let answer = Answer { statistics, ..Answer::of_tables(Vec::new()) }.with_fact("t", &20.0);
+        let cycle = |per_time: Option<f64>| Cycle {
+            period: 3,
+            points: Vec::new(),
+            duration: 4.5,
+            radius: 1e-3,
+            captured_at: 100.0,
+            settled_at: Some(200.0),
+            approach: per_time.map(|per_time| Rate { per_time, standard_error: 1e-4, from: 1.0, to: 2.0 }),
+            rotation: None,
+        };
+        let lyapunov = Some(Exponent { value: 0.25, standard_error: 0.01, duration: 1e4 });
+        for (verdict, word) in [
+            (Verdict::Periodic(cycle(Some(-0.1))), "period-3"),
+            (Verdict::Spiralling(cycle(Some(0.1))), "period-3"),
+            (Verdict::Spiralling(cycle(Some(-0.1))), "leaving-period-3"),
+            (Verdict::Spiralling(cycle(None)), "period-3"),
+            (Verdict::QuasiPeriodic(cycle(None)), "quasi-periodic"),
+            (Verdict::Chaotic { lyapunov, bands: 2 }, "irregular"),
+            (Verdict::Undecided { lyapunov: None }, "undecided"),
+            (Verdict::Noisy { contrast: None, around: Some(cycle(None)) }, "noisy-around-period-3"),
+            (Verdict::Noisy { contrast: None, around: None }, "noisy"),
+            (Verdict::Escaped { last_crossing: 3.0 }, "escaped"),
+            (Verdict::TooFew { points: 3 }, "too-few"),
+        ] {
+            let cycle = verdict.cycle().cloned();
+            let evidence = Evidence { verdict, lyapunov, crossings: 6, ..evidence.clone() };
+            let found = Outcome::of(&evidence, &answer).unwrap();
+            assert_eq!((found.word.as_str(), found.crossings, found.end, found.steps), (word, 6, 20.0, 77));
+            let (captured, settled) = (cycle.as_ref().map(|_| 100.0), cycle.as_ref().map(|_| 200.0));
+            assert_eq!((found.captured_at, found.settled_at), (captured, settled));
+            assert_eq!((found.radius, found.turn), (cycle.as_ref().map(|_| 1e-3), cycle.as_ref().map(|_| 4.5)));
+            assert_eq!(found.period, if cycle.is_some() { 3 } else { 0 });
+            let approach = cycle.and_then(|c| c.approach);
+            assert_eq!((found.rate, found.rate_error), (approach.map(|a| a.per_time), approach.map(|_| 1e-4)));
+            assert_eq!((found.exponent, found.exponent_error), (Some(0.25), Some(0.01)));
+        }
+    }
+}

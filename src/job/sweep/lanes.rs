@@ -327,3 +327,104 @@ fn recorded<const N: usize>(end: End<SectionRecorder<N>, N>) -> Result<Recording
     }
     Ok(Recording { data, t, x: x.into(), statistics, most_steps_in_segment, stop })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::super::Axis;
+    use super::*;
+    use crate::job::cases;
+    use crate::job::desk::JobWatch;
+    use crate::system::{Caricature, System};
+
+    /// Counts the groups that are computed in lanes.
+    #[derive(Default)]
+    struct Groups(Mutex<usize>);
+
+    impl Progress for Groups {
+        fn begin<'a>(&'a self, label: &str, _: f64) -> Box<dyn JobWatch + 'a> {
+            *self.0.lock().unwrap() += usize::from(label == "cells side by side");
+            Box::new(())
+        }
+    }
+
+    /// In how many groups the rows of a sweep are computed; they are those computed alone.
+    fn groups(system: System, axes: &[&str]) -> usize {
+        let observe = Observation::Section { coordinate: 1, value: 0.5 };
+        let mut run = cases::run(system, SwitchSpec::tanh(1e-2), 5.0, observe);
+        run.method.tolerance.rtol = 1e-6;
+        let axes: Vec<Axis> = axes.iter().map(|a| a.parse().unwrap()).collect();
+        let sweep = Sweep::new(run, axes, None).unwrap();
+        let numbers: Vec<u64> = (0..sweep.rows()).collect();
+        let (groups, mut rows) = (Groups::default(), Vec::new());
+        let mut take = |row: Row| {
+            rows.push(row);
+            true
+        };
+        sweep.rows_together(&numbers, &groups, &mut take).unwrap();
+        rows.sort_by_key(Row::number);
+        let rows: Vec<String> = rows.iter().map(Row::line).collect();
+        let alone: Vec<String> = numbers.iter().map(|row| sweep.row(*row, &()).unwrap().line()).collect();
+        assert_eq!(rows, alone);
+        groups.0.into_inner().unwrap()
+    }
+
+    /// Three cells and more share lanes, in systems of two to four states, with files' equations and compiled ones.
+    #[test]
+    fn three_cells_share_lanes() {
+        if InstructionSet::best() == InstructionSet::Portable {
+            return;
+        }
+        for (n, lanes) in [(2, 1), (3, 1), (4, 1), (5, 0)] {
+            assert_eq!(groups(cases::decays(n), &["shift.a2=1e-3*3"]), lanes, "{n} states");
+        }
+        let caricature = || System::from(Caricature::with_reinjection(0.1, 1e-5));
+        assert_eq!(groups(caricature(), &["shift.x=1e-3*3"]), 1);
+        assert_eq!(groups(caricature(), &["shift.x=1e-3*2"]), 0);
+        assert_eq!(groups(caricature(), &["shift.x=1e-3*4"]), 1);
+    }
+
+    /// Whoever shows progress can stop it, and so can whoever takes the rows.
+    #[test]
+    fn lanes_stop_when_asked_to() {
+        struct Never;
+        impl Progress for Never {
+            fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn JobWatch + 'a> {
+                Box::new(Never)
+            }
+        }
+        impl JobWatch for Never {
+            fn done(self: Box<Self>, _: &str) {}
+        }
+        impl Watch for Never {
+            fn reached(&self, _: f64) -> bool {
+                false
+            }
+        }
+        let observe = Observation::Section { coordinate: 0, value: 0.5 };
+        let turning = cases::smooth(&["x", "v"], "x + 9", &["v", "-x"]);
+        let run = cases::run(turning, SwitchSpec::tanh(1e-2), 300.0, observe);
+        let sweep = Sweep::new(run, vec!["shift.x=1e-3*5".parse().unwrap()], None).unwrap();
+        let mut none = |row: Row| panic!("row {}", row.number());
+        assert_eq!(sweep.rows_together(&[0, 1, 2, 3, 4], &Never, &mut none), Err(JobError::Interrupted));
+        let mut taken = 0;
+        let mut two = |_: Row| {
+            taken += 1;
+            taken < 2
+        };
+        assert_eq!(sweep.rows_together(&[0, 1, 2, 3, 4], &(), &mut two), Ok(()));
+        assert_eq!(taken, 2);
+    }
+
+    /// Cells that differ in the width alone, in a system that switches: each has an equation of its own.
+    #[test]
+    fn widths_of_one_system_are_other_equations() {
+        let caricature = System::from(Caricature::with_reinjection(0.1, 1e-5));
+        let portable = InstructionSet::best() == InstructionSet::Portable;
+        assert_eq!(groups(caricature.clone(), &["eps=1e-1,3e-2,1e-2"]), usize::from(!portable));
+        // Of two equations with 32 cells each, both go by themselves.
+        let many = groups(caricature, &["eps=1e-1,3e-2", "shift.x=1e-3*32"]);
+        assert_eq!(many, if portable { 0 } else { 2 });
+    }
+}

@@ -336,6 +336,49 @@ mod tests {
     }
 
     #[test]
+    fn a_seed_and_a_number_make_a_draw() {
+        let sweep =
+            |count, seed| Sweep::new(run(), axes(&["shift.x=-1..1", "eps=1e-2,1e-3"]), Some(Draws { count, seed }));
+        let draw = |seed, row| sweep(3, seed).unwrap().settings(row)[0].value();
+        let mut draws: Vec<f64> =
+            (0..4).flat_map(|seed| (0..6).map(move |row| (seed, row))).map(|(s, r)| draw(s, r)).collect();
+        draws.sort_by(f64::total_cmp);
+        draws.dedup();
+        assert_eq!(draws.len(), 24, "every seed's rows have draws of their own");
+        // More draws are more rows behind the ones that were there.
+        let (three, five) = (sweep(3, 1).unwrap(), sweep(5, 1).unwrap());
+        assert_eq!((three.with_draws(5).as_ref(), three.rows(), five.rows()), (Some(&five), 6, 10));
+        assert!((0..6).all(|row| three.settings(row) == five.settings(row)));
+        assert_eq!(Sweep::new(run(), axes(&["eps=1e-2"]), None).unwrap().with_draws(5), None);
+        assert_eq!(
+            (three.axes(), three.draws()),
+            (&axes(&["shift.x=-1..1", "eps=1e-2,1e-3"])[..], Some(Draws { count: 3, seed: 1 }))
+        );
+        assert!(sweep(0, 1).unwrap_err().to_string().contains("one draw or more"));
+        assert!(sweep(MOST_ROWS / 2, 1).is_ok() && sweep(MOST_ROWS / 2 + 1, 1).is_err());
+    }
+
+    #[test]
+    fn shards_are_named_from_one_on() {
+        for (text, k, n) in [("1/1", 1, 1), ("2/8", 2, 8), (" 8 / 8 ", 8, 8)] {
+            assert_eq!(text.parse(), Ok(Shard { k, n }));
+        }
+        for text in ["0/3", "4/3", "1/0", "1", "/3", "1/", "a/b", "-1/3"] {
+            let error = text.parse::<Shard>().unwrap_err();
+            assert!(error.contains("K from 1 to N"), "{text}: {error}");
+        }
+    }
+
+    /// A shift is added to the start that another axis gives, whichever comes first.
+    #[test]
+    fn shifts_come_after_starts() {
+        for texts in [["shift.x=0.5", "start.x=2"], ["start.x=2", "shift.x=0.5"]] {
+            let sweep = Sweep::new(run(), axes(&texts), None).unwrap();
+            assert_eq!(sweep.question(0).unwrap().0.run.start, [2.5, 0.0, -1.0]);
+        }
+    }
+
+    #[test]
     fn what_has_no_effect_is_refused() {
         for (texts, word) in [
             (vec!["seed=1,2"], "random"),

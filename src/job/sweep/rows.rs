@@ -426,6 +426,149 @@ mod tests {
     use crate::job::spec::*;
     use crate::system::Caricature;
 
+    fn sweep(axes: &[&str], draws: Option<u64>) -> Sweep {
+        let section = Observation::Section { coordinate: 1, value: 0.0 };
+        let run = crate::job::cases::run(
+            Caricature::with_reinjection(1e-1, 1e-5).into(),
+            SwitchSpec::tanh(1e-3),
+            60.0,
+            section,
+        );
+        let axes = axes.iter().map(|a| a.parse().unwrap()).collect();
+        Sweep::new(run, axes, draws.map(|count| crate::job::sweep::Draws { count, seed: 1 })).unwrap()
+    }
+
+    fn failed(sweep: &Sweep, number: u64) -> Row {
+        Row::failed(number, sweep.settings(number), None, format!("why {number}\nindeed"))
+    }
+
+    /// Every cell of a row that was found and of one that failed stands in its column.
+    #[test]
+    fn rows_say_what_was_found() {
+        let sweep = sweep(&["eps=1e-2,1e-3"], None);
+        let key = Hash::of(b"a question");
+        let outcome = Outcome {
+            word: "period-3".into(),
+            period: 3,
+            captured_at: Some(1.0),
+            settled_at: Some(2.0),
+            radius: Some(3.0),
+            rate: Some(4.0),
+            rate_error: Some(5.0),
+            turn: Some(6.0),
+            exponent: Some(7.0),
+            exponent_error: None,
+            crossings: 8,
+            end: 9.0,
+            steps: 10,
+        };
+        let mut rows = Rows::of(sweep.clone());
+        assert!(rows.is_empty() && rows.get(0).is_none() && !rows.has(0));
+        let found = Row::found(0, sweep.settings(0), &key, outcome);
+        assert_eq!((found.number(), found.outcome(), found.reason()), (0, "period-3", None));
+        assert_eq!(format!("{:015x}", found.key()), key.as_str()[..15]);
+        assert_eq!((failed(&sweep, 1).reason(), failed(&sweep, 1).key()), (Some("why 1 indeed"), 0));
+        rows.insert(found.clone()).unwrap();
+        rows.insert(failed(&sweep, 1)).unwrap();
+        assert!(!rows.is_empty() && rows.len() == 2 && rows.has(1));
+        assert_eq!(rows.get(0).unwrap().line(), found.line());
+        let table = rows.table();
+        for (name, value) in [
+            ("eps", 1e-2),
+            ("captured_at", 1.0),
+            ("settled_at", 2.0),
+            ("radius", 3.0),
+            ("rate", 4.0),
+            ("rate_error", 5.0),
+            ("turn", 6.0),
+            ("exponent", 7.0),
+            ("end", 9.0),
+        ] {
+            assert_eq!(table.numbers(name)[0], value, "{name}");
+            assert!(name == "eps" || table.numbers(name)[1].is_nan(), "{name}");
+        }
+        assert!(table.numbers("exponent_error").iter().all(|v| v.is_nan()));
+        for (name, values) in [("period", [3, 0]), ("crossings", [8, 0]), ("steps", [10, 0]), ("row", [0, 1])] {
+            assert_eq!(table.integers(name), values, "{name}");
+        }
+        assert_eq!(table.words("outcome").collect::<Vec<_>>(), ["period-3", "failed"]);
+        assert_eq!(table.words("reason").collect::<Vec<_>>(), ["", "why 1 indeed"]);
+        assert_eq!(rows.counts(), [("failed".to_owned(), 1), ("period-3".to_owned(), 1)].into());
+    }
+
+    /// Fewer draws keep the first rows, more keep all; and both are the rows of the other sweep.
+    #[test]
+    fn rows_of_other_draws_are_kept() {
+        let axes = ["shift.x=0..1", "eps=1e-2,1e-3"];
+        let mut rows = Rows::of(sweep(&axes, Some(3)));
+        (0..6).filter(|n| *n != 2).for_each(|n| rows.insert(failed(&sweep(&axes, Some(3)), n)).unwrap());
+        for (draws, kept) in [(1, vec![0, 1]), (2, vec![0, 1, 3]), (5, vec![0, 1, 3, 4, 5])] {
+            let other = rows.with_draws(draws).unwrap();
+            assert_eq!(other.sweep(), &sweep(&axes, Some(draws)));
+            assert_eq!(other.iter().map(|row| row.number()).collect::<Vec<_>>(), kept);
+        }
+        assert!(Rows::of(sweep(&["eps=1e-2"], None)).with_draws(5).is_none());
+    }
+
+    /// A file whose columns, rows, heading or order of cells were changed is not one of ours.
+    #[test]
+    fn a_changed_file_is_refused() {
+        let sweep = sweep(&["eps=1e-2,1e-3"], None);
+        let mut rows = Rows::of(sweep.clone());
+        (0..2).for_each(|n| rows.insert(failed(&sweep, n)).unwrap());
+        let file = String::from_utf8(rows.csv()).unwrap();
+        assert_eq!(Rows::from_csv(file.as_bytes()).unwrap().csv(), rows.csv());
+        let integer = "{\"kind\":\"integer\",\"name\":\"period\"";
+        for (from, to, word) in [
+            ("captured_at", "captivated", "columns"),
+            (integer, &*integer.replace("integer", "number"), "columns"),
+            ("why 1", "why 7", "not those that it was written with"),
+            ("\n0.001,", "\n0.002,", "not those that it was written with"),
+            ("twofold-sweep", "twofold-sweet", "does not say"),
+            ("\"version\":1", "\"version\":2", "does not say"),
+            ("\"t_end\":60", "\"t_end\":61", "its spec is not the one"),
+            (",1\n", ",-1\n", "no number"),
+        ] {
+            assert!(file.contains(from), "{from}: {file}");
+            let error = Rows::from_csv(file.replace(from, to).as_bytes()).unwrap_err().to_string();
+            assert!(error.contains(word), "{from} {to}: {error}");
+        }
+        // A journal's rows are as long as their heading says, and of its kinds.
+        let journal = rows.journal();
+        let with = |line: &str| Rows::from_journal(&[journal[0].clone(), line.to_owned()]);
+        assert_eq!(with(&journal[2]).unwrap().len(), 1);
+        for (from, to, word) in [
+            (",1]", "]", "another length"),
+            (",1]", ",-1]", "no number"),
+            (",1]", ",0.5]", "kinds"),
+            ("[", "", "not a list"),
+        ] {
+            assert!(journal[2].contains(from), "{}", journal[2]);
+            let error = with(&journal[2].replacen(from, to, 1)).unwrap_err().to_string();
+            assert!(error.contains(word), "{from} {to}: {error}");
+        }
+        assert!(Rows::from_journal(&[]).unwrap_err().to_string().contains("no heading"));
+        // Parts of two sweeps.
+        let error = rows.merge(Rows::of(self::sweep(&["eps=1e-2"], None))).unwrap_err().to_string();
+        assert!(error.contains("different sweeps"), "{error}");
+        assert_eq!(rows.journal(), journal);
+    }
+
+    /// A part that another version computed says so in the whole.
+    #[test]
+    fn versions_are_kept_side_by_side() {
+        let sweep = sweep(&["eps=1e-2,1e-3"], None);
+        let mut rows = Rows::of(sweep.clone());
+        rows.insert(failed(&sweep, 0)).unwrap();
+        let other = rows.journal_heading().replace(NUMERICS, "another");
+        let mut whole = Rows::from_journal(&[other, failed(&sweep, 1).line()]).unwrap();
+        assert_eq!(whole.numerics().collect::<Vec<_>>(), ["another"]);
+        whole.merge(rows.clone()).unwrap();
+        assert_eq!((whole.len(), whole.numerics().count()), (2, 2));
+        let both = [whole.journal(), rows.journal()].concat();
+        assert_eq!(Rows::from_journal(&both).unwrap().journal(), whole.journal());
+    }
+
     /// Every way to have some of four rows in three parts: merged in any grouping and order they are the same rows, and one row with two contents is
     /// refused wherever it stands.
     #[test]
