@@ -94,6 +94,24 @@ fn sections_inside_the_layer_are_those_of_the_taylor_method() {
     }
 }
 
+#[test]
+fn a_crossing_that_steps_may_not_go_through_at_once_goes_on_where_it_was_cut() {
+    // From outside through the layer, which takes some 0.02; then on.
+    let field = caricature(1e-1, 1e-5, Transition::Tanh);
+    let end = |cap: f64| {
+        let course = Course { step_cap: StepCap::Absolute(cap), ..Course::to(1.0) };
+        let mut method = Layered::new(tolerance(1e-11));
+        drive(&field, START.into(), &course, &mut method, &mut Ignore, &()).unwrap()
+    };
+    let whole = end(f64::INFINITY);
+    assert!(whole.x[0] < -0.1, "{}", whole.x);
+    for cap in [1e-2, 3.1e-3, 7e-4] {
+        let cut = end(cap);
+        assert!(cut.statistics.steps as f64 >= 1.0 / cap);
+        assert!((cut.x - whole.x).amax() < 1e-9, "{cap}: {} {}", cut.x, whole.x);
+    }
+}
+
 /// Looks into every step.
 struct Looking {
     kinds: [u64; 3],

@@ -271,6 +271,12 @@ mod tests {
         let seen = run(Course::to(10.0), &mut After(7), &());
         assert_eq!((seen.stop, seen.statistics.steps), (StopReason::Observer, 7));
         assert!(seen.t < 10.0 && seen.most_steps_in_segment == 7);
+        // Three segments, the last of them hardly begun.
+        let often = Course { schedule: Schedule { restart_every: Some(1.0), kick: None }, ..Course::to(10.0) };
+        let first = run(Course { t_end: 1.0, ..often }, &mut Ignore, &()).statistics.steps;
+        let second = run(Course { t_end: 2.0, ..often }, &mut Ignore, &()).statistics.steps - first;
+        let third = run(often, &mut After(first + second + 1), &());
+        assert_eq!((third.stop, third.most_steps_in_segment), (StopReason::Observer, first.max(second)));
 
         let poor = run(Course { max_steps: 5, ..Course::to(10.0) }, &mut Ignore, &());
         assert_eq!((poor.stop, poor.statistics.steps), (StopReason::StepBudget, 5));
