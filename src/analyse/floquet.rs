@@ -483,7 +483,7 @@ mod tests {
         let pair_first = [[0.2, -0.82, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [5.0, 0.0, 0.2, 0.15], [0.0, 7.0, 1.0, 0.0]];
         let pair_last = [[0.2, 0.15, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [5.0, 0.0, 0.2, -0.82], [0.0, 7.0, 1.0, 0.0]];
         for four in [pair_first, pair_last] {
-            let entry = |k: usize| if k / 5 == 0 || k % 5 == 0 { 9.0 } else { four[k / 5 - 1][k % 5 - 1] };
+            let entry = |k: usize| if k / 5 == 0 || k.is_multiple_of(5) { 9.0 } else { four[k / 5 - 1][k % 5 - 1] };
             let full: Vec<f64> = (0..25).map(entry).collect();
             close(&of(&full, 5, 0), &[[0.1, 0.9], [0.1, 0.9], [0.5, 0.0], [-0.3, 0.0]]);
         }

@@ -144,7 +144,7 @@ mod tests {
         let Ending::Periodic { points } = ending(&turns(51.0, 10)) else { panic!() };
         assert_eq!(points, [[1.0, 0.0], [2.0, 0.0], [0.0, 0.0]], "the last turn");
         // One like the last in the other direction is another point.
-        let down = |k: usize| if k % 2 == 0 { "up" } else { "down" };
+        let down = |k: usize| if k.is_multiple_of(2) { "up" } else { "down" };
         let passages: Vec<([f64; 2], &str)> = (0..9).map(|k| ([51.0 + k as f64, (k % 2) as f64], down(k))).collect();
         assert_eq!(ending_of(&passages).word(), "period 1");
     }
