@@ -149,6 +149,36 @@ fn failures_are_those_of_a_run_alone() {
     });
 }
 
+/// x' = c - sqrt(x) with c as a second state: trial points where x is negative have no value. Orbits with c = 0 end there, others only look over the edge.
+#[test]
+fn a_trial_that_has_no_value_is_repeated_as_in_a_run_alone() {
+    struct Edge;
+    impl twofold::system::VectorField<2> for Edge {
+        fn eval<S: twofold::num::Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+            vector![x[1] - x[0].sqrt(), S::zero()]
+        }
+    }
+    let coarse = Tolerance { rtol: 1e-2, atol: 1e-2 };
+    let runs: Vec<Run<2>> = (0..19_u32)
+        .map(|k| Run { start: vector![0.3 + 0.1 * f64::from(k), 0.05 * f64::from(k % 3)], course: Course::to(9.0) })
+        .collect();
+    let word = |summary: &Result<twofold::integrate::Summary<2>, twofold::integrate::Failure>| match summary {
+        Ok(end) => format!("{:?} {:?} {:?}", end.x.map(f64::to_bits), end.t.to_bits(), end.statistics),
+        Err(failure) => format!("{failure:?}"),
+    };
+    let alone: Vec<_> = runs
+        .iter()
+        .map(|run| drive(&Edge, run.start, &run.course, &mut Dopri5::new(coarse), &mut Ignore, &()))
+        .collect();
+    let expected: Vec<_> = alone.iter().map(word).collect();
+    assert!(expected.iter().any(|e| e.starts_with("NotFinite")), "{expected:?}");
+    assert!(alone.iter().flatten().any(|end| end.statistics.rejected > 0), "{expected:?}");
+    on_every_set(|set| {
+        let found = ensemble_with(set, &Edge, &runs, coarse, None, |_| Ignore);
+        assert_eq!(found.iter().map(|end| word(&end.summary)).collect::<Vec<_>>(), expected, "{set:?}");
+    });
+}
+
 #[test]
 fn no_runs_no_ends() {
     assert!(ensemble(&field(), &[], TOLERANCE, None, |_| Ignore).is_empty());
