@@ -371,6 +371,7 @@ mod tests {
         let e = multipliers(&m, 1);
         assert!((e[0][0] - 0.9).abs() < 1e-12 && e[0][1] == 0.0, "{e:?}");
         assert!((e[1][0] - 0.1).abs() < 1e-12 && (e[1][1].abs() - 0.7).abs() < 1e-12, "{e:?}");
+        assert!(e[2][0] == e[1][0] && e[2][1] == -e[1][1], "a pair: {e:?}");
     }
 
     /// s' = 1, y' = q'(s) with q(s) = s (s^2 - 1)(s^2 - 4): so y - q(s) stays what it is, and a return of a plane of y is a root of a polynomial.

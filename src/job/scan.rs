@@ -159,6 +159,9 @@ mod tests {
         }
         assert!(ending(&turns(3)).is_like(&ending(&turns(3)[..89]), 1e-3), "cut at another passage");
         assert!(!ending(&turns(3)).is_like(&ending(&turns(1)), 1e-3));
+        let other: Vec<[f64; 2]> = turns(3).iter().map(|[t, x]| [*t, x + 0.01]).collect();
+        assert!(!ending(&turns(3)).is_like(&ending(&other), 1e-4), "as many passages, elsewhere");
+        assert!(ending(&turns(3)).is_like(&ending(&other), 0.1));
         assert_eq!(ending(&[[10.0, 1.0], [40.0, 1.0]]), Ending::Quiet { state: vec![3.0, 4.0] });
         let drifting: Vec<[f64; 2]> = (0..90).map(|k| [10.0 + k as f64, (k * k % 83) as f64]).collect();
         assert_eq!(ending(&drifting), Ending::Irregular);

@@ -570,7 +570,7 @@ impl<F: VectorField<N>, const N: usize> WithStepper<N> for Drive<'_, F, N> {
 mod tests {
     use super::*;
     use crate::integrate::filippov::Side;
-    use crate::integrate::{Kick, KickLaw, Schedule};
+    use crate::integrate::{Kick, KickLaw, Schedule, StepCap, Tolerance};
     use crate::job::cases;
     use crate::system::Relaxation;
 
@@ -697,7 +697,7 @@ mod tests {
         let circle = cases::smooth(&["x", "y"], "x + 9", &["x*(1 - x*x - y*y) - y", "y*(1 - x*x - y*y) + x"]);
         let section = Observation::Section { coordinate: 1, value: 0.0 };
         let mut run = cases::run(circle, SwitchSpec::tanh(1e-2), 30_000.0, section);
-        run.method.tolerance = crate::integrate::Tolerance { rtol: 1e-3, atol: 1e-3 };
+        run.method.tolerance = Tolerance { rtol: 1e-3, atol: 1e-3 };
         let (end, rows, parts) = in_parts(&run);
         assert!(parts.len() == 2 && parts[0] == PART && end.rows as usize == rows.len(), "{parts:?}");
         assert!(rows == answer(&run, &()).unwrap().tables[0].rows());
@@ -718,6 +718,23 @@ mod tests {
             let size = apart.iter().map(|d| d * d).sum::<f64>().sqrt();
             assert!((t[k] - time).abs() < 1e-12 && (size - 1e-3).abs() < 1e-12, "{size} at {}", t[k]);
         }
+    }
+
+    #[test]
+    fn a_filippov_run_has_the_tolerance_the_longest_step_and_the_budget_asked_for() {
+        let [_, _, filippov] = switches();
+        let steps = |change: &dyn Fn(&mut MethodSpec)| {
+            let mut run = cases::run(cases::decays(2), filippov, 1.0, EVERY);
+            change(&mut run.method);
+            answer(&run, &()).map(|answer| answer.statistics.unwrap().steps)
+        };
+        let fine = steps(&|_| {}).unwrap();
+        assert!(steps(&|m| m.tolerance = Tolerance { rtol: 1e-3, atol: 1e-3 }).unwrap() < fine / 2);
+        let capped = steps(&|m| m.step_cap = StepCap::Absolute(1e-3)).unwrap();
+        assert!((1000..1010).contains(&capped), "{capped}");
+        // The step that exceeds the budget has been made.
+        let said = steps(&|m| m.max_steps = 50).unwrap_err().to_string();
+        assert!(fine > 51 && said.starts_with("51 steps were not enough"), "{said}");
     }
 
     #[test]
