@@ -56,11 +56,22 @@ pub trait Precision: Scalar + FromDecimal {
     fn size(self) -> f64 {
         log2(self.to_f64().abs())
     }
+
+    /// The numbers rounded, in `room` if they are not what they are.
+    fn rounded<'a>(numbers: &'a [Self], room: &'a mut Vec<f64>) -> &'a [f64] {
+        room.clear();
+        room.extend(numbers.iter().map(|c| c.to_f64()));
+        room
+    }
 }
 
 impl Precision for f64 {
     const EPSILON: f64 = f64::EPSILON;
     const TANH_SATURATION: f64 = 19.1;
+
+    fn rounded<'a>(numbers: &'a [Self], _: &'a mut Vec<f64>) -> &'a [f64] {
+        numbers
+    }
 }
 
 impl Precision for DoubleDouble {
@@ -327,11 +338,8 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         if S::BEYOND_F64 {
             return self.resolved_step_beyond_f64(h);
         }
-        let series = &mut self.argument;
         for (kind, w) in self.solution.layer_arguments() {
-            series.clear();
-            series.extend(w.iter().map(|c| c.to_f64()));
-            h = self.layers.longest(kind, series, h);
+            h = self.layers.longest(kind, S::rounded(w, &mut self.argument), h);
         }
         h
     }
@@ -449,7 +457,14 @@ fn stride_time(w: &[f64], stride: f64, h: f64) -> f64 {
         return h;
     }
     // The travel is increasing and convex, so that Newton's method from the right converges from the right.
-    let mut s = h.min(stride / w[1].abs());
+    let first = stride / w[1].abs();
+    // A branch, not a minimum: what follows then need not wait until h is known.
+    let mut s = if first < h {
+        first
+    } else {
+        std::hint::cold_path();
+        h
+    };
     for _ in 0..50 {
         let (travel, speed) = travel_and_speed(w, s);
         let excess = travel - stride;
@@ -540,12 +555,13 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         self.t = if last { self.t_end } else { self.t + self.h };
 
         let mut power = S::one();
-        self.rounded.coefficients.clear();
-        self.rounded.coefficients.extend((0..=self.order).map(|k| {
-            let rounded = SVector::from_fn(|i, _| (series[i][k] * power).to_f64());
+        self.rounded.coefficients.resize(self.order + 1, SVector::zeros());
+        for (k, rounded) in self.rounded.coefficients.iter_mut().enumerate() {
+            for i in 0..N {
+                rounded[i] = (series[i][k] * power).to_f64();
+            }
             power = power * self.h;
-            rounded
-        }));
+        }
         self.statistics.steps += 1;
         Ok(Step { t0, t1: self.t.to_f64(), x0, x1, interpolant: &self.rounded })
     }
@@ -556,6 +572,25 @@ mod tests {
     use super::*;
     use crate::num::tape::Recorded;
     use crate::num::{Arithmetic, Elementary};
+    use crate::system::{Caricature, Smoothed, Transition};
+
+    /// Steps from outside the layer through it, all on compiled series?
+    fn is_compiled<F: VectorField<3>>(field: &F) -> bool {
+        let mut taylor = Taylor::<3>::new(Tolerance { rtol: 1e-8, atol: 1e-8 });
+        taylor.restart(field, 0.0, nalgebra::vector![0.2, 0.0, -1.0], 10.0, f64::INFINITY).unwrap();
+        while taylor.state().0 < 10.0 {
+            taylor.step(field).unwrap();
+        }
+        taylor.solution.is_compiled()
+    }
+
+    #[test]
+    fn the_papers_equation_is_compiled() {
+        let smoothed =
+            |transition| Smoothed { system: Caricature::with_reinjection(1e-1, 1e-4), transition, eps: 1e-3 };
+        assert!(is_compiled(&smoothed(Transition::Tanh)));
+        assert!(!is_compiled(&smoothed(Transition::PerturbedTanh { sigma: 0.01 })));
+    }
 
     #[test]
     fn free_time_stops_before_the_layer() {

@@ -8,6 +8,7 @@
 //! The tape also knows the arguments of every tanh and erf. That is how an integrator learns where an equation has a layer, without
 //! being told (see [`Solution::layer_arguments`]).
 
+mod compiled;
 #[cfg(test)]
 mod plain;
 mod plan;
@@ -18,6 +19,7 @@ use std::any::{Any, TypeId};
 use super::Elementary;
 use super::decimal::{Decimal, FromDecimal};
 use super::tape::{Operation, Tape};
+use compiled::Opening;
 use plan::{Equation, Plan, advance, start};
 use table::{Columns, LONGEST, ROW, advance_rows, start_rows};
 
@@ -37,7 +39,7 @@ enum Recurrence<S> {
     /// Sum with a constant.
     Shift(Series, S),
     /// A constant less a series.
-    Minus(S, Series),
+    Minus(Series, S),
     /// Product with a constant.
     Scale(Series, S),
     /// Quotient by a constant.
@@ -55,8 +57,8 @@ enum Recurrence<S> {
     Weighted(Series),
     /// tanh; its companion 1 - tanh^2 is the next series.
     Tanh(Series, Weights),
-    /// 1 - u^2 of the tanh u before it.
-    TanhSlope(Series),
+    /// 1 - u^2 of the tanh u before it, the first series; the second is u's argument.
+    TanhSlope(Series, Series),
     /// Sine; the cosine is the next series.
     Sin(Series, Weights),
     /// Cosine; the sine is the series before.
@@ -67,6 +69,16 @@ enum Recurrence<S> {
     Atan(Series),
     /// u = erf a: u' = a' g, the series g = 2/sqrt(pi) exp(-a^2) being the one before.
     Erf(Series, Weights),
+}
+
+impl<S: Elementary> Recurrence<S> {
+    /// The number in it; zero if there is none.
+    fn number(&self) -> S {
+        match *self {
+            Self::Constant(c) | Self::Shift(_, c) | Self::Minus(_, c) | Self::Scale(_, c) | Self::Over(_, c) => c,
+            _ => S::zero(),
+        }
+    }
 }
 
 /// What an equation's constants and parameters, given in decimal, stand for.
@@ -102,6 +114,8 @@ pub struct Solution<S> {
     /// The series of the components' derivatives.
     outputs: Vec<Series>,
     layer_arguments: Vec<(LayerKind, Series)>,
+    /// The first coefficients compiled, if that is so.
+    opening: Option<Opening>,
     /// The plans that were needed so far.
     plans: Vec<Plan<S>>,
 }
@@ -120,6 +134,7 @@ impl<S: Elementary + FromDecimal> Solution<S> {
             recurrences: Vec::new(),
             outputs: Vec::new(),
             layer_arguments: Vec::new(),
+            opening: None,
             plans: Vec::new(),
         };
         solution.set_tape(tape, constants);
@@ -167,8 +182,12 @@ impl<S: Elementary + FromDecimal> Solution<S> {
         self.coefficients.clear();
         self.coefficients.resize(count * (self.degree + 1), S::zero());
         self.rows.clear();
+        self.opening = None;
         if TypeId::of::<S>() == TypeId::of::<f64>() && count <= ROW && self.degree <= LONGEST {
             self.rows.resize(self.degree + 1, [0.0; ROW]);
+            self.opening = (&self.recurrences as &dyn Any)
+                .downcast_ref::<Vec<Recurrence<f64>>>()
+                .and_then(|recurrences| Opening::of(self.dimension, recurrences, &self.outputs));
         }
     }
 
@@ -203,6 +222,12 @@ impl<S: Elementary + FromDecimal> Solution<S> {
         } else {
             self.expand_columns();
         }
+    }
+
+    /// Whether all that was expanded so far is compiled.
+    #[cfg(test)]
+    pub(crate) fn is_compiled(&self) -> bool {
+        self.opening.is_some() && self.plans.iter().all(|plan| plan.compiled.is_some())
     }
 
     fn expand_columns(&mut self) {
@@ -250,7 +275,10 @@ impl Solution<f64> {
         for (start, series) in rows[0].iter_mut().zip(self.coefficients.chunks(width)).take(self.dimension) {
             *start = series[0];
         }
-        let saturated = start_rows(&self.equation(), &mut rows);
+        let saturated = match &self.opening {
+            Some(opening) => start_rows(&mut rows, |table| opening.start(table)),
+            None => start_rows(&mut rows, |table| start(&self.equation(), table)),
+        };
         let plan = self.plan(saturated);
         for k in 1..self.degree {
             advance_rows(&self.plans[plan], &mut rows, k);
@@ -306,7 +334,7 @@ impl<S: Elementary> Compiler<S> {
                 (None, None) => Recurrence::Add(self.of(a), self.of(b)),
             },
             Operation::Sub(a, b) => match (self.fixed[a], self.fixed[b]) {
-                (Some(c), _) => Recurrence::Minus(c, self.of(b)),
+                (Some(c), _) => Recurrence::Minus(self.of(b), c),
                 (None, Some(c)) => Recurrence::Shift(self.of(a), -c),
                 (None, None) => Recurrence::Sub(self.of(a), self.of(b)),
             },
@@ -333,7 +361,7 @@ impl<S: Elementary> Compiler<S> {
             Operation::Tanh(a) => {
                 let (a, weights) = self.weighted(a);
                 let tanh = self.push(Recurrence::Tanh(a, weights));
-                self.push(Recurrence::TanhSlope(tanh));
+                self.push(Recurrence::TanhSlope(tanh, a));
                 return tanh;
             }
             Operation::Sin(a) => return self.sine(a),

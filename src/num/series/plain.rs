@@ -40,7 +40,7 @@ fn coefficient<S: Elementary + FromDecimal>(
             Recurrence::Mul(a, b) if a == b => square(series(a), 0),
             Recurrence::Mul(a, b) => convolution(series(a), series(b), 0, 0),
             Recurrence::Div(a, b) => (at(a) - tail(series(this), series(b), 0)) / at(b),
-            _ => start_of(recurrence, &solution.equation(), at),
+            _ => start_of(recurrence, at),
         };
     }
     // Coefficient k of the integral of a' b.
@@ -49,7 +49,7 @@ fn coefficient<S: Elementary + FromDecimal>(
         Recurrence::Constant(_) | Recurrence::Sign(_) => S::zero(),
         Recurrence::Add(a, b) => at(a) + at(b),
         Recurrence::Sub(a, b) => at(a) - at(b),
-        Recurrence::Neg(a) | Recurrence::Minus(_, a) => -at(a),
+        Recurrence::Neg(a) | Recurrence::Minus(a, _) => -at(a),
         Recurrence::Shift(a, _) => at(a),
         Recurrence::Scale(a, c) => at(a) * c,
         Recurrence::Over(a, c) => at(a) / c,
@@ -62,7 +62,7 @@ fn coefficient<S: Elementary + FromDecimal>(
         Recurrence::Ln(a) => (at(a) - integral(this + 1, series(a))) / series(a)[0],
         Recurrence::Sqrt(a) => (at(a) - square(series(this), k)) / series(this)[0].scale(2.0),
         Recurrence::Tanh(_, weights) | Recurrence::Sin(_, weights) => integral(weights, series(this + 1)),
-        Recurrence::TanhSlope(u) => -square(series(u), k),
+        Recurrence::TanhSlope(u, _) => -square(series(u), k),
         Recurrence::Cos(_, weights) => -integral(weights, series(this - 1)),
         Recurrence::OnePlusSquare(a) => square(series(a), k),
         Recurrence::Atan(a) => (at(a) - integral(this + 1, series(this - 1))) / series(this - 1)[0],

@@ -8,13 +8,16 @@
 //! Nothing is reassociated: every coefficient has the bits that its recurrence gives it (if all are finite; an overflow in a series that drops out of the equation,
 //! as in (1 + a) - (2 + a), drops out with it).
 
+use std::any::Any;
+
+use super::compiled::Compiled;
 use super::table::Table;
 use super::{LayerKind, Recurrence, Series, Weights};
 use crate::num::Elementary;
 
 /// What one instruction does at degree k >= 1. The number at hand is the result of the instruction before.
-#[derive(Clone, Copy, Debug)]
-enum Action<S> {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Action<S> {
     /// Zero.
     Clear,
     Copy(Series),
@@ -81,11 +84,27 @@ enum Action<S> {
     Erf(Series, Weights),
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Instruction<S> {
-    action: Action<S>,
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Instruction<S> {
+    pub action: Action<S>,
     /// The series that the result belongs to.
-    to: Series,
+    pub to: Series,
+}
+
+impl<S: Elementary> Instruction<S> {
+    /// The number in it; zero if there is none.
+    pub fn number(&self) -> S {
+        match self.action {
+            Action::NegScale(_, c)
+            | Action::Scale(_, c)
+            | Action::ScaleThis(c)
+            | Action::PlusScale(_, _, c)
+            | Action::LessScale(_, _, c)
+            | Action::Over(_, c)
+            | Action::ThisOver(c) => c,
+            _ => S::zero(),
+        }
+    }
 }
 
 /// Coefficient k of a^2, each product once.
@@ -116,35 +135,50 @@ fn integral<S: Elementary>(table: &impl Table<S>, weights: Weights, b: Series) -
 /// The coefficients of degree 0, from those of the state, and those of degree 1 of the state. Returns which tanh are saturated, a bit each.
 #[inline(always)]
 pub(super) fn start<S: Elementary>(equation: &Equation<S>, table: &mut impl Table<S>) -> u64 {
-    let (mut saturated, mut bit) = (0, 1_u64);
+    let mut saturated = Saturated::default();
     for (i, recurrence) in equation.recurrences.iter().enumerate() {
-        let value = start_of(recurrence, equation, |series| table.get(series, 0));
-        if matches!(recurrence, Recurrence::TanhSlope(_)) && S::EXACT_ZEROS {
-            saturated |= if value == S::zero() { bit } else { 0 };
-            bit <<= 1;
-        }
-        table.set(equation.dimension + i, value);
+        begin(recurrence, equation.dimension + i, table, &mut saturated);
     }
     for (i, output) in equation.outputs.iter().enumerate() {
         table.set_next(i, table.get(*output, 0).over(1.0));
     }
-    saturated
+    saturated.bits
 }
 
-/// The coefficient of degree 0 of a series, those of its arguments being known.
+/// Which tanh of an equation are saturated, as far as they have been computed.
+#[derive(Default)]
+pub(super) struct Saturated {
+    /// A bit each.
+    pub bits: u64,
+    count: u32,
+}
+
+/// The coefficient of degree 0 of one series, those of its arguments being known.
 #[inline(always)]
-pub(super) fn start_of<S: Elementary>(
+pub(super) fn begin<S: Elementary>(
     recurrence: &Recurrence<S>,
-    equation: &Equation<S>,
-    at: impl Fn(Series) -> S,
-) -> S {
+    to: Series,
+    table: &mut impl Table<S>,
+    saturated: &mut Saturated,
+) {
+    let value = start_of(recurrence, |series| table.get(series, 0));
+    if matches!(recurrence, Recurrence::TanhSlope(..)) && S::EXACT_ZEROS {
+        saturated.bits |= u64::from(value == S::zero()) << saturated.count;
+        saturated.count += 1;
+    }
+    table.set(to, value);
+}
+
+/// What it is, its arguments being `at` hand.
+#[inline(always)]
+pub(super) fn start_of<S: Elementary>(recurrence: &Recurrence<S>, at: impl Fn(Series) -> S) -> S {
     match *recurrence {
         Recurrence::Constant(c) => c,
         Recurrence::Add(a, b) => at(a) + at(b),
         Recurrence::Sub(a, b) => at(a) - at(b),
         Recurrence::Neg(a) => -at(a),
         Recurrence::Shift(a, c) => at(a) + c,
-        Recurrence::Minus(c, a) => c - at(a),
+        Recurrence::Minus(a, c) => c - at(a),
         Recurrence::Scale(a, c) => at(a) * c,
         Recurrence::Over(a, c) => at(a) / c,
         Recurrence::Mul(a, b) if a == b => S::zero() + S::zero() + at(a).squared(),
@@ -156,14 +190,8 @@ pub(super) fn start_of<S: Elementary>(
         Recurrence::Sqrt(a) => at(a).sqrt(),
         Recurrence::Sign(a) => at(a).sign(),
         Recurrence::Tanh(a, _) => at(a).tanh(),
-        Recurrence::TanhSlope(u) => {
-            let known = match equation.recurrences[u - equation.dimension] {
-                Recurrence::Tanh(a, _) => at(a).sech_squared(),
-                _ => None,
-            };
-            // As (1 - u)(1 + u): exactly zero where tanh is saturated, and accurate near it.
-            known.unwrap_or_else(|| (S::one() - at(u)) * (S::one() + at(u)))
-        }
+        // As (1 - u)(1 + u): exactly zero where tanh is saturated, and accurate near it.
+        Recurrence::TanhSlope(u, a) => at(a).sech_squared().unwrap_or_else(|| (S::one() - at(u)) * (S::one() + at(u))),
         Recurrence::Sin(a, _) => at(a).sin(),
         Recurrence::Cos(a, _) => at(a).cos(),
         Recurrence::OnePlusSquare(a) => S::one() + at(a).squared(),
@@ -175,88 +203,97 @@ pub(super) fn start_of<S: Elementary>(
 /// Carries the instructions out at one degree.
 #[inline(always)]
 pub(super) fn advance<S: Elementary, T: Table<S>>(plan: &Plan<S>, table: &mut T) {
-    let k = table.degree();
-    let (degree, next) = (k as f64, (k + 1) as f64);
     let mut this = S::zero();
-    for &Instruction { action, to } in &plan.instructions {
-        this = match action {
-            Action::Clear => S::zero(),
-            Action::Copy(a) => table.at(a),
-            Action::Keep => this,
-            Action::Neg(a) => -table.at(a),
-            Action::NegThis => -this,
-            Action::NegScale(a, c) => -(table.at(a) * c),
-            Action::NegLess(a, b) => -table.at(a) - table.at(b),
-            Action::Add(a, b) => table.at(a) + table.at(b),
-            Action::ThisPlus(a) => this + table.at(a),
-            Action::PlusThis(a) => table.at(a) + this,
-            Action::Sub(a, b) => table.at(a) - table.at(b),
-            Action::ThisLess(a) => this - table.at(a),
-            Action::LessThis(a) => table.at(a) - this,
-            Action::Scale(a, c) => table.at(a) * c,
-            Action::ScaleThis(c) => this * c,
-            Action::PlusScale(a, b, c) => table.at(a) + table.at(b) * c,
-            Action::LessScale(a, b, c) => table.at(a) - table.at(b) * c,
-            Action::Over(a, c) => table.at(a) / c,
-            Action::ThisOver(c) => this / c,
-            Action::Mul(a, b) => product(table, a, b),
-            Action::PlusMul(a, b, c) => table.at(a) + product(table, b, c),
-            Action::LessMul(a, b, c) => table.at(a) - product(table, b, c),
-            Action::MulPlus(a, b, c) => product(table, a, b) + table.at(c),
-            Action::MulLess(a, b, c) => product(table, a, b) - table.at(c),
-            Action::Square(a) => square(table, a),
-            Action::PlusSquare(a, b) => table.at(a) + square(table, b),
-            Action::Squares(a, b) => square(table, a) + square(table, b),
-            Action::ThreeSquares(a, b, c) => (square(table, a) + square(table, b)) + square(table, c),
-            Action::Lift(c, a) => lifted(table.get(c, 0), table.at(a)),
-            Action::PlusLift(a, c, b) => table.at(a) + lifted(table.get(c, 0), table.at(b)),
-            Action::LiftThis(c) => lifted(table.get(c, 0), this),
-            Action::PlusLiftThis(a, c) => table.at(a) + lifted(table.get(c, 0), this),
-            Action::Div(a, b) => (table.at(a) - table.products(b, to, 1, k + 1)) / table.get(b, 0),
-            Action::Exp(a, weights) => {
-                table.set(weights, table.at(a).scale(degree));
-                integral(table, weights, to)
-            }
-            Action::Ln(a) => {
-                // The sum lacks exactly the term of the coefficient asked for.
-                table.set(to + 1, S::zero());
-                let u = (table.at(a) - integral(table, to + 1, a)) / table.get(a, 0);
-                table.set(to + 1, u.scale(degree));
-                u
-            }
-            Action::Sqrt(a) => {
-                // The square's coefficient lacks exactly 2 r_0 r_k.
-                table.set(to, S::zero());
-                (table.at(a) - square(table, to)) / table.get(to, 0).scale(2.0)
-            }
-            Action::Tanh(a, weights) => {
-                let a = table.at(a);
-                tanh(table, a, weights, to)
-            }
-            Action::TanhThis(weights) => tanh(table, this, weights, to),
-            Action::Sin(a, weights) => {
-                table.set(weights, table.at(a).scale(degree));
-                let cosine = -integral(table, weights, to);
-                let sine = integral(table, weights, to + 1);
-                table.set(to + 1, cosine);
-                sine
-            }
-            Action::Atan(a) => {
-                table.set(to + 1, S::zero());
-                let u = (table.at(a) - integral(table, to + 1, to - 1)) / table.get(to - 1, 0);
-                table.set(to + 1, u.scale(degree));
-                u
-            }
-            Action::Erf(a, weights) => {
-                table.set(weights, table.at(a).scale(degree));
-                integral(table, weights, to - 1)
-            }
-        };
-        table.set(to, this);
+    for &instruction in &plan.instructions {
+        this = carry_out(instruction, this, table);
     }
+    let next = (table.degree() + 1) as f64;
     for (i, derivative) in plan.derivatives.iter().enumerate() {
         table.set_next(i, table.at(*derivative).over(next));
     }
+}
+
+/// Carries one instruction out, `this` being the number at hand. Returns the next.
+#[inline(always)]
+pub(super) fn carry_out<S: Elementary, T: Table<S>>(instruction: Instruction<S>, this: S, table: &mut T) -> S {
+    let Instruction { action, to } = instruction;
+    let k = table.degree();
+    let degree = k as f64;
+    let this = match action {
+        Action::Clear => S::zero(),
+        Action::Copy(a) => table.at(a),
+        Action::Keep => this,
+        Action::Neg(a) => -table.at(a),
+        Action::NegThis => -this,
+        Action::NegScale(a, c) => -(table.at(a) * c),
+        Action::NegLess(a, b) => -table.at(a) - table.at(b),
+        Action::Add(a, b) => table.at(a) + table.at(b),
+        Action::ThisPlus(a) => this + table.at(a),
+        Action::PlusThis(a) => table.at(a) + this,
+        Action::Sub(a, b) => table.at(a) - table.at(b),
+        Action::ThisLess(a) => this - table.at(a),
+        Action::LessThis(a) => table.at(a) - this,
+        Action::Scale(a, c) => table.at(a) * c,
+        Action::ScaleThis(c) => this * c,
+        Action::PlusScale(a, b, c) => table.at(a) + table.at(b) * c,
+        Action::LessScale(a, b, c) => table.at(a) - table.at(b) * c,
+        Action::Over(a, c) => table.at(a) / c,
+        Action::ThisOver(c) => this / c,
+        Action::Mul(a, b) => product(table, a, b),
+        Action::PlusMul(a, b, c) => table.at(a) + product(table, b, c),
+        Action::LessMul(a, b, c) => table.at(a) - product(table, b, c),
+        Action::MulPlus(a, b, c) => product(table, a, b) + table.at(c),
+        Action::MulLess(a, b, c) => product(table, a, b) - table.at(c),
+        Action::Square(a) => square(table, a),
+        Action::PlusSquare(a, b) => table.at(a) + square(table, b),
+        Action::Squares(a, b) => square(table, a) + square(table, b),
+        Action::ThreeSquares(a, b, c) => (square(table, a) + square(table, b)) + square(table, c),
+        Action::Lift(c, a) => lifted(table.get(c, 0), table.at(a)),
+        Action::PlusLift(a, c, b) => table.at(a) + lifted(table.get(c, 0), table.at(b)),
+        Action::LiftThis(c) => lifted(table.get(c, 0), this),
+        Action::PlusLiftThis(a, c) => table.at(a) + lifted(table.get(c, 0), this),
+        Action::Div(a, b) => (table.at(a) - table.products(b, to, 1, k + 1)) / table.get(b, 0),
+        Action::Exp(a, weights) => {
+            table.set(weights, table.at(a).scale(degree));
+            integral(table, weights, to)
+        }
+        Action::Ln(a) => {
+            // The sum lacks exactly the term of the coefficient asked for.
+            table.set(to + 1, S::zero());
+            let u = (table.at(a) - integral(table, to + 1, a)) / table.get(a, 0);
+            table.set(to + 1, u.scale(degree));
+            u
+        }
+        Action::Sqrt(a) => {
+            // The square's coefficient lacks exactly 2 r_0 r_k.
+            table.set(to, S::zero());
+            (table.at(a) - square(table, to)) / table.get(to, 0).scale(2.0)
+        }
+        Action::Tanh(a, weights) => {
+            let a = table.at(a);
+            tanh(table, a, weights, to)
+        }
+        Action::TanhThis(weights) => tanh(table, this, weights, to),
+        Action::Sin(a, weights) => {
+            table.set(weights, table.at(a).scale(degree));
+            let cosine = -integral(table, weights, to);
+            let sine = integral(table, weights, to + 1);
+            table.set(to + 1, cosine);
+            sine
+        }
+        Action::Atan(a) => {
+            table.set(to + 1, S::zero());
+            let u = (table.at(a) - integral(table, to + 1, to - 1)) / table.get(to - 1, 0);
+            table.set(to + 1, u.scale(degree));
+            u
+        }
+        Action::Erf(a, weights) => {
+            table.set(weights, table.at(a).scale(degree));
+            integral(table, weights, to - 1)
+        }
+    };
+    table.set(to, this);
+    this
 }
 
 /// A constant times a coefficient, as the only term of a product's sum.
@@ -304,6 +341,8 @@ pub(super) struct Plan<S> {
     instructions: Vec<Instruction<S>>,
     /// Where the coefficients of the components' derivatives are.
     derivatives: Vec<Series>,
+    /// The same compiled, if that is so.
+    pub compiled: Option<Compiled>,
 }
 
 impl<S: Elementary> Plan<S> {
@@ -323,8 +362,12 @@ impl<S: Elementary> Plan<S> {
                 }
             }
         }
-        let derivatives = equation.outputs.iter().map(|output| tails.place(*output)).collect();
-        Self { saturated, instructions: planner.instructions, derivatives }
+        let derivatives: Vec<_> = equation.outputs.iter().map(|output| tails.place(*output)).collect();
+        let instructions = planner.instructions;
+        let compiled = (&instructions as &dyn Any)
+            .downcast_ref::<Vec<Instruction<f64>>>()
+            .and_then(|instructions| Compiled::of(instructions, &derivatives));
+        Self { saturated, instructions, derivatives, compiled }
     }
 }
 
@@ -454,7 +497,7 @@ impl Tails {
                 self.read(self.place(b));
             }
             Recurrence::Neg(a)
-            | Recurrence::Minus(_, a)
+            | Recurrence::Minus(a, _)
             | Recurrence::Scale(a, _)
             | Recurrence::Over(a, _)
             | Recurrence::Sqrt(a)
@@ -467,7 +510,7 @@ impl Tails {
                 self.read(this - 1);
             }
             // Computed with the one before.
-            Recurrence::TanhSlope(_) | Recurrence::Cos(..) => self.read(this - 1),
+            Recurrence::TanhSlope(..) | Recurrence::Cos(..) => self.read(this - 1),
             Recurrence::Constant(_) | Recurrence::Sign(_) | Recurrence::Shift(..) | Recurrence::Weighted(_) => {}
         }
     }
@@ -506,8 +549,8 @@ impl<S: Elementary> Planner<'_, S> {
         let at_hand = |a: Series| self.at_hand == Some(self.tails.place(a));
         let zero = |a: Series| S::EXACT_ZEROS && self.tails.is_zero(a);
         let action = match recurrence {
-            Recurrence::Neg(a) | Recurrence::Minus(_, a) if at_hand(a) => Action::NegThis,
-            Recurrence::Neg(a) | Recurrence::Minus(_, a) => Action::Neg(place(a)),
+            Recurrence::Neg(a) | Recurrence::Minus(a, _) if at_hand(a) => Action::NegThis,
+            Recurrence::Neg(a) | Recurrence::Minus(a, _) => Action::Neg(place(a)),
             Recurrence::Add(a, b) if at_hand(a) => Action::ThisPlus(place(b)),
             Recurrence::Add(a, b) if at_hand(b) => Action::PlusThis(place(a)),
             Recurrence::Add(a, b) => Action::Add(place(a), place(b)),
@@ -535,7 +578,7 @@ impl<S: Elementary> Planner<'_, S> {
             Recurrence::Atan(a) => Action::Atan(place(a)),
             Recurrence::Erf(a, weights) => Action::Erf(place(a), weights),
             // Computed with the tanh or sine before them, or by those who need weights.
-            Recurrence::TanhSlope(_) | Recurrence::Cos(..) | Recurrence::Weighted(_) => return,
+            Recurrence::TanhSlope(..) | Recurrence::Cos(..) | Recurrence::Weighted(_) => return,
             Recurrence::Constant(_) | Recurrence::Sign(_) | Recurrence::Shift(..) => {
                 unreachable!("what is constant or a copy is not computed")
             }

@@ -1,7 +1,7 @@
 //! Where the coefficients of all series are while they are computed.
 
 use super::Series;
-use super::plan::{Equation, Plan, advance, start};
+use super::plan::{Plan, advance};
 use crate::num::Elementary;
 
 /// The coefficients below degree k of all series, and those of degree k of the series that have been computed.
@@ -65,7 +65,7 @@ pub(super) const LONGEST: usize = 21;
 ///
 /// With its length known, a sum is computed without a loop: how often a loop goes round is what a processor guesses wrong. And as neighbours in a row belong to
 /// different series, no compiler reads two coefficients at once: that would have to wait until the younger one has arrived in memory.
-struct Rows<'a, const T: usize> {
+pub(super) struct Rows<'a, const T: usize> {
     known: &'a mut [[f64; ROW]; T],
     next: &'a mut [f64; ROW],
 }
@@ -103,10 +103,11 @@ impl<const T: usize> Table<f64> for Rows<'_, T> {
     }
 }
 
-/// See [`start`].
-pub(super) fn start_rows(equation: &Equation<f64>, rows: &mut [[f64; ROW]]) -> u64 {
+/// Does what [`start`](super::plan::start) does, on more than one row.
+#[inline(always)]
+pub(super) fn start_rows(rows: &mut [[f64; ROW]], start: impl FnOnce(&mut Rows<1>) -> u64) -> u64 {
     match rows.split_first_chunk_mut::<1>() {
-        Some((known, [next, ..])) => start(equation, &mut Rows { known, next }),
+        Some((known, [next, ..])) => start(&mut Rows { known, next }),
         _ => 0,
     }
 }
@@ -127,6 +128,10 @@ pub(super) fn advance_rows(plan: &Plan<f64>, rows: &mut [[f64; ROW]], k: usize) 
 #[inline(never)]
 fn advance_in<const T: usize>(plan: &Plan<f64>, rows: &mut [[f64; ROW]]) {
     if let Some((known, [next, ..])) = rows.split_first_chunk_mut::<T>() {
-        advance(plan, &mut Rows { known, next });
+        let mut rows = Rows { known, next };
+        match &plan.compiled {
+            Some(compiled) => compiled.advance(&mut rows),
+            None => advance(plan, &mut rows),
+        }
     }
 }
