@@ -128,6 +128,7 @@ fn once(unit: &str, set: &str, method: &str) -> Option<Done> {
         }
         ("W2", "dopri5-lanes-portable") => w2_in_lanes(&field, InstructionSet::Portable),
         ("W1", "dopri5-file") => w1(&from_file(set)?, Dopri5::new(TOLERANCE)),
+        ("W1", "taylor-file") => w1(&from_file(set)?, Taylor::new(TOLERANCE)),
         ("W2", "dopri5-lanes-file") => w2_in_lanes(&from_file(set)?, InstructionSet::best()),
         // As if each run had parameters of its own.
         ("W2", "dopri5-lanes-parameters") => {

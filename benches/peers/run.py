@@ -53,6 +53,8 @@ METHODS = {
     # With an error at the end of W0 below the crate's in both sets.
     "radau5-matched": (W1, "differential-equations Radau5", 1 / 1.5),
     "taylor": (W1, "heyoka Taylor, layer resolved by events", 1 / 1.2),
+    # The same system from its file, whose series are not compiled.
+    "taylor-file": (W1, "heyoka Taylor, layer resolved by events", 1 / 1.2),
     "taylor-extended": (W3, "__float128 Taylor", 1 / 10),
 }
 
