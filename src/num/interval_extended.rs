@@ -473,3 +473,124 @@ impl Enclosure for Ball {
         (self.thin(), Interval::symmetric(self.radius))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::num::{MultiFloat, Scalar};
+
+    /// 150 digits.
+    type Fine = MultiFloat<8>;
+
+    /// A function in balls and in many digits.
+    struct Function {
+        name: &'static str,
+        ball: fn(Ball) -> Ball,
+        fine: fn(Fine) -> Fine,
+        /// What a radius about `x` may add to the result's, the value there being `y` in modulus.
+        spread: fn(x: f64, radius: f64, y: f64) -> f64,
+        /// What rounding may add to it, in units of 1e-30 y; `x` in modulus.
+        rounding: fn(x: f64, y: f64) -> f64,
+        /// Arguments from which on it is given.
+        from: f64,
+    }
+
+    fn sech_squared(x: Fine) -> Fine {
+        let e = (-(x.abs() + x.abs())).exp();
+        let f = e + Fine::one();
+        e / (f * f) * Fine::from_f64(4.0)
+    }
+
+    fn functions() -> [Function; 9] {
+        let all = f64::NEG_INFINITY;
+        let f = |name, ball, fine, spread, rounding, from| Function { name, ball, fine, spread, rounding, from };
+        // Beyond the first quadrant, pi's own error, whatever the value is.
+        let reduced = |x: f64, y: f64| (0.73 + 0.11 * x) / if x > 1.0 { y } else { 1.0 };
+        [
+            f("exp", Ball::exp, Fine::exp, |_, r, y| y * (r + r * r), |x, _| 0.9 + 0.25 * x, all),
+            f("tanh", Ball::tanh, Fine::tanh, |x, r, _| r / cosh((x.abs() - r).max(0.0)).powi(2), |_, _| 3.7, all),
+            f("sech^2", Ball::sech_squared_ball, sech_squared, |_, r, y| 14.8 * r * y, |x, _| 2.1 + 0.48 * x, all),
+            f("sin", Ball::sin, Fine::sin, |_, r, _| r, reduced, all),
+            f("cos", Ball::cos, Fine::cos, |_, r, _| r, reduced, all),
+            f("ln", Ball::ln, Fine::ln, |x, r, _| r / (x - r), |_, y| (1.2 + 0.75 * y) / y, 0.01),
+            f("sqrt", Ball::sqrt, Fine::sqrt, |x, r, _| r / x.sqrt(), |_, _| 0.125, 0.01),
+            f("atan", Ball::atan, Fine::atan, |_, r, _| r, |_, _| 1.6, all),
+            f("erf", Ball::erf, Fine::erf, |_, r, _| 1.13 * r, |x, _| 1.15 + 1.3 * x + 0.62 * x * x, all),
+        ]
+    }
+
+    fn cosh(x: f64) -> f64 {
+        let e = Elementary::exp(x);
+        0.5 * (e + 1.0 / e)
+    }
+
+    const POINTS: [f64; 15] =
+        [1e-70, 1e-20, 0.003, 0.05, 0.11, 0.169, 0.18, 0.34, 0.7, 1.6, 2.9, 6.5, 11.5, 40.3, 150.1];
+
+    #[test]
+    fn a_function_of_a_ball_contains_its_values_and_little_else() {
+        for Function { name, ball, fine, spread, rounding, from } in functions() {
+            for x in POINTS.iter().flat_map(|x| [*x, -x]).filter(|x| *x >= from) {
+                // A midpoint with a second part.
+                let midpoint = DoubleDouble::from_f64(x) + DoubleDouble::from_f64(x * 3e-18);
+                let center = Fine::from_f64(midpoint.high()) + Fine::from_f64(midpoint.low());
+                for radius in [0.0, 1e-25, 1e-14, 1e-6, 2e-3] {
+                    if x.abs() < 1e-3 && radius > 1e-9 {
+                        continue;
+                    }
+                    let found = ball(Ball::new(midpoint, radius));
+                    let y = fine(center).to_f64().abs();
+                    for part in [-1.0, -0.4, 0.0, 0.7, 1.0] {
+                        let value = fine(center + Fine::from_f64(radius) * Fine::from_f64(part));
+                        let away =
+                            value - Fine::from_f64(found.midpoint().high()) - Fine::from_f64(found.midpoint().low());
+                        assert!(
+                            away.abs() <= Fine::from_f64(found.radius()),
+                            "{name} of {x} ± {radius}, {part}: {found:?}"
+                        );
+                    }
+                    let most = spread(x, radius, y) * (1.0 + 1e-9) + rounding(x.abs(), y) * 1e-30 * y;
+                    assert!(found.radius() <= most, "{name} of {x} ± {radius}: {found:?}, wanted {most:e}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn beyond_what_it_knows_a_ball_says_so() {
+        let point = |x: f64| Ball::from_f64(x);
+        let thick = |x: f64, radius: f64| Ball::new(DoubleDouble::from_f64(x), radius);
+        assert!(Ball::ENTIRE.is_entire() && !thick(1.0, 1e300).is_entire());
+        for f in [Ball::tanh, Ball::exp, Ball::ln, Ball::atan, Ball::erf, Ball::sqrt, Ball::sin, Ball::cos] {
+            assert!(f(Ball::ENTIRE).is_entire());
+        }
+        for entire in [
+            point(621.0).exp(),
+            thick(0.0, 1.1).exp(),
+            point(-1.0).ln(),
+            thick(1.0, 1.0).ln(),
+            point(-1.0).sqrt(),
+            thick(1.0, 1.5).sqrt(),
+            point(1e-280).times_power_of_two(-20),
+            point(1.0).times_power_of_two(1001),
+            point(1.0) / thick(1.0, 1.0),
+            thick(0.0, 0.5).sign(),
+        ] {
+            assert!(entire.is_entire(), "{entire:?}");
+        }
+        // Far out, all that is known is within 1.
+        for known in [point(1e13).sin(), thick(0.5, 1.5).sech_squared_ball(), thick(301.0, 2.0).sech_squared_ball()] {
+            assert_eq!((known.midpoint().high(), known.radius()), (0.0, 1.0));
+        }
+        for x in [-301.0, 301.0] {
+            let (tanh, slope) = (thick(x, 0.5).tanh(), thick(x, 0.5).sech_squared_ball());
+            assert_eq!(tanh.midpoint().high(), x.signum());
+            assert!((1e-260..1e-100).contains(&tanh.radius()), "{tanh:?}");
+            assert!(slope.midpoint().high() == 0.0 && slope.radius() == 1e-259, "{slope:?}");
+        }
+        let erf = point(-12.5).erf();
+        assert!(erf.midpoint().high() == -1.0 && (1e-62..1.1e-62).contains(&erf.radius()), "{erf:?}");
+        assert_eq!(thick(3.0, 0.5).times_power_of_two(-1).midpoint().high(), 1.5);
+        assert_eq!(thick(-3.0, 0.5).sign(), point(-1.0));
+    }
+}
