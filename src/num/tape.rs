@@ -858,7 +858,9 @@ mod tests {
         let c = S::from_f64(0.1);
         let r = x.squared() + y.squared();
         let shared = (c - y.scale(1e-3)) * r + S::one();
-        let a = (x / S::from_f64(0.3)).tanh() * shared - (y.exp() / (r + S::one()).sqrt()) + S::one() / (r + c);
+        let mut a = (x / S::from_f64(0.3)).tanh() * shared - (y.exp() / (r + S::one()).sqrt()) + S::one() / (r + c);
+        a += c;
+        a -= y;
         let b = -(x * y).sin() + y.cos() * (r + c).ln() - x.atan() + (x - y).erf() + y.abs();
         [a, b + (pi - x).power(5) - S::one(), S::from_f64(2.5)]
     }
