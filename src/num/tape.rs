@@ -859,7 +859,7 @@ mod tests {
         let r = x.squared() + y.squared();
         let shared = (c - y.scale(1e-3)) * r + S::one();
         let mut a = (x / S::from_f64(0.3)).tanh() * shared - (y.exp() / (r + S::one()).sqrt()) + S::one() / (r + c);
-        a += c;
+        a += c * x;
         a -= y;
         let b = -(x * y).sin() + y.cos() * (r + c).ln() - x.atan() + (x - y).erf() + y.abs();
         [a, b + (pi - x).power(5) - S::one(), S::from_f64(2.5)]
@@ -1082,5 +1082,24 @@ mod tests {
         let mut out = [0.0; 3];
         Program::new(&t).evaluate(&[3.0], &mut out);
         assert_eq!(out[..2], [3.0 * 0.1 + 0.1 * 0.2 - 0.0, 2.0]);
+    }
+
+    #[test]
+    fn programs_are_alike_that_differ_in_numbers_alone() {
+        let number = Recorded::from_f64;
+        let program = |f: &dyn Fn(&[Recorded]) -> Vec<Recorded>| Program::new(&Tape::record(2, f));
+        let one = program(&|v| vec![v[0] * number(0.3) + v[1], number(2.0)]);
+        assert!(one.is_like(&program(&|v| vec![v[0] * number(0.4) + v[1], number(3.0)])));
+        for other in [
+            // Another operation, another variable, a value where there was a number, the values the other way round.
+            program(&|v| vec![v[0] * number(0.3) - v[1], number(2.0)]),
+            program(&|v| vec![v[1] * number(0.3) + v[0], number(2.0)]),
+            program(&|v| vec![v[0] * number(0.3) + v[1], v[0]]),
+            program(&|v| vec![number(2.0), v[0] * number(0.3) + v[1]]),
+            program(&|v| vec![v[0] * number(0.3) + v[1], number(2.0), number(1.0)]),
+        ] {
+            assert!(!one.is_like(&other) && !other.is_like(&one), "{other:?}");
+        }
+        assert!(!one.is_like(&Program::new(&Tape::record(3, |v| vec![v[0] * number(0.3) + v[1], number(2.0)]))));
     }
 }
