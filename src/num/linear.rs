@@ -382,6 +382,25 @@ mod tests {
         }
     }
 
+    /// A cycle and twice the identity: every double step changes nothing, until the exceptional shift comes, which has something to shift by.
+    #[test]
+    fn what_goes_round_in_circles_is_shaken() {
+        for n in 3..9 {
+            for shift in [2.0, -0.5] {
+                let entry = |i: usize, j: usize| f64::from((i + 1) % n == j) + if i == j { shift } else { 0.0 };
+                let matrix: Vec<f64> = (0..n * n).map(|at| entry(at / n, at % n)).collect();
+                let found = eigenvalues(&matrix, n).unwrap();
+                assert_eq!(found.len(), n);
+                for k in 0..n {
+                    let turn = std::f64::consts::TAU * k as f64 / n as f64;
+                    let root = [shift + turn.cos(), turn.sin()];
+                    let near = |e: &&[f64; 2]| (e[0] - root[0]).abs() + (e[1] - root[1]).abs() < 1e-13;
+                    assert_eq!(found.iter().filter(near).count(), 1, "{n} {shift} {root:?} {found:?}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn roots_of_one() {
         for n in [3, 4, 5, 7, 8] {
