@@ -723,6 +723,9 @@ mod tests {
         assert_eq!(i(3.0, 3.2).cos().lower(), -1.0);
         assert!(i(0.1, 1.5).sin().upper() < 1.0 && i(2.0, 4.0).sin().lower() > -1.0);
         assert_eq!(i(0.0, 7.0).sin(), Interval::UNIT);
+        // Far out nothing is said, however thin the argument; nearer it is.
+        assert_eq!((Interval::from_f64(2e9).sin(), Interval::from_f64(-2e9).cos()), (Interval::UNIT, Interval::UNIT));
+        assert!(Interval::from_f64(9e8).sin().width() < 1e-6);
         assert!(Interval::from_f64(PI).sin().contains(1.2246467991473532e-16));
         assert!(Interval::from_f64(PI).sin().width() < 1e-30);
     }
