@@ -1,7 +1,15 @@
 //! Equations whose series are compiled.
 //!
-//! To go through a list of recurrences or instructions costs a jump for each, which takes about as long as what it does. The paper's equation (8), the smoothed
-//! caricature, is known beforehand: its recurrences and its plans are written down here, once, as lists that an equation is compared with and that are compiled too. What is none of them is
+//! To go through a list of recurrences or instructions costs a jump for each, which takes about as long as what it does. One equation is known beforehand, the normal form of a two-fold with
+//! a pull towards it, smoothed (Jeffrey 2013, eqs (4), (5) and (8)):
+//!
+//! ```text
+//! f- + (f+ - f-) phi,  phi = (1 + tanh(x/eps))/2
+//! f+ = (-y, 1,  v+) + (0, alpha - beta y, alpha - beta z) |x|^2
+//! f- = ( z, v-, 1 ) + (0, alpha - beta y, alpha - beta z) |x|^2
+//! ```
+//!
+//! Its recurrences and its plans are written down here, once, as lists that an equation is compared with and that are compiled too. What is none of them is
 //! gone through; the bits are the same, since either way each recurrence is [`begin`] and each instruction [`carry_out`].
 
 use super::plan::{Action, Instruction, Saturated, begin, carry_out};
@@ -130,7 +138,7 @@ macro_rules! shapes {
     };
 }
 
-// Series 0 to 2 are x, y, z; 5 is tanh(x/eps), 8 the transition function phi, 13 the square of the distance from the origin, 16 and 19 the reinjection, 20 to 22 f+, 2, 23 and 24 f-.
+// Series 0 to 2 are x, y, z; 5 is tanh(x/eps), 8 the transition function phi, 13 the square of the distance from the origin, 16 and 19 the pull, 20 to 22 f+, 2, 23 and 24 f-.
 opening! {
     dimension 3 outputs [27, 30, 33] {
         Over(0; eps) -> 3,
@@ -168,8 +176,8 @@ opening! {
 }
 
 shapes! {
-    /// The smoothed caricature where tanh(x/eps) is +-1.
-    CaricatureOutside derivatives [27, 16, 19] {
+    /// Where tanh(x/eps) is +-1.
+    TwoFoldOutside derivatives [27, 16, 19] {
         Over(0; eps) -> 3,
         ThreeSquares(0, 1, 2) -> 13,
         NegScale(1; beta) -> 15,
@@ -180,8 +188,8 @@ shapes! {
         PlusLiftThis(2, 8) -> 27,
     }
 
-    /// The smoothed caricature within the layer.
-    CaricatureInside derivatives [27, 30, 33] {
+    /// Within the layer.
+    TwoFoldInside derivatives [27, 30, 33] {
         Over(0; eps) -> 3,
         TanhThis(4) -> 5,
         ScaleThis(; half) -> 8,
@@ -205,7 +213,7 @@ mod tests {
     use crate::num::{Arithmetic, Elementary, Tape};
 
     /// Eq. (8) with the fields of eq. (5), the first component of f- being `sign` z.
-    fn caricature(sign: f64, eps: f64) -> Tape {
+    fn two_fold(sign: f64, eps: f64) -> Tape {
         let c = Recorded::from_f64;
         Tape::record(3, |x| {
             let phi = ((x[0] / c(eps)).tanh() + c(1.0)) * c(0.5);
@@ -219,10 +227,10 @@ mod tests {
     }
 
     #[test]
-    fn the_caricature_is_compiled_at_every_degree_and_has_the_bits_of_its_recurrences() {
+    fn the_two_fold_is_compiled_at_every_degree_and_has_the_bits_of_its_recurrences() {
         for degree in 1..=21 {
             for eps in [0.125, 1e-3] {
-                let mut solution = Solution::<f64>::new(degree, &caricature(1.0, eps), Constants::Binary);
+                let mut solution = Solution::<f64>::new(degree, &two_fold(1.0, eps), Constants::Binary);
                 for start in [[0.3, 0.5, -0.7], [1e-3, -0.4, 0.9], [-0.4, 0.0, 1.1], [-2e-4, 0.6, 0.2]] {
                     solution.expand(&start);
                     assert!(solution.is_compiled(), "{solution:?}");
@@ -239,16 +247,16 @@ mod tests {
 
     #[test]
     fn another_equation_is_not_taken_for_it() {
-        let mut misprint = Solution::<f64>::new(9, &caricature(-1.0, 1e-3), Constants::Binary);
-        misprint.expand(&[0.3, 0.5, -0.7]);
-        assert!(misprint.opening.is_none() && misprint.plans.iter().all(|plan| plan.compiled.is_none()));
+        let mut other = Solution::<f64>::new(9, &two_fold(-1.0, 1e-3), Constants::Binary);
+        other.expand(&[0.3, 0.5, -0.7]);
+        assert!(other.opening.is_none() && other.plans.iter().all(|plan| plan.compiled.is_none()));
         // A solution that is given another equation forgets.
-        let mut solution = Solution::<f64>::new(9, &caricature(1.0, 1e-3), Constants::Binary);
+        let mut solution = Solution::<f64>::new(9, &two_fold(1.0, 1e-3), Constants::Binary);
         solution.expand(&[0.3, 0.5, -0.7]);
         assert!(solution.is_compiled());
-        solution.set_tape(&caricature(-1.0, 1e-3), Constants::Binary);
+        solution.set_tape(&two_fold(-1.0, 1e-3), Constants::Binary);
         solution.expand(&[0.3, 0.5, -0.7]);
         assert!(!solution.is_compiled());
-        assert_eq!(solution.component(0), misprint.component(0));
+        assert_eq!(solution.component(0), other.component(0));
     }
 }
