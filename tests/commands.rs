@@ -124,6 +124,38 @@ fn pictures_that_cannot_be_are_refused_with_reasons() {
     assert_eq!(fs::read_dir(at).unwrap().count(), 1, "something was written");
 }
 
+/// A table in a file that is called a picture would be noticed by whoever opens it.
+#[test]
+fn numbers_go_into_files_that_are_named_for_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let run = ["run", "--quiet", "--system", "stick-slip", "--t-end", "3"];
+    for format in ["csv", "json", "parquet"] {
+        let (named, asked) = (format!("named.{format}"), format!("asked-{format}"));
+        good(at, &[&run[..], &["--out", &named]].concat());
+        good(at, &[&run[..], &["--format", format, "--out", &asked]].concat());
+        assert!(fs::read(at.join(named)).unwrap() == fs::read(at.join(asked)).unwrap(), "{format}");
+    }
+    let written = fs::read_dir(at).unwrap().count();
+    let scan = ["scan", "--quiet", "--system", "stick-slip", "--section", "x=0.5", "--over", "params.belt=0.3,0.4"];
+    let sweep = ["sweep", "--quiet", "--t-end", "30", "--runs", "2"];
+    let orbit = ["orbit", "--quiet", "--system", "stick-slip", "--switch", "filippov", "--section", "v=0"];
+    let exponent = ["lyapunov", "--quiet", "--system", "chua", "--t-end", "20"];
+    for (call, out, why) in [
+        (&run[..], "a.png", "`twofold plot`"),
+        (&[&run[..], &["--format", "json"]].concat(), "a.csv", "the name says csv, but json is asked for"),
+        (&scan, "a.svg", "`twofold scan --plot`"),
+        (&scan, "a.json", "what is written is csv"),
+        (&sweep, "a.pdf", "csv or json or parquet"),
+        (&[&sweep[..], &["--json"]].concat(), "a.parquet", "the name says parquet"),
+        (&orbit, "a.parquet", "text or csv or json"),
+        (&exponent, "a.csv", "text or json"),
+    ] {
+        refused(at, &[call, &["--out", out]].concat(), 2, &["--out", out, why]);
+    }
+    assert_eq!(fs::read_dir(at).unwrap().count(), written, "something was written");
+}
+
 #[test]
 fn parameters_that_make_no_sense_are_refused() {
     let folder = tempfile::tempdir().unwrap();

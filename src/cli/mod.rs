@@ -15,6 +15,7 @@
 //! ```
 
 pub mod commands;
+pub mod ending;
 pub mod exit;
 pub mod figure;
 pub mod flags;

@@ -149,7 +149,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             "findings": findings,
         }))?;
     } else if failures == 0 {
-        print(&format!("{} pictures checked, all the same", findings.len()))?;
+        let pictures =
+            if findings.len() == 1 { "1 picture".to_owned() } else { format!("{} pictures", findings.len()) };
+        print(&format!("{pictures} checked, all the same"))?;
     } else {
         print(&format!(
             "{failures} differ. If the change is meant, look at the pictures (twofold report), then: twofold bless --reason \"why\""

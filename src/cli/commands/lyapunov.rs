@@ -3,6 +3,7 @@
 use serde_json::json;
 
 use crate::analyse::lyapunov::{Exponent, Settings};
+use crate::cli::ending;
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::progress::Progress;
 use crate::cli::speak::{Delivery, deliver, try_delivery};
@@ -25,7 +26,7 @@ pub struct Arguments {
     /// Time before averaging begins, in which the orbit settles and the vector turns into the fastest direction [default: a tenth of --t-end].
     #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Exponent")]
     transient: Option<f64>,
-    /// Output format [default: text].
+    /// Output format [default: what the name of --out ends in, else text].
     #[arg(long, value_enum)]
     format: Option<Format>,
     #[command(flatten)]
@@ -57,6 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     };
     let question = LargestExponent { system: spec.system, switch: spec.switch, start: spec.start, settings };
     let out = arguments.delivery.out.as_deref();
+    let format = ending::format(out, arguments.format, Format::Text)?;
     try_delivery(out)?;
     let progress = Progress::with_grace(arguments.delivery.quiet);
     let answer = match (Desk::new(None, &progress).ask(&question), progress.asked_to_stop()) {
@@ -69,7 +71,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         return Err(CliError::Job(JobError::Other(failure)));
     }
     let found: Exponent = answer.fact("exponent").map_err(JobError::from)?;
-    let bytes = match arguments.format.unwrap_or(Format::Text) {
+    let bytes = match format {
         Format::Json => encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() })),
         Format::Text => {
             let (value, error) = (found.value, found.standard_error);

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use serde_json::json;
 
 use crate::analyse::floquet::Plane;
+use crate::cli::ending;
 use crate::cli::exit::part_of;
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::progress::Progress;
@@ -43,7 +44,7 @@ pub struct Arguments {
     /// Follow the orbit along a parameter of the system, or eps, from one value to another, in at least so many steps [default: 40].
     #[arg(long, value_name = "NAME=FROM..TO[:STEPS]", allow_hyphen_values = true, help_heading = "Orbit")]
     along: Option<String>,
-    /// Output format [default: text].
+    /// Output format [default: what the name of --out ends in, else text].
     #[arg(long, value_enum)]
     format: Option<Format>,
     #[command(flatten)]
@@ -91,6 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         along: arguments.along.as_deref().map(along).transpose()?,
     };
     let out = arguments.delivery.out.as_deref();
+    let format = ending::format(out, arguments.format, Format::Text)?;
     try_delivery(out)?;
     let progress = Progress::with_grace(arguments.delivery.quiet);
     let answer = match Desk::new(None, &progress).ask(&question) {
@@ -100,7 +102,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         }
         other => other?,
     };
-    let bytes = match arguments.format.unwrap_or(Format::Text) {
+    let bytes = match format {
         Format::Text => text(&question, &answer)?.into_bytes(),
         Format::Csv => {
             let about = json!({ "kind": question.kind(), "question": question.json(), "facts": answer.facts });

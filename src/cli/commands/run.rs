@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde_json::json;
 
+use crate::cli::ending;
 use crate::cli::exit::part_of;
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::progress::Progress;
@@ -32,7 +33,7 @@ pub struct Arguments {
     /// Print the run's spec as JSON and compute nothing.
     #[arg(long, conflicts_with = "format")]
     print_spec: bool,
-    /// Output format [default: csv].
+    /// Output format [default: what the name of --out ends in, else csv].
     #[arg(long, value_enum)]
     format: Option<Format>,
     /// With taylor-extended, compute the orbit with the next precision and with another order, too, and say on standard error until when all three agree to
@@ -56,6 +57,8 @@ enum Format {
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let spec = arguments.flags.spec(Use::Any)?;
     let out = arguments.delivery.out.as_deref();
+    // A spec is JSON whatever the run's numbers would be.
+    let format = if arguments.print_spec { Format::Json } else { ending::format(out, arguments.format, Format::Csv)? };
     try_delivery(out)?;
     if arguments.print_spec {
         let mut text = serde_json::to_vec_pretty(&spec).expect("specs are plain data");
@@ -69,7 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     }
     let progress = Progress::with_grace(arguments.delivery.quiet);
     let run = Run(spec);
-    let exit = record(arguments, &run, out, &progress)?;
+    let exit = record(&run, format, out, &progress)?;
     if arguments.horizon {
         say_horizon(&run, &progress)?;
     }
@@ -96,8 +99,7 @@ fn say_horizon(run: &Run, progress: &Progress) -> Result<(), CliError> {
 }
 
 /// Computes the run and delivers it.
-fn record(arguments: &Arguments, run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, CliError> {
-    let format = arguments.format.unwrap_or(Format::Csv);
+fn record(run: &Run, format: Format, out: Option<&Path>, progress: &Progress) -> Result<Exit, CliError> {
     let funnel = matches!(run.0.switch, SwitchSpec::Filippov { funnel: Some(_), .. });
     if let (Format::Csv, false) = (format, funnel) {
         return stream(run, out, progress);

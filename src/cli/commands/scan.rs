@@ -5,16 +5,17 @@ use std::path::PathBuf;
 use rayon::prelude::*;
 use serde_json::json;
 
+use crate::cli::ending;
 use crate::cli::exit::part_of;
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::progress::Progress;
 use crate::cli::speak::{Delivery, complain, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit, in_pool};
-use crate::draw::scan::{self, Basin};
+use crate::draw::scan::{self, Basin, Scanned};
 use crate::integrate::Watch;
 use crate::job::scan::Ending;
 use crate::job::spec::{Observation, RunSpec};
-use crate::job::sweep::{Axis, Sweep};
+use crate::job::sweep::{Axis, Sweep, Values};
 use crate::job::table::{Column, Entry, Table};
 use crate::job::{self, Answer, Desk, JobError, Run, encode};
 use crate::render::markup;
@@ -60,6 +61,12 @@ const MOST_RUNS: u64 = 1_000_000;
 struct Cell {
     settings: Vec<Entry>,
     found: Result<Found, JobError>,
+}
+
+/// What the rows of a scan are written as.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Rows {
+    Csv,
 }
 
 /// What is kept of a run.
@@ -111,6 +118,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         return usage("--plot: a map is drawn over numbers".into());
     }
     let out = arguments.delivery.out.as_deref();
+    let Rows::Csv = ending::format(out, None, Rows::Csv)?;
     try_delivery(out)?;
     if let Some(file) = &arguments.plot {
         try_delivery(Some(file))?;
@@ -250,6 +258,13 @@ fn setting_columns(sweep: &Sweep) -> Vec<Column> {
         .collect()
 }
 
+/// A line of "name = value, name = value" without the values that every run of the scan has its own of; `None` if nothing is left.
+fn without(line: &str, varied: &[String]) -> Option<String> {
+    let is_fixed = |part: &&str| part.split_once(" = ").is_none_or(|(name, _)| !varied.iter().any(|v| v == name));
+    let fixed: Vec<&str> = line.split(", ").filter(is_fixed).collect();
+    (!fixed.is_empty()).then(|| fixed.join(", "))
+}
+
 fn passages(sweep: &Sweep, cells: &[Cell]) -> Table {
     let states = sweep.run().system.coordinates();
     let columns = setting_columns(sweep).into_iter().chain([Column::numbers("t")]);
@@ -298,35 +313,43 @@ fn endings(sweep: &Sweep, cells: &[Cell], alike: f64) -> (Table, Vec<Basin>) {
         let more = [Entry::Word(word), Entry::Integer(number), Entry::Word(reason)];
         table.push(cell.settings.iter().cloned().chain(more));
     }
+    let words: Vec<String> = known.iter().map(|(ending, _)| ending.word()).collect();
     let mut basins: Vec<Basin> = known.into_iter().map(|(_, basin)| basin).collect();
+    // Two attractors may have one word; the rows tell them apart by their numbers.
+    for (i, basin) in basins.iter_mut().enumerate() {
+        if words.iter().filter(|word| **word == words[i]).count() > 1 {
+            basin.name = format!("{}, no. {}", words[i], i + 1);
+        }
+    }
     if !failed.cells.is_empty() {
         basins.push(failed);
     }
     (table, basins)
 }
 
-/// An axis's name as mathematics sets it: of `params.alpha` only the parameter's.
-fn axis_title(axis: &Axis) -> String {
+/// A setting as it is drawn; its name as mathematics sets it, of `params.alpha` only the parameter's.
+fn scanned(axis: &Axis) -> Scanned {
     let name = axis.coordinate.to_string();
-    markup::name(name.rsplit('.').next().unwrap_or(&name))
+    let values: Vec<f64> = (0..axis.count()).map(|i| axis.value(i, 0.5).value()).collect();
+    let logarithmic = matches!(axis.values, Values::Log { .. }) && values.iter().all(|v| *v > 0.0);
+    Scanned { title: markup::name(name.rsplit('.').next().unwrap_or(&name)), values, logarithmic }
 }
 
 fn picture(sweep: &Sweep, table: &Table, basins: &[Basin], shown: Option<&str>, two: bool) -> crate::render::Sheet {
     let title = sweep.run().system.definition().title().to_owned();
     let axes = sweep.axes();
-    let numbers = |axis: &Axis| (0..axis.count()).map(|i| axis.value(i, 0.5).value()).collect::<Vec<f64>>();
     let mut sheet = if two {
-        let [u, v] = [0, 1].map(|k| axis_title(&axes[k]));
-        scan::map(&title, [&u, &v], &numbers(&axes[0]), &numbers(&axes[1]), basins)
+        scan::map(&title, [&scanned(&axes[0]), &scanned(&axes[1])], basins)
     } else {
         let name = axes[0].coordinate.to_string();
         let value = |row: usize| table.column(&name).map_or(f64::NAN, |c| c.get(row).value());
         let heights = shown.map_or(&[][..], |s| table.numbers(s));
         let points = heights.iter().enumerate().map(|(row, y)| [value(row), *y]).collect();
-        scan::diagram(&title, &axis_title(&axes[0]), &shown.map_or(String::new(), markup::name), points)
+        scan::diagram(&title, &scanned(&axes[0]), &shown.map_or(String::new(), markup::name), points)
     };
     let over: Vec<String> = axes.iter().map(|a| markup::literal(&a.to_string())).collect();
-    sheet.footer = small_print(sweep.run());
+    let varied: Vec<String> = axes.iter().map(|axis| scanned(axis).title).collect();
+    sheet.footer = small_print(sweep.run()).iter().filter_map(|line| without(line, &varied)).collect();
     sheet.footer.insert(0, format!("over {}", over.join(", ")));
     sheet
         .provenance("Software", concat!("twofold ", env!("CARGO_PKG_VERSION")))
@@ -335,4 +358,18 @@ fn picture(sweep: &Sweep, table: &Table, basins: &[Basin], shown: Option<&str>, 
         .provenance("Method", sweep.run().method.name.name())
         .provenance("Spec-SHA256", sweep.hash().as_str())
         .provenance("Data-SHA256", crate::record::Hash::of(&encode::bits(std::slice::from_ref(table))).as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_print_says_nothing_of_what_is_varied() {
+        let varied = ["*α*".to_owned(), "*ε*".to_owned()];
+        assert_eq!(without("*α* = 9, *β* = 14, *t* = 0 … 5", &varied).as_deref(), Some("*β* = 14, *t* = 0 … 5"));
+        assert_eq!(without("tanh smoothing, *ε* = 10^{-3}", &varied).as_deref(), Some("tanh smoothing"));
+        assert_eq!(without("*α* = 9", &varied), None);
+        assert_eq!(without("lsoda", &varied).as_deref(), Some("lsoda"));
+    }
 }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
+use crate::cli::ending;
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::progress::Progress;
 use crate::cli::rows::{compute, journal_of};
@@ -74,7 +75,7 @@ pub struct Arguments {
     /// Threads; 0 is one per core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
-    /// File to write instead of standard output (-): Parquet if its name ends in .parquet, else CSV.
+    /// File to write instead of standard output (-): Parquet or JSON if its name ends in .parquet or .json, else CSV.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Spec, rows and counts as JSON.
@@ -96,7 +97,7 @@ struct Merge {
     /// The parts: .parquet, .csv or .journal.
     #[arg(required = true, value_name = "FILE")]
     parts: Vec<PathBuf>,
-    /// File to write instead of standard output (-): Parquet if its name ends in .parquet, else CSV.
+    /// File to write instead of standard output (-): Parquet or JSON if its name ends in .parquet or .json, else CSV.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Spec, rows and counts as JSON.
@@ -160,17 +161,15 @@ fn sweep(arguments: &Arguments) -> Result<Sweep, CliError> {
 fn computed(arguments: &Arguments) -> Result<Exit, CliError> {
     let sweep = sweep(arguments)?;
     let out = arguments.out.as_deref().filter(|f| !is_standard_output(f));
+    let format = format(out, arguments.json)?;
     try_delivery(out)?;
     if arguments.recheck.is_some() && !arguments.resume {
         return Err(CliError::no_effect("--recheck", "it belongs to --resume; leave it out, or go on with a file"));
     }
-    let empty = Rows::of(sweep.clone());
-    // A name that does not fit what is to be written is noticed now.
-    bytes_of(&empty, out, arguments.json)?;
-    let mut rows = empty;
+    let mut rows = Rows::of(sweep.clone());
     let mut journal = None;
     if let Some(out) = out {
-        journal = Some(open(arguments, out, &mut rows)?);
+        journal = Some(open(arguments, out, format, &mut rows)?);
     } else if arguments.resume {
         return Err(CliError::no_effect("--resume", "there is no file to go on with; give --out FILE"));
     }
@@ -188,14 +187,14 @@ fn computed(arguments: &Arguments) -> Result<Exit, CliError> {
         let place = match out {
             Some(out) => format!("{}; --resume goes on with them", journal_of(out).display()),
             None => {
-                deliver(None, &bytes_of(&rows, None, arguments.json)?)?;
+                deliver(None, &bytes_of(&rows, format))?;
                 "standard output".to_owned()
             }
         };
         let said = format!("interrupted: {} of {wanted} runs are finished, their rows are in {place}", wanted - left);
         return Err(CliError::Stopped { said, exit });
     }
-    deliver(out, &bytes_of(&rows, out, arguments.json)?)?;
+    deliver(out, &bytes_of(&rows, format))?;
     if let Some(journal) = journal {
         journal.remove()?;
     }
@@ -203,7 +202,7 @@ fn computed(arguments: &Arguments) -> Result<Exit, CliError> {
 }
 
 /// Opens the journal beside `out` and takes in what is there.
-fn open(arguments: &Arguments, out: &Path, rows: &mut Rows) -> Result<Journal, CliError> {
+fn open(arguments: &Arguments, out: &Path, format: Format, rows: &mut Rows) -> Result<Journal, CliError> {
     let path = journal_of(out);
     let (mut journal, lines) = Journal::open(&path)?;
     let refuse = |file: &Path, why: String| CliError::Usage(format!("{}: {why}", file.display()));
@@ -223,7 +222,7 @@ fn open(arguments: &Arguments, out: &Path, rows: &mut Rows) -> Result<Journal, C
             journal.append(&heading)?;
         }
     }
-    if arguments.resume && out.exists() && !arguments.json {
+    if arguments.resume && out.exists() && format != Format::Json {
         let old = read_rows(out)?;
         take(arguments, rows, old, out)?;
     }
@@ -273,6 +272,7 @@ fn read_rows(file: &Path) -> Result<Rows, CliError> {
 
 fn merged(arguments: &Merge) -> Result<Exit, CliError> {
     let out = arguments.out.as_deref().filter(|f| !is_standard_output(f));
+    let format = format(out, arguments.json)?;
     try_delivery(out)?;
     let mut parts = arguments.parts.iter();
     let first = parts.next().ok_or_else(|| CliError::Usage("give the parts to merge".into()))?;
@@ -280,21 +280,29 @@ fn merged(arguments: &Merge) -> Result<Exit, CliError> {
     for part in parts {
         rows.merge(read_rows(part)?).map_err(|e| CliError::Usage(format!("{}: {e}", part.display())))?;
     }
-    deliver(out, &bytes_of(&rows, out, arguments.json)?)?;
+    deliver(out, &bytes_of(&rows, format))?;
     let progress = Progress::new(arguments.quiet);
     progress.line(&format!("{} of {} rows", rows.len(), rows.sweep().rows()));
     summary(&rows, &progress)
 }
 
-fn bytes_of(rows: &Rows, out: Option<&Path>, as_json: bool) -> Result<Vec<u8>, CliError> {
-    let is_parquet = out.and_then(|f| f.extension()).is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
-    match (as_json, is_parquet) {
-        (true, true) => {
-            Err(CliError::Usage("--json writes JSON: give --out a name that does not end in .parquet".into()))
-        }
-        (true, false) => Ok(json_of(rows)),
-        (false, true) => Ok(rows.parquet()),
-        (false, false) => Ok(rows.csv()),
+/// What rows are written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Format {
+    Csv,
+    Json,
+    Parquet,
+}
+
+fn format(out: Option<&Path>, as_json: bool) -> Result<Format, CliError> {
+    ending::format(out, as_json.then_some(Format::Json), Format::Csv)
+}
+
+fn bytes_of(rows: &Rows, format: Format) -> Vec<u8> {
+    match format {
+        Format::Csv => rows.csv(),
+        Format::Json => json_of(rows),
+        Format::Parquet => rows.parquet(),
     }
 }
 
