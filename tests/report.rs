@@ -10,9 +10,9 @@ use std::process::Output;
 use assert_cmd::Command;
 use common::{copy, figures, schema, write_references};
 use serde_json::Value;
-use twofold::record::{Hash, read_tree};
+use twofold::record::{Hash, read_tree, read_tree_with};
 use twofold::render::{Pixels, decode_png, encode_png};
-use twofold::report::{Links, Reference, Report, assemble, page};
+use twofold::report::{Links, MadeFile, Reference, Report, assemble, page};
 
 fn twofold(arguments: &[&str]) -> Output {
     Command::cargo_bin("twofold").unwrap().args(arguments).output().unwrap()
@@ -55,7 +55,7 @@ impl Bench {
 
     fn report(&self) -> Report {
         assemble(
-            &read_tree(&self.made(), &|_| true).unwrap().files,
+            &read_tree_with(&self.made(), &|_| true, &MadeFile::from).unwrap().0,
             &read_tree(&self.expected(), &|_| true).unwrap().files,
         )
     }

@@ -4,6 +4,8 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
+use rayon::prelude::*;
+
 use super::files::{self, FileError};
 
 /// A file of a folder.
@@ -48,17 +50,34 @@ const LARGEST_TREE: u64 = 4 << 30;
 /// # Errors
 /// If the folder or a file cannot be read, or there is more of them than fits in memory.
 pub fn read_tree(folder: &Path, wanted: &dyn Fn(&str) -> bool) -> Result<Tree, FileError> {
-    let mut walk = Walk { wanted, tree: Tree::default(), bytes: 0 };
+    let (files, dangling) = read_tree_with(folder, wanted, &|file| file)?;
+    Ok(Tree { files, dangling })
+}
+
+/// [`read_tree`] that keeps of each file what `keep` makes of it, several side by side: the files' rests, and what was met and not read.
+///
+/// # Errors
+/// As [`read_tree`].
+pub fn read_tree_with<T: Send>(
+    folder: &Path,
+    wanted: &dyn Fn(&str) -> bool,
+    keep: &(dyn Fn(FileBytes) -> T + Sync),
+) -> Result<(Vec<T>, Vec<String>), FileError> {
+    let mut walk = Walk { wanted, files: Vec::new(), dangling: Vec::new(), bytes: 0 };
     walk.folder(folder, "", DEPTH)?;
-    let mut tree = walk.tree;
-    tree.files.sort_by(|a, b| a.path.cmp(&b.path));
-    tree.dangling.sort();
-    Ok(tree)
+    let Walk { mut files, mut dangling, .. } = walk;
+    files.sort();
+    dangling.sort();
+    let read = |path: String| Ok(keep(FileBytes { bytes: files::read(&folder.join(&path))?, path }));
+    let kept: Result<Vec<T>, FileError> = files.into_par_iter().map(read).collect();
+    Ok((kept?, dangling))
 }
 
 struct Walk<'a> {
     wanted: &'a dyn Fn(&str) -> bool,
-    tree: Tree,
+    /// Paths inside the folder.
+    files: Vec<String>,
+    dangling: Vec<String>,
     bytes: u64,
 }
 
@@ -78,7 +97,7 @@ impl Walk<'_> {
                 // A link to nothing, or a file that was removed since its folder was listed.
                 Err(e) if e.kind() == io::ErrorKind::NotFound => {
                     if (self.wanted)(&inside) {
-                        self.tree.dangling.push(inside);
+                        self.dangling.push(inside);
                     }
                     continue;
                 }
@@ -89,14 +108,13 @@ impl Walk<'_> {
                     self.folder(&path, &format!("{inside}/"), depth - 1)?;
                 }
             } else if kind.is_file() && (self.wanted)(&inside) {
-                let bytes = files::read(&path)?;
-                self.bytes += bytes.len() as u64;
+                self.bytes = self.bytes.saturating_add(kind.len());
                 if self.bytes > LARGEST_TREE {
                     let why = format!("the files in it have more than {} GiB", LARGEST_TREE >> 30);
                     let source = io::Error::new(io::ErrorKind::FileTooLarge, why);
                     return Err(FileError { action: "read", path: folder.to_path_buf(), source });
                 }
-                self.tree.files.push(FileBytes { path: inside, bytes });
+                self.files.push(inside);
             }
         }
         Ok(())
@@ -149,7 +167,7 @@ mod tests {
         let paths: Vec<&str> = tree.files.iter().map(|f| f.path.as_str()).collect();
         assert_eq!(paths, ["1/2/3/4/in.txt"]);
         let after = |already: u64| {
-            let mut walk = Walk { wanted: &|_| true, tree: Tree::default(), bytes: already };
+            let mut walk = Walk { wanted: &|_| true, files: Vec::new(), dangling: Vec::new(), bytes: already };
             walk.folder(folder.path(), "", DEPTH)
         };
         after(LARGEST_TREE - 5).unwrap();

@@ -23,23 +23,28 @@ pub fn shrunk(pixels: &Pixels, width: u32, how: Shrink) -> Pixels {
     let (columns, rows) = (shares(pixels.width, width), shares(pixels.height, height));
     let area = u64::from(pixels.width) * u64::from(pixels.height);
     let mut rgba = Vec::with_capacity(4 * width as usize * height as usize);
+    let stride = 4 * pixels.width as usize;
+    // Sums over the rows that a row stands for, of every column's channels.
+    let mut sums = vec![0_u64; stride];
     for row in &rows {
-        for column in &columns {
-            let parts = row.iter().flat_map(|(y, v)| column.iter().map(move |(x, u)| (*x, *y, u * v)));
-            let at = |x: usize, y: usize| {
-                let start = 4 * (y * pixels.width as usize + x);
-                [pixels.rgba[start], pixels.rgba[start + 1], pixels.rgba[start + 2]]
-            };
-            let colour = match how {
-                Shrink::Mean => {
-                    let mut sum = [0u64; 3];
-                    for (x, y, weight) in parts {
-                        sum.iter_mut().zip(at(x, y)).for_each(|(s, c)| *s += weight * u64::from(c));
-                    }
-                    sum.map(|s| ((s + area / 2) / area) as u8)
+        if how == Shrink::Mean {
+            sums.fill(0);
+            for (y, v) in row {
+                for (sum, c) in sums.iter_mut().zip(&pixels.rgba[y * stride..][..stride]) {
+                    *sum += v * u64::from(*c);
                 }
-                Shrink::Strongest => parts
-                    .map(|(x, y, _)| at(x, y))
+            }
+        }
+        for column in &columns {
+            let colour = match how {
+                Shrink::Mean => [0, 1, 2].map(|channel| {
+                    let sum: u64 = column.iter().map(|(x, u)| u * sums[4 * x + channel]).sum();
+                    ((sum + area / 2) / area) as u8
+                }),
+                Shrink::Strongest => row
+                    .iter()
+                    .flat_map(|(y, _)| column.iter().map(move |(x, _)| y * stride + 4 * x))
+                    .map(|start| [pixels.rgba[start], pixels.rgba[start + 1], pixels.rgba[start + 2]])
                     .max_by_key(|c| c.iter().map(|v| u32::from(255 - v)).sum::<u32>())
                     .unwrap_or([255; 3]),
             };

@@ -1,12 +1,13 @@
 //! RO-Crate 1.1 metadata: what an archive needs to take the folder as it is.
 
+use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::assemble::media_type;
+use super::assemble::{MadeFile, media_type};
 use super::html::address;
 use super::model::{Report, indented};
 use super::names;
-use crate::record::{FileBytes, Hash};
+use crate::record::FileBytes;
 use crate::render::read_provenance;
 
 /// Date of the release, as CITATION.cff has it. RO-Crate asks for a date of publication; a clock would make the bytes of this file
@@ -37,12 +38,12 @@ const AFFILIATION: (&str, &str) = ("https://www.bristol.ac.uk/", "University of 
 pub(super) const PROCEEDINGS: &str = "Proc. 5th International Conference on Structural Dynamics SEMS, Cape Town";
 
 /// The metadata of a folder that holds `made` and what the report adds to it (`added`: name and bytes).
-pub fn archive(report: &Report, made: &[FileBytes], added: &[(&str, &[u8])]) -> Vec<u8> {
+pub fn archive(report: &Report, made: &[MadeFile], added: &[(&str, &[u8])]) -> Vec<u8> {
     let own = [names::PAGE, names::REPORT, names::VERDICTS, names::ARCHIVE];
-    let mut files: Vec<(&str, &[u8])> =
-        made.iter().map(|f| (f.path.as_str(), f.bytes.as_slice())).filter(|(path, _)| !own.contains(path)).collect();
-    files.extend(added);
-    files.sort_by_key(|(path, _)| *path);
+    let added = added.iter().map(|(name, bytes)| FileBytes { path: (*name).to_owned(), bytes: bytes.to_vec() }.into());
+    let added: Vec<MadeFile> = added.collect();
+    let mut files: Vec<&MadeFile> = made.iter().filter(|f| !own.contains(&f.path.as_str())).chain(&added).collect();
+    files.sort_by_key(|file| &file.path);
 
     let mut graph = vec![
         json!({
@@ -68,7 +69,7 @@ pub fn archive(report: &Report, made: &[FileBytes], added: &[(&str, &[u8])]) -> 
             "keywords": "non-smooth dynamics, two-fold singularity, Filippov systems, reproducibility, chaos",
             "mainEntity": { "@id": names::PAGE },
             "mentions": report.figures.iter().map(|f| json!({ "@id": action(&f.id) })).collect::<Vec<_>>(),
-            "hasPart": files.iter().map(|(path, _)| json!({ "@id": address(path) })).collect::<Vec<_>>(),
+            "hasPart": files.iter().map(|file| json!({ "@id": address(&file.path) })).collect::<Vec<_>>(),
         }),
         json!({
             "@id": "#authors",
@@ -115,8 +116,8 @@ pub fn archive(report: &Report, made: &[FileBytes], added: &[(&str, &[u8])]) -> 
         let within = format!("{}/", figure.id);
         let made: Vec<Value> = files
             .iter()
-            .filter(|(path, _)| path.starts_with(&within))
-            .map(|(path, _)| json!({ "@id": address(path) }))
+            .filter(|file| file.path.starts_with(&within))
+            .map(|file| json!({ "@id": address(&file.path) }))
             .collect();
         graph.push(json!({
             "@id": action(&figure.id),
@@ -126,7 +127,7 @@ pub fn archive(report: &Report, made: &[FileBytes], added: &[(&str, &[u8])]) -> 
             "result": made,
         }));
     }
-    graph.extend(files.iter().map(|(path, bytes)| file(report, path, bytes)));
+    graph.par_extend(files.par_iter().map(|found| file(report, found)));
     indented(&json!({ "@context": "https://w3id.org/ro/crate/1.1/context", "@graph": graph }))
 }
 
@@ -134,17 +135,18 @@ fn action(figure: &str) -> String {
     format!("#compute-{}", address(figure))
 }
 
-fn file(report: &Report, path: &str, bytes: &[u8]) -> Value {
+fn file(report: &Report, found: &MadeFile) -> Value {
+    let path = found.path.as_str();
     let mut entity = json!({
         "@id": address(path),
         "@type": "File",
         "name": name(report, path),
         "encodingFormat": media_type(path),
-        "contentSize": bytes.len().to_string(),
-        "sha256": Hash::of(bytes).as_str(),
+        "contentSize": found.size.to_string(),
+        "sha256": found.sha256.as_str(),
     });
     // A picture's own provenance names the question and the numbers behind it.
-    if let Ok(provenance) = read_provenance(bytes) {
+    if let Ok(provenance) = read_provenance(&found.bytes) {
         let text: Vec<String> = provenance.entries.iter().map(|(key, value)| format!("{key}: {value}")).collect();
         entity["description"] = json!(text.join("; "));
     }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -35,20 +36,56 @@ struct Record {
     tables: Vec<TableRecord>,
 }
 
+/// A file of the figures' folder, as far as a report needs it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MadeFile {
+    /// Its path inside the folder, with forward slashes.
+    pub path: String,
+    /// Its size in bytes.
+    pub size: u64,
+    /// Its hash.
+    pub sha256: Hash,
+    /// What is in it; nothing of a table that no view in space is drawn from, which is only listed.
+    pub bytes: Vec<u8>,
+}
+
+impl From<FileBytes> for MadeFile {
+    fn from(file: FileBytes) -> Self {
+        let (size, sha256) = (file.bytes.len() as u64, Hash::of(&file.bytes));
+        let is_read = !file.path.ends_with(".csv") || space::camera(file.folder()).is_some();
+        Self { bytes: if is_read { file.bytes } else { Vec::new() }, path: file.path, size, sha256 }
+    }
+}
+
+impl MadeFile {
+    fn folder(&self) -> &str {
+        self.path.rsplit_once('/').map_or("", |(folder, _)| folder)
+    }
+
+    fn name(&self) -> &str {
+        self.path.rsplit_once('/').map_or(&self.path, |(_, name)| name)
+    }
+}
+
 /// Puts the report together: `made` are the files of the figures' folder, `committed` those of the references' folder
 /// (figN/expected.json and figN/NAME.png).
-pub fn assemble(made: &[FileBytes], committed: &[FileBytes]) -> Report {
+pub fn assemble(made: &[MadeFile], committed: &[FileBytes]) -> Report {
     let mut problems = Vec::new();
-    let mut folders: BTreeMap<(bool, Vec<Piece>, &str), Vec<&FileBytes>> = BTreeMap::new();
+    let mut folders: BTreeMap<(bool, Vec<Piece>, &str), Vec<&MadeFile>> = BTreeMap::new();
     for file in made.iter().filter(|f| !f.folder().is_empty() && !f.folder().contains('/')) {
         folders.entry((!of_the_paper(file.folder()), natural(file.folder()), file.folder())).or_default().push(file);
     }
     let committed = Committed(committed);
-    let figures: Vec<FigureReport> = folders
-        .into_iter()
-        .map(|((_, _, id), files)| figure(id, &files, &committed, &mut problems))
-        .filter(|f| !f.pictures.is_empty() || !f.unrecorded.is_empty())
-        .collect();
+    let folders: Vec<(&str, Vec<&MadeFile>)> = folders.into_iter().map(|((_, _, id), files)| (id, files)).collect();
+    let each: Vec<(FigureReport, Vec<String>)> =
+        folders.par_iter().map(|(id, files)| figure(id, files, &committed)).collect();
+    let mut figures = Vec::new();
+    for (figure, found) in each {
+        problems.extend(found);
+        if !figure.pictures.is_empty() || !figure.unrecorded.is_empty() {
+            figures.push(figure);
+        }
+    }
     let making = making(made, &mut problems);
     Report {
         format: "twofold-report",
@@ -63,7 +100,7 @@ pub fn assemble(made: &[FileBytes], committed: &[FileBytes]) -> Report {
 }
 
 /// How the figures were made, as the folder says.
-fn making(made: &[FileBytes], problems: &mut Vec<String>) -> Vec<Making> {
+fn making(made: &[MadeFile], problems: &mut Vec<String>) -> Vec<Making> {
     let Some(file) = made.iter().find(|f| f.path == super::names::MAKING) else { return Vec::new() };
     match serde_json::from_slice::<Makings>(&file.bytes) {
         Ok(makings) => makings.runs,
@@ -123,7 +160,9 @@ impl Committed<'_> {
     }
 }
 
-fn figure(id: &str, files: &[&FileBytes], committed: &Committed<'_>, problems: &mut Vec<String>) -> FigureReport {
+/// A figure, and what is wrong with it.
+fn figure(id: &str, files: &[&MadeFile], committed: &Committed<'_>) -> (FigureReport, Vec<String>) {
+    let mut problems = Vec::new();
     let manifest = committed.manifest(id);
     let mut records = Vec::new();
     for file in files.iter().filter(|f| f.name().ends_with(".json")) {
@@ -138,14 +177,20 @@ fn figure(id: &str, files: &[&FileBytes], committed: &Committed<'_>, problems: &
         }
     }
     let names: Vec<String> = records.iter().map(|(_, r)| r.hashes.name.clone()).collect();
-    let mut pictures: Vec<PictureReport> = records
-        .into_iter()
+    let each: Vec<(PictureReport, Vec<String>)> = records
+        .into_par_iter()
         .map(|(file, record)| {
-            let own: Vec<&FileBytes> =
+            let own: Vec<&MadeFile> =
                 files.iter().filter(|f| owner(f.name(), &names) == Some(&record.hashes.name)).copied().collect();
-            picture(id, file, record, &own, committed, &manifest, problems)
+            let mut problems = Vec::new();
+            (picture(id, file, record, &own, committed, &manifest, &mut problems), problems)
         })
         .collect();
+    let mut pictures = Vec::new();
+    for (picture, found) in each {
+        problems.extend(found);
+        pictures.push(picture);
+    }
     pictures.sort_by_key(|p| (natural(&p.name), p.name.clone()));
     for picture in &pictures {
         for missing in picture.files.iter().filter(|f| f.integrity == Integrity::Missing) {
@@ -171,13 +216,14 @@ fn figure(id: &str, files: &[&FileBytes], committed: &Committed<'_>, problems: &
         }
     }
     let title = pictures.iter().map(|p| p.title.clone()).find(|t| !t.is_empty()).unwrap_or_default();
-    FigureReport {
+    let report = FigureReport {
         id: id.to_owned(),
         title,
         unrecorded: spare.iter().map(|(f, _)| file_report(f, Role::Png, None, None)).collect(),
         unrecorded_png: spare.into_iter().map(|(_, preview)| preview).collect(),
         pictures,
-    }
+    };
+    (report, problems)
 }
 
 /// The picture that a file belongs to: the longest name that the file's name goes on from with a hyphen or a dot.
@@ -191,9 +237,9 @@ fn owner<'a>(file: &str, names: &'a [String]) -> Option<&'a String> {
 /// One picture from its record and its `files`.
 fn picture(
     id: &str,
-    own: &FileBytes,
+    own: &MadeFile,
     record: Record,
-    files: &[&FileBytes],
+    files: &[&MadeFile],
     committed: &Committed<'_>,
     manifest: &Result<Manifest, String>,
     problems: &mut Vec<String>,
@@ -283,7 +329,7 @@ fn picture(
 }
 
 /// The panels in space, from their tables; none of a picture that is no view in space, or whose tables are not there.
-fn spaces(id: &str, panels: &[PanelReport], tables: &[TableRecord], files: &[&FileBytes]) -> Vec<space::SpaceView> {
+fn spaces(id: &str, panels: &[PanelReport], tables: &[TableRecord], files: &[&MadeFile]) -> Vec<space::SpaceView> {
     let Some(camera) = space::camera(id) else { return Vec::new() };
     let table = |panel: &PanelReport| -> Option<Table> {
         let own = tables.iter().filter(|t| t.panel.as_deref() == Some(panel.label.as_str()));
@@ -300,7 +346,7 @@ fn spaces(id: &str, panels: &[PanelReport], tables: &[TableRecord], files: &[&Fi
     space::views(&sources, &camera)
 }
 
-fn unreadable(file: &FileBytes, error: &dyn std::fmt::Display) -> String {
+fn unreadable(file: &MadeFile, error: &dyn std::fmt::Display) -> String {
     format!("{}: cannot be read as a picture ({error})", file.path)
 }
 
@@ -405,14 +451,14 @@ fn held_against(
     }
 }
 
-fn file_report(file: &FileBytes, role: Role, panel: Option<String>, recorded: Option<&Hash>) -> FileReport {
-    let hash = Hash::of(&file.bytes);
+fn file_report(file: &MadeFile, role: Role, panel: Option<String>, recorded: Option<&Hash>) -> FileReport {
+    let hash = file.sha256.clone();
     FileReport {
         path: file.path.clone(),
         role,
         panel,
         media_type: media_type(&file.path),
-        bytes: file.bytes.len() as u64,
+        bytes: file.size,
         integrity: match recorded {
             None => Integrity::Unrecorded,
             Some(r) if *r == hash => Integrity::Unchanged,

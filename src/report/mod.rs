@@ -9,7 +9,7 @@
 //! use twofold::report::{Links, assemble, page};
 //! // No record vouches for this file, so it counts for nothing.
 //! let file = FileBytes { path: "own/table.csv".into(), bytes: b"t,x\n".to_vec() };
-//! let report = assemble(&[file], &[]);
+//! let report = assemble(&[file.into()], &[]);
 //! assert_eq!((report.summary.pictures, report.summary.panels), (0, 0));
 //! assert!(page(&report, Links::Beside).starts_with(b"<!DOCTYPE html>"));
 //! ```
@@ -24,7 +24,7 @@ mod rules;
 mod space;
 
 pub use archive::{RELEASE_DATE, archive};
-pub use assemble::assemble;
+pub use assemble::{MadeFile, assemble};
 pub use model::*;
 pub use page::{Links, page};
 pub use space::SpaceView;

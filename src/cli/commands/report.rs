@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use crate::cli::speak::print_json;
-use crate::cli::{CliError, Exit, print};
+use crate::cli::{CliError, Exit, in_pool, print};
 use crate::paper::{Figure, figures};
-use crate::record::{self, FileBytes, read_tree};
-use crate::report::{Links, Report, archive, assemble, names, page};
+use crate::record::{self, FileBytes, read_tree, read_tree_with};
+use crate::report::{Links, MadeFile, Report, archive, assemble, names, page};
 
 /// Write a self-contained page about the figures in a folder, and beside it report.json, verdicts.json and RO-Crate metadata.
 ///
@@ -31,10 +31,13 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
+    in_pool(0, || report(arguments))?
+}
+
+fn report(arguments: &Arguments) -> Result<Exit, CliError> {
     let folder = &arguments.figures;
-    let made = read_tree(folder, &|_| true)
-        .map_err(|e| CliError::Usage(format!("{e}; run `make figures` first, or name another --figures")))?
-        .files;
+    let (made, _) = read_tree_with(folder, &|_| true, &MadeFile::from)
+        .map_err(|e| CliError::Usage(format!("{e}; run `make figures` first, or name another --figures")))?;
     let report = assemble(&made, &references(arguments.expected.as_deref())?);
     if report.figures.is_empty() {
         return Err(CliError::Usage(format!(
