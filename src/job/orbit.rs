@@ -620,7 +620,7 @@ mod tests {
         let guess = |apart: f64, passages: f64| {
             let speed = 1.0 / 3.0 + apart / (6.0 * PI);
             let field = ["-y".to_owned(), "x".into(), format!("-{speed:?}*v"), format!("{speed:?}*u")];
-            let field: Vec<&str> = field.iter().map(|f| f.as_str()).collect();
+            let field: Vec<&str> = field.iter().map(String::as_str).collect();
             let system = cases::smooth(&["x", "y", "u", "v"], "x + 9", &field);
             let start = vec![4.0 * 0.5_f64.cos(), -4.0 * 0.5_f64.sin(), 1.0, 0.0];
             let settle = 1.0 + 2.0 * PI * (passages - 1.0);
