@@ -230,4 +230,20 @@ mod tests {
             assert!((low..=high).contains(&a.error), "{r:?}");
         }
     }
+
+    #[test]
+    fn a_method_has_twice_the_references_time() {
+        // Of five passages that a reference claims to have made by t = 6, the method makes those before 12: pi/2, 3
+        // pi/2, 5 pi/2 and 7 pi/2.
+        let claimed = |k: usize| ExtendedCrossing {
+            t: DoubleDouble::from_f64(6.0 - (4 - k) as f64),
+            x: SVector::from([0.0; 3].map(DoubleDouble::from_f64)),
+            direction: crate::analyse::Direction::Up,
+        };
+        let reference: Vec<_> = (0..5).map(claimed).collect();
+        let mut method = crate::integrate::Dopri5::<3>::new(Tolerance { rtol: 1e-10, atol: 1e-10 });
+        let (start, plane) = (SVector::from([0.0, 0.05, 0.0]), Plane { coordinate: 1, value: 0.0 });
+        let rows = agreement(&Spiral, start, plane, &reference, &mut method, StepCap::None, 10_000).unwrap();
+        assert_eq!(rows.iter().map(|r| r.t).collect::<Vec<_>>(), [2.0, 3.0, 4.0, 5.0]);
+    }
 }

@@ -220,6 +220,21 @@ mod tests {
     }
 
     #[test]
+    fn the_pieces_of_a_motion_share_the_room_there_is() {
+        // Room for ten points: two are in the first piece and four in the second, so the third ends at its fourth.
+        let mut r = MotionRecorder::<1>::new(0.1);
+        step(&mut r, Mode::Plus, 0.0, 1.0);
+        r.points = MOST_POINTS - 10;
+        let full = (1..9).find(|&k| {
+            let (from, until, mode) = (f64::from(k), f64::from(k + 1), if k > 3 { Mode::Plus } else { Mode::Minus });
+            let straight = Straight(from, until);
+            let step = Step { t0: from, t1: until, x0: [from].into(), x1: [until].into(), interpolant: &straight };
+            r.step(mode, &step) == Flow::Stop
+        });
+        assert_eq!((full, r.kept()), (Some(6), 10));
+    }
+
+    #[test]
     fn samples_at_multiples_know_their_modes() {
         let mut r = TimedMotion::<1>::new(&[0.0].into(), 0.5);
         step(&mut r, Mode::Plus, 0.0, 1.0);

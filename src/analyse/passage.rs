@@ -185,7 +185,7 @@ fn nearest(x: &ExtendedPoint) -> SVector<f64, 3> {
 
 /// Watches an orbit for the place where it leaves the switching surface behind a two-fold at the origin: where |x| first exceeds 3 eps
 /// after the orbit has been within sqrt(eps). The rule does not depend on how the switch is smoothed, so that hysteresis and noise can be
-/// asked the same; linear between steps, which are short in the layer.
+/// asked the same; linear between steps, which are short in the layer. A kick that leads out of it ends where it leads.
 #[derive(Clone, Copy, Debug)]
 pub struct Leaving {
     eps: f64,
@@ -233,7 +233,12 @@ impl<const N: usize> Observer<N> for Leaving {
     }
     fn kick(&mut self, _: f64, _: &SVector<f64, N>, after: &SVector<f64, N>) {
         if let [x, y, z, ..] = after.as_slice() {
-            self.last = Some([*x, *y, *z]);
+            let (after, edge) = ([*x, *y, *z], LEAVES * self.eps);
+            let within = self.last.is_some_and(|before| before[0].abs() <= edge);
+            if self.left.is_none() && self.visited && within && after[0].abs() > edge {
+                self.left = Some(after);
+            }
+            self.last = Some(after);
         }
     }
 }
@@ -506,6 +511,28 @@ mod tests {
         assert!((place[0] + 0.03).abs() < 1e-15 && (place[1] - 0.1).abs() < 1e-15, "{place:?}");
     }
 
+    #[test]
+    fn after_a_kick_the_way_goes_on_from_where_it_led() {
+        let kicked = |l: &mut Leaving, to: [f64; 3]| l.kick(0.3, &SVector::from([9.0; 3]), &SVector::from(to));
+        let mut l = Leaving::new(1e-2);
+        l.see([0.0, 0.05, 0.0]);
+        kicked(&mut l, [0.02, 0.0, 0.05]);
+        assert_eq!(l.place(), None);
+        l.see([0.04, -0.1, -0.05]);
+        let place = l.place().unwrap();
+        assert!((place[0] - 0.03).abs() < 1e-15 && (place[1] + 0.05).abs() < 1e-15 && place[2].abs() < 1e-15);
+        // A kick out of the layer is where it is left, after the visit and once.
+        for (start, left) in [([0.0, 0.05, 0.0], Some([0.04, 0.1, 0.2])), ([0.0, 0.5, 0.0], None)] {
+            let mut l = Leaving::new(1e-2);
+            l.see(start);
+            for to in [[0.04, 0.1, 0.2], [0.0, 0.5, 0.0], [-0.04, 0.3, 0.4]] {
+                kicked(&mut l, to);
+            }
+            l.see([-0.05, 0.5, 0.5]);
+            assert_eq!(l.place(), left);
+        }
+    }
+
     /// y and z turn about the two-fold once in 2 pi, `GROWTH` per unit time farther out, and x goes by at the speed `drift`: all that happens is known.
     struct Screw {
         drift: f64,
@@ -550,6 +577,18 @@ mod tests {
             if crosses > 4.0 {
                 assert!((p.leaving.unwrap()[0].abs() - 0.03).abs() < 1e-12, "{p:?}");
             }
+        }
+        // The exit is the first, though y = 0 is passed again at 9 pi/2; what was all found is not followed on, to
+        // where it overflows.
+        let long = PassageQuestion { by: 16.0, ..near.clone() };
+        let exits = [&long, &near].map(|q| screwed(2.0, 0.01, q).exit.unwrap());
+        assert!((0..3).all(|i| (exits[0][i] - exits[1][i]).abs() < 1e-14), "{exits:?}");
+        for far in [0.0, 0.2] {
+            let [short, endless] =
+                [12.0, 1e4].map(|by| screwed(8.0, 0.01, &PassageQuestion { far, by, ..near.clone() }));
+            assert_eq!((short.far.is_some(), endless.far.is_some()), (far > 0.0, far > 0.0));
+            let steps = [short, endless].map(|p| p.statistics.steps);
+            assert!(steps[1] < 2 * steps[0], "{steps:?}");
         }
         // Before its time is over nothing else has happened.
         let short = screwed(8.0, 0.01, &PassageQuestion { by: 7.0, ..near });

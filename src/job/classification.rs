@@ -261,6 +261,9 @@ mod tests {
             assert!(matches!(evidence.verdict, Verdict::Periodic(_)), "{}", evidence.summary);
             assert_eq!(cycle.period, 1);
             assert!((cycle.duration - 6.663_286_859).abs() < 1e-5, "{}", cycle.duration);
+            // A picture shows the second half; y goes up through 0 where x is below 0.
+            assert_eq!(evidence.shown_from, 1000.0);
+            assert!(cycle.points.len() == 2 && cycle.points.iter().all(|p| p.upward == (p.u[amplitude] < 0.0)));
             let sizes = cycle.points.iter().map(|p| p.u[amplitude].abs());
             // In five states the plane is (a, x).
             sizes.for_each(|size| assert!((size - 2.008_619_86).abs() < 1e-6, "{size}"));

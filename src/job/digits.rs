@@ -66,3 +66,44 @@ impl Question for MethodDigits {
         Ok(Answer { statistics: Some(found.statistics), stop: Stop::Finished, ..answer })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use crate::analyse::digits::Contender;
+    use crate::analyse::reference::Plane;
+    use crate::integrate::StepCap;
+    use crate::job::cases;
+    use crate::job::spec::Method;
+
+    /// y and z turn about the origin once in 2 pi: y = 0 is passed at pi/2 and 3 pi/2. The tighter the tolerance, the
+    /// more digits.
+    #[test]
+    fn digits_are_what_is_right_behind_the_point() {
+        let methods = [1e-4, 1e-10].map(|tolerance| Contender { name: Method::Dopri5, tolerance });
+        let question = MethodDigits {
+            system: cases::smooth(&["x", "y", "z"], "x + 9", &["-x", "-z", "y"]),
+            eps: 1e-2,
+            compared: DigitsQuestion {
+                start: [0.0, 1.0, 0.0],
+                section: Plane { coordinate: 1, value: 0.0 },
+                t_end: 6.0,
+                near: 0.5,
+                methods: methods.into(),
+                step_cap: StepCap::None,
+                max_steps: 10_000,
+            },
+        };
+        let answer = question.compute(&Desk::quiet(), &()).unwrap();
+        let rows = answer.table("agreement").unwrap();
+        assert_eq!(rows.integers("crossing"), [1, 2, 1, 2]);
+        assert!(rows.words("method").all(|word| word == "dopri5") && answer.table("visits").unwrap().is_empty());
+        for (row, [least, most]) in [[1.0, 6.0], [1.0, 6.0], [8.0, 13.0], [8.0, 13.0]].into_iter().enumerate() {
+            let [t, error, digits] = ["t", "error", "digits"].map(|name| rows.numbers(name)[row]);
+            assert!((t - PI * ((row % 2) as f64 + 0.5)).abs() < 1e-12, "{t}");
+            assert!((least..most).contains(&digits) && (digits + error.log10()).abs() < 1e-12, "{error} {digits}");
+        }
+    }
+}

@@ -586,6 +586,22 @@ mod tests {
         assert_eq!(from_csv(&bytes).unwrap().1, t);
     }
 
+    /// Its first table, its question, and why it ended if that was too soon.
+    #[test]
+    fn the_file_of_a_run_says_which_run_it_is() {
+        use crate::job::spec::{Observation, SwitchSpec};
+        use crate::job::{Run, cases};
+        let observe = Observation::Times { every: 0.5 };
+        let run = Run(cases::run(cases::decays(2), SwitchSpec::tanh(1e-2), 1.0, observe));
+        let tables = [vec![0.1, 0.2], vec![7.0, 8.0]].map(|numbers| table(numbers, vec!["up".into(), "down".into()]));
+        for (stop, said) in [(Stop::Finished, None), (Stop::Interrupted, Some(Stop::Interrupted))] {
+            let bytes = csv_of_run(&run, &Answer { stop, ..Answer::of_tables(tables.to_vec()) });
+            let (heading, back) = from_csv(&bytes).unwrap();
+            assert_eq!((&back, stop_of_csv(&bytes)), (&tables[0], said));
+            assert_eq!(heading.about, json!({ "kind": "run", "question": run.json() }));
+        }
+    }
+
     #[test]
     fn other_files_are_refused() {
         assert!(from_csv(b"a,b\n1,2\n").is_err());

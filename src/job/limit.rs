@@ -218,6 +218,9 @@ mod tests {
         let desk = Desk::new(Some(store), &());
         let crossings = vec![(1e-2, Some(vec![1.0, 2.0, 3.0])), (3e-3, None)];
         assert_eq!(question.smoothed(&desk).unwrap(), crossings);
+        // So the table after the visit has the one place, and no row of the other.
+        let after = question.compute(&desk, &()).unwrap().tables.remove(1);
+        assert_eq!([after.numbers("eps"), after.numbers("y"), after.numbers("z")], [[1e-2], [2.0], [3.0]]);
         let keys: Vec<_> = question.rests_on().iter().map(|q| key(&**q)).collect();
         assert_eq!(keys, passages.iter().map(|p| key(p)).collect::<Vec<_>>());
         question.compared.start.pop();

@@ -612,6 +612,45 @@ mod tests {
         assert_eq!(long.compute(&Desk::new(None, &Never), &()), Err(JobError::Interrupted));
     }
 
+    /// Two turns beside each other, of (x, y) at unit speed and of (u, v) at a third of it and a little more: at x = 4,
+    /// where y = 0 is passed upwards, u and v are again what they were after three passages, but for `apart`. That
+    /// counts as the same within a thousandth of 1 + 4.
+    #[test]
+    fn a_passage_is_the_same_within_a_thousandth_of_its_size() {
+        let guess = |apart: f64, passages: f64| {
+            let speed = 1.0 / 3.0 + apart / (6.0 * PI);
+            let field = ["-y".to_owned(), "x".into(), format!("-{speed:?}*v"), format!("{speed:?}*u")];
+            let field: Vec<&str> = field.iter().map(String::as_str).collect();
+            let system = cases::smooth(&["x", "y", "u", "v"], "x + 9", &field);
+            let start = vec![4.0 * 0.5_f64.cos(), -4.0 * 0.5_f64.sin(), 1.0, 0.0];
+            let settle = 1.0 + 2.0 * PI * (passages - 1.0);
+            let question = ClosedOrbit { settle, start, ..question(system, SwitchSpec::tanh(1e-2), 1) };
+            question.guess(&Desk::quiet()).unwrap()
+        };
+        for (apart, returns) in [(4.5e-3, 3), (5.5e-3, 1)] {
+            let (point, found) = guess(apart, 6.0);
+            assert!((point[0] - 4.0).abs() < 1e-6 && point[1] == 0.0 && found == returns, "{apart}: {found} {point:?}");
+        }
+        // Three passages are too few to see it; one return is tried.
+        assert_eq!(guess(0.0, 3.0).1, 1);
+        assert_eq!(guess(0.0, 4.0).1, 3);
+    }
+
+    /// Not in half of the time that a turn takes; and a period is as good as the tolerance that was asked for.
+    #[test]
+    fn a_return_is_computed_as_it_is_asked_for() {
+        let question = question(circle(2), SwitchSpec::tanh(1e-2), 1);
+        let hasty = ClosedOrbit { longest_return: PI, ..question.clone() };
+        let said = hasty.compute(&Desk::quiet(), &()).unwrap_err().to_string();
+        assert!(said.contains(&format!("within t = {PI}")), "{said}");
+        let period = |tolerance: f64| -> f64 {
+            let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
+            let answer = ClosedOrbit { tolerance, ..question.clone() }.compute(&Desk::quiet(), &()).unwrap();
+            (answer.fact::<f64>("period").unwrap() - 2.0 * PI).abs()
+        };
+        assert!(period(1e-4) > 1e-8 && period(1e-12) < 1e-10, "{} {}", period(1e-4), period(1e-12));
+    }
+
     /// Without settling: the start, moved onto the plane, with phi on its side of h = 0.
     #[test]
     fn a_hysteretic_guess_has_phi() {

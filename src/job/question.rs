@@ -132,6 +132,21 @@ mod tests {
     use crate::job::*;
     use crate::system::{Caricature, System, Transition};
 
+    /// What the one who asked can mend, and what nobody can by asking otherwise.
+    #[test]
+    fn a_question_is_at_fault_or_its_computation_is() {
+        let spec = SpecError { field: "start", value: "x".into(), rule: "give numbers" };
+        let run = cases::run(cases::decays(2), SwitchSpec::tanh(1e-3), 9.0, Observation::Times { every: 1.0 });
+        let dimension = run.system.bind::<3>().map(|_| ()).unwrap_err();
+        for bad in [JobError::Spec(spec), JobError::Dimension(dimension)] {
+            assert!(bad.is_bad_question(), "{bad}");
+        }
+        for other in [JobError::Interrupted, JobError::TooManyPoints { t: 1.0, limit: 2 }, JobError::Other("no".into())]
+        {
+            assert!(!other.is_bad_question(), "{other}");
+        }
+    }
+
     /// One of each kind: stores and files know it by this name, and it is what makes two questions of one shape different.
     #[test]
     fn every_kind_of_question_has_a_name_of_its_own() {

@@ -528,6 +528,7 @@ mod tests {
         let answer = recording.to_answer(&run);
         assert_eq!(Recording::of_answer(&run, &answer).unwrap(), recording);
         assert_eq!((recording.data.len(), answer.stop), (10, Stop::SetValued));
+        assert!(Data::<3>::Path(Vec::new()).is_empty() && Data::<3>::Motion(Motion::default()).is_empty());
     }
 
     /// On a straight line through both surfaces: x = 0 at time 1, y = 0 at time 2.
@@ -556,6 +557,22 @@ mod tests {
         }
         let events: Vec<&str> = answer.table("events").unwrap().words("signs").collect();
         assert_eq!(events, ["0-", "+0"]);
+    }
+
+    /// "On" is within so many parts of 1 + the largest component: at 9 ten times as far as near the origin.
+    #[test]
+    fn a_surface_is_as_thick_as_the_state_is_large() {
+        let field = "plus = ['1', '2', '3']\nminus = ['1', '2', '3']\n";
+        let system =
+            crate::job::cases::of(&format!("states = ['x', 'y', 'z']\nh = 'x'\n{field}[second]\nh = 'y'\n{field}"));
+        let exit = ExitRule::AtOnce { side: Side::Plus };
+        let mut run = run(SwitchSpec::Filippov { exit, funnel: None }, Observation::Times { every: 0.5 });
+        run.system = system;
+        let mut points = Table::new("motion", ["x", "y", "z"].map(Column::numbers));
+        for [x, y, z] in [[5.0, -20.0, 9.0], [0.5, -2.0, 0.0]] {
+            points.push([(x * INTERSECTION).into(), (y * INTERSECTION).into(), z.into()]);
+        }
+        assert_eq!(signed(&run, points).words("signs").collect::<Vec<_>>(), ["0-", "0-"]);
     }
 
     #[test]

@@ -139,6 +139,12 @@ mod tests {
         for n in [3, 4, 5, 6, 7, 8] {
             assert_eq!(ending(&turns(51.0, n)), Ending::Irregular, "{n} passages");
         }
+        // One passage a turn is seen in three; and all of the last two turns are compared, also with the first passage
+        // of the one before.
+        assert_eq!(ending(&[[51.0, 1.0], [52.0, 1.0], [53.0, 1.0]]).word(), "period 1");
+        let mut other = turns(51.0, 9);
+        other[0][1] = 7.0;
+        assert_eq!(ending(&other), Ending::Irregular);
         // The ones before half of the time do not count: five and four.
         assert_eq!(ending(&turns(46.0, 9)), Ending::Irregular);
         let Ending::Periodic { points } = ending(&turns(51.0, 10)) else { panic!() };
@@ -165,5 +171,9 @@ mod tests {
         assert_eq!(ending(&[[10.0, 1.0], [40.0, 1.0]]), Ending::Quiet { state: vec![3.0, 4.0] });
         let drifting: Vec<[f64; 2]> = (0..90).map(|k| [10.0 + k as f64, (k * k % 83) as f64]).collect();
         assert_eq!(ending(&drifting), Ending::Irregular);
+        // Of what does not repeat no difference is seen.
+        assert!(
+            Ending::Irregular.is_like(&ending(&drifting), 1e-3) && !Ending::Irregular.is_like(&ending(&turns(3)), 9.0)
+        );
     }
 }

@@ -638,6 +638,34 @@ mod tests {
         }
     }
 
+    /// Every state begins at its own value, not at phi's.
+    #[test]
+    fn a_hysteretic_run_begins_where_it_is_asked_to() {
+        let mut run = cases::run(cases::decays(2), switches()[1], 1.0, EVERY);
+        run.start = vec![0.3, -0.7];
+        let points = &answer(&run, &()).unwrap().tables[0];
+        for (name, from, rate) in [("a1", 0.3, 1.0), ("a2", -0.7, 2.0)] {
+            let state = points.numbers(name);
+            let right = |(t, x): (&f64, &f64)| (x - from * (-rate * t).exp()).abs() < 1e-10;
+            assert!(state[0] == from && points.numbers("t").iter().zip(state).all(right), "{state:?}");
+        }
+    }
+
+    /// Looked at each 4096 steps: it is not that there was no more room.
+    #[test]
+    fn an_interrupted_part_says_so() {
+        struct Never;
+        impl Watch for Never {
+            fn reached(&self, _: f64) -> bool {
+                false
+            }
+        }
+        let section = Observation::Section { coordinate: 0, value: 0.5 };
+        let mut run = cases::run(cases::decays(1), SwitchSpec::tanh(1e-2), 1.0, section);
+        run.method.step_cap = StepCap::Absolute(1e-4);
+        assert_eq!(part(&run, Part::WHOLE, &Never), Err(JobError::Interrupted));
+    }
+
     #[test]
     fn recordings_are_of_three_states() {
         let section = Observation::Section { coordinate: 0, value: 0.5 };

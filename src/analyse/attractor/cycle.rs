@@ -436,18 +436,30 @@ mod tests {
                 assert!(distance(&found, &c) < 1e-9 * (scale + 1e-3), "{scale} {c:?}: {found:?}");
             }
         }
-        // Fewer than six points have no map.
+        // Six points have a map; fewer have their mean, whatever a map would say.
+        let mut d = [1.0, 0.5];
+        let six = [(); 6].map(|()| {
+            let here = [5.0 + d[0], d[1] - 3.0];
+            d = [-0.5 * d[0] - 0.8 * d[1], 0.8 * d[0] - 0.5 * d[1]];
+            here
+        });
+        assert!(distance(&fixed_point(&six), &[5.0, -3.0]) < 1e-12, "{:?}", fixed_point(&six));
+        let mean: Point = std::array::from_fn(|k| six[..5].iter().map(|p| p[k]).sum::<f64>() / 5.0);
+        assert!(fixed_point(&six[..5]) == mean && distance(&mean, &[5.0, -3.0]) > 0.1, "{mean:?}");
         assert_eq!(fixed_point(&[[0.0, 1.0], [2.0, 4.0], [4.0, 1.0]]), [2.0, 2.0]);
     }
 
     #[test]
     fn a_thin_spiral_has_its_mean_for_a_centre() {
-        // A hundredth as wide as long is still an ellipse; a ten-thousandth is a line, in any unit.
-        for scale in [1e-3, 1.0, 1e3] {
+        // A hundredth as wide as long is still an ellipse; a ten-thousandth is a line, in any unit, level or tilted by
+        // an eighth of a circle.
+        for (scale, tilt) in [(1e-3, 0.0), (1.0, 0.0), (1e3, 0.0), (1.0, 0.125)] {
             for (width, eye) in [(1e-2, true), (1e-4, false)] {
+                let (s, c) = (sin(TAU * tilt), cos(TAU * tilt));
                 let points: Vec<Point> = (0..8)
                     .map(|i| TAU * 0.15 * f64::from(i))
-                    .map(|a| [scale * (2.0 + cos(a)), scale * (1.0 + width * sin(a))])
+                    .map(|a| [cos(a), width * sin(a)])
+                    .map(|[u, v]| [scale * (2.0 + c * u - s * v), scale * (1.0 + s * u + c * v)])
                     .collect();
                 let mean: Point = std::array::from_fn(|k| points.iter().map(|p| p[k]).sum::<f64>() / 8.0);
                 let want = if eye { [2.0 * scale, scale] } else { mean };
@@ -481,6 +493,10 @@ mod tests {
             }
             assert!((turns.rotation().unwrap() - rotation).abs() < 1e-10, "{rotation}: {:?}", turns.rotation());
         }
+        // A quarter turn is seen whole: all increments point the same way, whichever it is.
+        let quarters: Vec<Point> = (0..12).map(|i| ellipse([0.0; 2], 0.25 * f64::from(i), 1.0)).collect();
+        let quarter = around(&quarters, &[], &[[0.0; 2]], 12).rotation().unwrap();
+        assert!((quarter - 0.25).abs() < 1e-10, "{quarter}");
         // To and fro by quarters is no rotation.
         let swing: Vec<Point> = (0..10).map(|i| ellipse([0.0; 2], 0.25 * f64::from(i % 2), 1.0)).collect();
         assert_eq!(around(&swing, &[], &[[0.0; 2]], 10).rotation(), None);
@@ -493,6 +509,12 @@ mod tests {
             let points: Vec<Point> = angles.iter().map(|a| ellipse([2.0, 1.0], *a, 1.0)).collect();
             let turns = around(&points, &[], &[[2.0, 1.0]], 4);
             // The last block: 0, 0.1, 0.25, 0.35. With the one before: halves of a circle filled alike.
+            for (blocks, gap) in [(1, 0.65), (2, 0.15)] {
+                assert!((turns.largest_gap(blocks).unwrap() - gap).abs() < 1e-10, "{offset} {blocks}");
+            }
+            // A block of two phases is twice as many points; both phases go around alike.
+            let twice: Vec<Point> = points.iter().flat_map(|p| [[p[0] + 9.0, p[1]], *p]).collect();
+            let turns = around(&twice, &[], &[[2.0, 1.0], [11.0, 1.0]], 4);
             for (blocks, gap) in [(1, 0.65), (2, 0.15)] {
                 assert!((turns.largest_gap(blocks).unwrap() - gap).abs() < 1e-10, "{offset} {blocks}");
             }
@@ -520,6 +542,27 @@ mod tests {
         assert!(around(&three, &[], &[[0.0; 2]; 3], 14).ring(0, 42).thickness < 1e-12);
         let flat = around(&line, &[], &[[0.0; 2]], 40).ring(0, 40);
         assert!((flat.thickness / (0.01 * std::f64::consts::SQRT_2) - 1.0).abs() < 0.01, "{}", flat.thickness);
+        // The last of three phases on an uneven line, the others on smooth rings: a third of the squares is the line's.
+        let mixed: Vec<Point> = (0..42)
+            .map(|i| {
+                let (turn, a) = (i / 3, TAU * f64::from(i / 3) * 3.0 / 14.0);
+                match i % 3 {
+                    2 => [if turn % 2 == 0 { 0.3 * 1.01 } else { 0.3 / 1.01 }, 0.0],
+                    phase => [9.0 * f64::from(phase + 1) + 0.3 * cos(a), 0.3 * sin(a)],
+                }
+            })
+            .collect();
+        let centres = [[0.0, 0.0], [18.0, 0.0], [9.0, 0.0]];
+        let mixed = around(&mixed, &[], &centres, 14).ring(0, 42);
+        assert!((mixed.thickness / (0.01 * sqrt(2.0 / 3.0)) - 1.0).abs() < 0.02, "{}", mixed.thickness);
+    }
+
+    #[test]
+    fn what_is_left_of_a_trend_is_about_zero() {
+        // The straight line through 1, 5, 3 by least squares is 2, 3, 4.
+        let left = detrended(&[1.0, 5.0, 3.0]);
+        assert!(left.iter().zip([-1.0, 2.0, -1.0]).all(|(a, b)| (a - b).abs() < 1e-14), "{left:?}");
+        assert_eq!(detrended(&[7.0]), [7.0]);
     }
 
     #[test]
@@ -593,6 +636,11 @@ mod tests {
         let rate = around(&points, &times[..40], &[[0.0; 2]; 2], 10).approach(&captured).unwrap();
         assert!((rate.per_time - 0.1 / 6.0).abs() < 1e-12, "{rate:?}");
         assert_eq!((rate.from, rate.to), (13.0, 10.0 + 3.0 * 39.0));
+        // A floor of three times 0.01: exp(-0.2 turn), in either phase, is above it up to turn 17.
+        let floored: Vec<f64> = (0..100).map(|i| if i < 50 { exp(-0.2 * f64::from(i / 2)) } else { 0.01 }).collect();
+        let settled = Captured { from: 0, blocks: 0, settled: Some(50) };
+        let rate = around(&at(&floored), &times, &[[0.0; 2]; 2], 10).approach(&settled).unwrap();
+        assert!((rate.per_time - 0.2 / 6.0).abs() < 1e-12 && rate.to == 10.0 + 3.0 * 35.0, "{rate:?}");
         // A point on the centre ends the fit, and fewer than three turns are none.
         let mut ends = two.clone();
         (ends[6], ends[7]) = (0.0, 0.0);

@@ -199,6 +199,13 @@ mod tests {
         // Neighbours are some 5e-4 apart, and distances saturate at 0.19: 2^8.6 times that.
         assert!((7..=10).contains(&d.returns_fitted), "{d:?}");
         assert!(d.standard_error > 0.0 && d.standard_error < 0.05, "{d:?}");
+        // In any unit the same.
+        for unit in [1.0 / 1024.0, 1024.0] {
+            let other: Vec<[f64; 2]> = orbit.iter().map(|p| p.map(|c| unit * c)).collect();
+            let o = divergence(&other, 2.5).unwrap();
+            assert!((o.per_return - d.per_return).abs() < 1e-12 && o.skill == d.skill, "{d:?} {o:?}");
+            assert_eq!(o.returns_fitted, d.returns_fitted);
+        }
     }
 
     #[test]

@@ -288,6 +288,33 @@ mod tests {
     }
 
     #[test]
+    fn a_run_that_crosses_no_more_has_escaped() {
+        // Every two units of time until 80: thirty returns later is 140.
+        let section: Vec<_> =
+            (0..41).map(|i| SectionPoint { t: 2.0 * f64::from(i), u: [1.0, 2.0], upward: true }).collect();
+        for (end, name) in [(139.0, "periodic"), (141.0, "escaped")] {
+            let question = Question { t_end: Some(end), ..Question::default() };
+            let e = classify(&section, &question, &Thresholds::default());
+            assert_eq!((e.name.as_str(), e.return_time), (name, 2.0), "{end}: {e:?}");
+        }
+    }
+
+    #[test]
+    fn a_picture_is_mixed_if_it_shows_what_was_before_the_capture() {
+        // One dot from the first crossing on, at t = 0; around it kicks hold the run in a cloud, which is never
+        // settled.
+        let dot: Vec<_> = (0..60).map(|i| SectionPoint { t: f64::from(i), u: [1.0, 2.0], upward: true }).collect();
+        for kicked in [false, true] {
+            for (shown_from, mixed) in [(-1.0, true), (0.0, false), (10.0, false)] {
+                let question = Question { shown_from, kicked, ..Question::default() };
+                let e = classify(&dot, &question, &Thresholds::default());
+                assert_eq!(e.verdict.cycle().map(|c| c.captured_at), Some(0.0), "{e:?}");
+                assert_eq!((e.mixed, e.dots_only), (mixed, !mixed && !kicked), "{shown_from}: {e:?}");
+            }
+        }
+    }
+
+    #[test]
     fn irregular_motion_in_the_second_coordinate_alone_is_irregular() {
         let mut x = 0.4;
         let mut next = || {
@@ -343,7 +370,28 @@ mod tests {
             // What is written of it is read again.
             let text = serde_json::to_string(&e).unwrap();
             assert_eq!(serde_json::from_str::<Evidence>(&text).unwrap(), e);
+            if gamma == 1e-4 {
+                // It is followed through fifteen blocks of 200 turns. Where more are asked for it is only regular.
+                let of = |fewest_blocks| {
+                    let thresholds = Thresholds { fewest_blocks, ..Thresholds::default() };
+                    classify(&section, &Question::default(), &thresholds).name
+                };
+                assert_eq!([of(15), of(16)], ["spiralling", "quasi-periodic"]);
+            }
         }
+    }
+
+    #[test]
+    fn the_bands_of_chaos_are_those_of_its_second_half() {
+        // The logistic map: one band at 3.97, two at 3.6, which are visited in turn.
+        let mut x = 0.4;
+        let chaos = (0..1200).map(|i| {
+            let before = x;
+            x = if i < 600 { 3.97 } else { 3.6 } * x * (1.0 - x);
+            [before, x]
+        });
+        let e = judge(chaos, |_| true);
+        assert!(matches!(e.verdict, Verdict::Chaotic { bands: 2, .. }), "{e:?}");
     }
 
     #[test]

@@ -310,6 +310,15 @@ mod tests {
     }
 
     #[test]
+    fn each_run_without_noise_is_held_against_the_others() {
+        // The last one is short and fills the hole like the rest: of its own few points it would be a structure, of the
+        // others' it has none.
+        let free: Vec<_> = (0..4).map(|k| if k < 3 { sea(20_000, 0.0, k) } else { sea(600, 1.0, k) }).collect();
+        let found = contrast(&sea(4000, 0.0, 9), &free, &Thresholds::default()).unwrap();
+        assert!(found.free[0].abs() < 0.4 && found.free[1] > 0.95, "{found:?}");
+    }
+
+    #[test]
     fn directions_are_kept_apart() {
         // Upwards the hole is empty, downwards it is as full as the rest: on each other they would have no island.
         let half = |n: usize, stream: u64| -> Vec<SectionPoint> {
@@ -377,6 +386,11 @@ mod tests {
             assert!((map.of_counts([2.0, 1.0]).unwrap() - want).abs() < 1e-12);
         }
         assert!(Map::of(&grid, &visited, 9).is_none());
+        // A hole that winds down, to the left and up again, and begins at its upper end, is one.
+        let hook = [[1, 5], [2, 5], [3, 5], [3, 4], [3, 3], [2, 3]];
+        let around = (0..64).map(|k| [k / 8, k % 8]).filter(|cell| !hook.contains(cell));
+        let around: Vec<[f64; 2]> = around.map(|cell| cell.map(|c| f64::from(c) + 0.5)).collect();
+        assert_eq!(Map::of(&grid, &around, 6).unwrap().area, [6.0, 58.0]);
     }
 
     #[test]

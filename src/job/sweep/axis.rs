@@ -503,6 +503,8 @@ mod tests {
         assert_eq!(values("method=lsoda,dopri5"), ["lsoda", "dopri5"].map(Entry::from));
         assert_eq!(values("shift.y=-1e-9..1e-9"), numbers(&[0.0]));
         assert_eq!(values("rtol=1e-10..1e-6:log"), numbers(&[1e-8]));
+        // Written again with all of its digits.
+        assert_eq!(values("params.beta=0.25,1e-5"), numbers(&[0.25, 1e-5]));
     }
 
     /// What only a file or a program can say.
@@ -536,13 +538,15 @@ mod tests {
     /// An end with more digits than a grid's values are rounded to is hit exactly; so is 1/3 of a range.
     #[test]
     fn grids_end_where_they_are_asked_to() {
-        let (from, to) = (0.1 + 0.2, 1.1 * 1.1);
-        let log = Axis { coordinate: Coordinate::Rtol, values: Values::Log { from, to, count: 4 } };
-        let linear = Axis { coordinate: Coordinate::Rtol, values: Values::Linear { from, to, count: 4 } };
-        for axis in [log, linear] {
-            assert_eq!((axis.value(0, 0.0), axis.value(3, 0.0)), (from.into(), to.into()));
-            assert!(axis.value(1, 0.0).value() > from && axis.value(2, 0.0).value() < to);
-            assert_eq!((axis.count(), axis.is_random()), (4, false));
+        // And in binary 0.2 + (0.9 - 0.2) is not 0.9.
+        for (from, to) in [(0.1 + 0.2, 1.1 * 1.1), (0.2, 0.9)] {
+            let log = Axis { coordinate: Coordinate::Rtol, values: Values::Log { from, to, count: 4 } };
+            let linear = Axis { coordinate: Coordinate::Rtol, values: Values::Linear { from, to, count: 4 } };
+            for axis in [log, linear] {
+                assert_eq!((axis.value(0, 0.0), axis.value(3, 0.0)), (from.into(), to.into()));
+                assert!(axis.value(1, 0.0).value() > from && axis.value(2, 0.0).value() < to);
+                assert_eq!((axis.count(), axis.is_random()), (4, false));
+            }
         }
         let drawn = |u| "rtol=1e-4..1:log".parse::<Axis>().unwrap().value(0, u).value();
         assert!((drawn(0.25) - 1e-3).abs() < 1e-15 && (drawn(0.0) - 1e-4).abs() < 1e-16);
@@ -676,7 +680,7 @@ mod tests {
             ("seed=9..1", "rising"),
             ("method=euler", "lsoda"),
             ("shift.x=1*0", "count"),
-            ("eps=inf", "finite"),
+            ("eps=inf", "not a finite number"),
             ("params.=1", "cannot be varied"),
             ("start.=1", "cannot be varied"),
             ("shift.=1", "cannot be varied"),

@@ -345,6 +345,8 @@ mod tests {
         draws.sort_by(f64::total_cmp);
         draws.dedup();
         assert_eq!(draws.len(), 24, "every seed's rows have draws of their own");
+        // Whatever bits it has.
+        assert!((0..64).all(|bit| draw(1 << bit, 0) != draw(0, 0)));
         // More draws are more rows behind the ones that were there.
         let (three, five) = (sweep(3, 1).unwrap(), sweep(5, 1).unwrap());
         assert_eq!((three.with_draws(5).as_ref(), three.rows(), five.rows()), (Some(&five), 6, 10));
