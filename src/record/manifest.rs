@@ -200,13 +200,30 @@ pub struct Difference {
     pub panels: Vec<String>,
 }
 
+/// Labels of panels in a sentence: each once, with how many have it. What a panel of ours asks is often one question of a hundred of a kind.
+pub fn listed(panels: &[String]) -> String {
+    let mut counted: Vec<(&str, usize)> = Vec::new();
+    for panel in panels {
+        match counted.iter_mut().find(|(label, _)| label == panel) {
+            Some((_, count)) => *count += 1,
+            None => counted.push((panel, 1)),
+        }
+    }
+    let said = |(label, count): &(&str, usize)| {
+        if *count == 1 { (*label).to_owned() } else { format!("{label} ({count} of them)") }
+    };
+    counted.iter().map(said).collect::<Vec<_>>().join(", ")
+}
+
 impl PictureEntry {
     /// The first layer in which `actual` differs from `self`.
     pub fn first_difference(&self, actual: &PictureEntry) -> Option<Difference> {
         let panels_differing = |hash: fn(&PanelEntry) -> Option<&Hash>| {
             let mut labels = Vec::new();
-            for panel in &self.panels {
-                let other = actual.panels.iter().find(|p| p.label == panel.label);
+            for (i, panel) in self.panels.iter().enumerate() {
+                // Questions of one kind have one label: the first is held against the first, the second against the second.
+                let before = self.panels[..i].iter().filter(|p| p.label == panel.label).count();
+                let other = actual.panels.iter().filter(|p| p.label == panel.label).nth(before);
                 if other.is_none_or(|o| hash(o) != hash(panel)) {
                     labels.push(panel.label.clone());
                 }
@@ -253,6 +270,26 @@ mod tests {
             pdf: h("6"),
             panels: vec![panel("i"), panel("ii")],
         }
+    }
+
+    #[test]
+    fn panels_of_one_label_are_told_apart_by_their_order() {
+        let h = |s: &str| Hash::of(s.as_bytes());
+        let with = |data: [&str; 3]| {
+            let panels = data.map(|d| PanelEntry { label: "leaving".into(), spec: h("s"), data: h(d), verdict: None });
+            PictureEntry { data: h(&data.join(" ")), panels: panels.to_vec(), ..entry() }
+        };
+        let difference = with(["a", "b", "c"]).first_difference(&with(["a", "x", "c"])).unwrap();
+        assert_eq!((difference.layer, difference.panels), (Layer::Data, vec!["leaving".to_owned()]));
+        let swapped = with(["a", "b", "c"]).first_difference(&with(["b", "a", "c"])).unwrap();
+        assert_eq!(swapped.panels.len(), 2);
+    }
+
+    #[test]
+    fn labels_are_said_once() {
+        let panels = ["i", "leaving", "ii", "leaving", "leaving"].map(str::to_owned);
+        assert_eq!(listed(&panels), "i, leaving (3 of them), ii");
+        assert_eq!(listed(&[]), "");
     }
 
     #[test]

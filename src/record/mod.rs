@@ -21,4 +21,4 @@ pub use files::{FileError, write};
 pub use folder::{FileBytes, Tree, read_tree, read_tree_with};
 pub use hash::Hash;
 pub use journal::Journal;
-pub use manifest::{Layer, Manifest, PanelEntry, PictureEntry, VerdictEntry};
+pub use manifest::{Layer, Manifest, PanelEntry, PictureEntry, VerdictEntry, listed};

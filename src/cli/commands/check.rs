@@ -11,7 +11,7 @@ use crate::cli::{CliError, Exit, in_pool, print};
 use crate::job::Desk;
 use crate::paper::figures;
 use crate::paper::pipeline::{PictureRecord, compute, questions};
-use crate::record::{self, Layer, Manifest};
+use crate::record::{self, Layer, Manifest, listed};
 
 /// Recompute figures and compare spec, data, pixels and files with the committed manifests; exit code 1 on a difference.
 #[derive(Debug, clap::Args)]
@@ -67,7 +67,7 @@ impl Finding {
                 format!("{name}: DIFFERS first in its {}", layer.name())
             }
             State::Differs { layer, panels } => {
-                format!("{name}: DIFFERS first in its {} of panel {}", layer.name(), panels.join(", "))
+                format!("{name}: DIFFERS first in its {} of panel {}", layer.name(), listed(panels))
             }
             State::MissingReference { why } => format!("{name}: MISSING REFERENCE: {why}"),
             State::NotMade => format!("{name}: NOT MADE: the manifest lists it, but its figure has no such picture"),

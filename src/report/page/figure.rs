@@ -8,7 +8,7 @@ use super::Links;
 use super::parts::*;
 use crate::compare::Comparison;
 use crate::paper::wording;
-use crate::record::Layer;
+use crate::record::{Layer, listed};
 
 pub(super) fn figure(html: &mut String, figure: &FigureReport, links: Links) {
     let id = figure_id(figure);
@@ -102,7 +102,7 @@ pub(super) fn mismatch(html: &mut String, picture: &PictureReport) {
         }
         _ => return,
     };
-    let of = if panels.is_empty() { String::new() } else { format!(" of panel {}", panels.join(", ")) };
+    let of = if panels.is_empty() { String::new() } else { format!(" of panel {}", listed(panels)) };
     put!(
         html,
         "<div class=\"notice\" data-mismatch=\"{}\">\n<p>Differs from the committed reference. The first layer that differs: <strong>{}{}</strong> \
