@@ -37,10 +37,15 @@ pub fn shrunk(pixels: &Pixels, width: u32, how: Shrink) -> Pixels {
         }
         for column in &columns {
             let colour = match how {
-                Shrink::Mean => [0, 1, 2].map(|channel| {
-                    let sum: u64 = column.iter().map(|(x, u)| u * sums[4 * x + channel]).sum();
-                    ((sum + area / 2) / area) as u8
-                }),
+                Shrink::Mean => {
+                    let mut sum = [0_u64; 3];
+                    for (x, u) in column {
+                        for (sum, of_column) in sum.iter_mut().zip(&sums[4 * x..4 * x + 3]) {
+                            *sum += u * of_column;
+                        }
+                    }
+                    sum.map(|sum| ((sum + area / 2) / area) as u8)
+                }
                 Shrink::Strongest => row
                     .iter()
                     .flat_map(|(y, _)| column.iter().map(move |(x, _)| y * stride + 4 * x))
