@@ -156,6 +156,34 @@ fn numbers_go_into_files_that_are_named_for_them() {
     assert_eq!(fs::read_dir(at).unwrap().count(), written, "something was written");
 }
 
+/// A second call draws nothing, a third what was changed since; with other questions, or without a store, everything is made.
+#[test]
+fn what_this_program_has_made_stands_until_it_is_touched() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let figure = |more: &[&str]| {
+        let (code, out, err) =
+            twofold_in(at, &[&["figure", "fig1", "fig3", "--out", "made", "--json"][..], more].concat());
+        assert_eq!(code, 0, "{err}");
+        let mut lines: Vec<String> = err.lines().filter(|l| l.ends_with(".png")).map(str::to_owned).collect();
+        lines.sort();
+        (out, lines.join(", "))
+    };
+    let kept = ["--store", "store"];
+    let (records, said) = figure(&kept);
+    assert_eq!(said, "wrote made/fig1/fig1.png, wrote made/fig3/fig3.png");
+    let how = fs::read(at.join("made/making.json")).unwrap();
+    assert_eq!(figure(&kept), (records.clone(), "stands made/fig1/fig1.png, stands made/fig3/fig3.png".into()));
+    assert_eq!(fs::read(at.join("made/making.json")).unwrap(), how, "nothing was made");
+
+    let svg = at.join("made/fig3/fig3.svg");
+    let whole = fs::read(&svg).unwrap();
+    fs::write(&svg, [&whole[..], b" "].concat()).unwrap();
+    assert_eq!(figure(&kept), (records.clone(), "stands made/fig1/fig1.png, wrote made/fig3/fig3.png".into()));
+    assert_eq!(fs::read(&svg).unwrap(), whole);
+    assert_eq!(figure(&["--fresh"]), (records, "wrote made/fig1/fig1.png, wrote made/fig3/fig3.png".into()));
+}
+
 #[test]
 fn parameters_that_make_no_sense_are_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -10,7 +10,7 @@ use std::process::Output;
 use assert_cmd::Command;
 use common::{copy, figures, schema, write_references};
 use serde_json::Value;
-use twofold::record::{Hash, read_tree, read_tree_with};
+use twofold::record::{Hash, read_tree, visit_tree};
 use twofold::render::{Pixels, decode_png, encode_png};
 use twofold::report::{Links, MadeFile, Reference, Report, assemble, page};
 
@@ -55,7 +55,7 @@ impl Bench {
 
     fn report(&self) -> Report {
         assemble(
-            &read_tree_with(&self.made(), &|_| true, &MadeFile::from).unwrap().0,
+            &visit_tree(&self.made(), &|_| true, &MadeFile::read).unwrap().0,
             &read_tree(&self.expected(), &|_| true).unwrap().files,
         )
     }

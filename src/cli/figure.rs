@@ -15,6 +15,7 @@ use crate::integrate::filippov::ExitRule;
 use crate::job::spec::{RunSpec, SwitchSpec};
 use crate::job::{Desk, Store};
 use crate::paper::pipeline::{Computed, PictureRecord, PipelineError, compute_with_tables, questions};
+use crate::paper::standing::{Standing, Stands};
 use crate::paper::{Alterations, Figure, Panel, Picture, View, figures};
 use crate::record::files::{read, still_there, try_folder};
 use crate::record::{FileError, write};
@@ -152,30 +153,53 @@ pub fn run(figures: Vec<Figure>, arguments: &FigureFlags) -> Result<(), CliError
         }
     }
     let desk = Desk::new(arguments.store.store(), &progress);
-    let records = in_pool(arguments.threads, || make(&figures, &arguments.out, &desk))??;
-    say_how(&figures, arguments, &progress)?;
+    let made = in_pool(arguments.threads, || make_what_is_missing(&figures, &arguments.out, &desk))??;
+    say_how(&figures, &made, arguments, &progress)?;
     if arguments.json {
-        print_json(&records)?;
+        print_json(&made.into_iter().map(|m| m.record).collect::<Vec<_>>())?;
     }
     Ok(())
 }
 
 /// Makes these figures, each in a folder of its own under `out`: all their questions first, side by side, the longest first; then the
-/// pictures. Answers that the desk's store keeps are not lost if this is killed.
+/// pictures. Answers that the desk's store keeps are not lost if this is killed. What this program has made in `out` before and nobody has changed since stands,
+/// if there is a store to know it by.
 ///
 /// # Errors
 ///
 /// If a computation or a drawing failed, a file could not be written, or what was written has been removed by the time that all is done;
 /// what could be made is there all the same.
 pub fn make(figures: &[Figure], out: &Path, desk: &Desk<'_>) -> Result<Vec<PictureRecord>, CliError> {
-    desk.gather(&questions(figures.iter().flat_map(|f| &f.pictures)));
+    Ok(make_what_is_missing(figures, out, desk)?.into_iter().map(|made| made.record).collect())
+}
+
+/// A picture that is there.
+struct Made {
+    /// What is known about it.
+    record: PictureRecord,
+    /// Whether it was drawn by this call, and did not stand there already.
+    anew: bool,
+}
+
+fn make_what_is_missing(figures: &[Figure], out: &Path, desk: &Desk<'_>) -> Result<Vec<Made>, CliError> {
     let pictures: Vec<(PathBuf, &Picture)> =
         figures.iter().flat_map(|f| f.pictures.iter().map(|p| (out.join(f.id), p))).collect();
+    let standing = desk.store().and_then(Standing::of);
+    let found = |(folder, picture): &(PathBuf, &Picture)| standing.as_ref().and_then(|s| s.find(picture, folder));
+    let standing_there: Vec<Option<Stands>> = pictures.par_iter().with_max_len(1).map(found).collect();
+    let missing = pictures.iter().zip(&standing_there).filter(|(_, stands)| stands.is_none());
+    desk.gather(&questions(missing.map(|((_, picture), _)| *picture)));
     // One by one: in larger portions a thread would be left with several while others have none.
-    let results: Vec<Result<(PictureRecord, Vec<Written>), CliError>> = pictures
+    let results: Vec<Result<(Made, Vec<Written>), CliError>> = pictures
         .par_iter()
+        .zip(standing_there)
         .with_max_len(1)
-        .map(|(folder, picture)| {
+        .map(|((folder, picture), stands)| {
+            let png = folder.join(format!("{}.png", picture.name));
+            if let Some(Stands { record, files }) = stands {
+                desk.progress().line(&format!("stands {}", png.display()));
+                return Ok((Made { record, anew: false }, files));
+            }
             let mut written = Vec::new();
             let mut keep = |file: &str, bytes: &[u8]| {
                 written.push(put(folder, file, bytes)?);
@@ -187,18 +211,28 @@ pub fn make(figures: &[Figure], out: &Path, desk: &Desk<'_>) -> Result<Vec<Pictu
             })?;
             write_picture(folder, &computed, &mut written)?;
             desk.forget();
-            let name = &computed.record.hashes.name;
-            desk.progress().line(&format!("wrote {}", folder.join(format!("{name}.png")).display()));
-            Ok((computed.record, written))
+            desk.progress().line(&format!("wrote {}", png.display()));
+            if let Some(Err(error)) = standing.as_ref().map(|s| s.remember(picture, &computed.record)) {
+                // The picture is there; only the next run will have to draw it again.
+                desk.progress().line(&format!("not kept for the next run: {error}"));
+            }
+            Ok((Made { record: computed.record, anew: true }, written))
         })
         .collect();
-    let (records, written): (Vec<_>, Vec<_>) = results.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+    let (made, written): (Vec<_>, Vec<_>) = results.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
     still_there(&written.concat())?;
-    Ok(records)
+    Ok(made)
 }
 
-/// Writes down by which build, with how many threads and in what time the figures were made: for the report. No picture depends on it.
-fn say_how(figures: &[Figure], arguments: &FigureFlags, progress: &Progress) -> Result<(), CliError> {
+/// Writes down by which build, with how many threads and in what time the figures were made: for the report. No picture depends on it. Of figures that stood
+/// there already, what was written down when they were made still holds.
+fn say_how(figures: &[Figure], made: &[Made], arguments: &FigureFlags, progress: &Progress) -> Result<(), CliError> {
+    let anew = |name: &str| made.iter().any(|m| m.anew && m.record.hashes.name == name);
+    let figures: Vec<String> =
+        figures.iter().filter(|f| f.pictures.iter().any(|p| anew(&p.name))).map(|f| f.id.to_owned()).collect();
+    if figures.is_empty() {
+        return Ok(());
+    }
     let path = arguments.out.join(names::MAKING);
     // What cannot be read is not worth keeping.
     let before: Makings = read(&path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default();
@@ -206,7 +240,7 @@ fn say_how(figures: &[Figure], arguments: &FigureFlags, progress: &Progress) -> 
     let rounded = |seconds: f64| (1e3 * seconds).round() / 1e3;
     let computed = progress.computed().into_iter().map(|(what, s)| Timed { what, seconds: rounded(s) }).collect();
     let making = Making {
-        figures: figures.iter().map(|f| f.id.to_owned()).collect(),
+        figures,
         program: concat!("twofold ", env!("CARGO_PKG_VERSION")).into(),
         commit: env!("TWOFOLD_COMMIT").into(),
         compiler: env!("TWOFOLD_RUSTC").into(),
@@ -235,8 +269,7 @@ fn put(folder: &Path, file: &str, bytes: &[u8]) -> Result<Written, FileError> {
 /// Writes a picture's files, its tables being there: the record last, so that a record vouches for everything beside it.
 fn write_picture(folder: &Path, computed: &Computed, written: &mut Vec<Written>) -> Result<(), FileError> {
     let name = &computed.record.hashes.name;
-    let mut json = serde_json::to_vec_pretty(&computed.record).expect("a record is plain data");
-    json.push(b'\n');
+    let json = computed.record.to_json();
     let files = [
         (format!("{name}.png"), &computed.rendered.png),
         (format!("{name}.svg"), &computed.rendered.svg),

@@ -65,6 +65,11 @@ impl<'a> Desk<'a> {
         self.progress
     }
 
+    /// The store, if answers are kept.
+    pub fn store(&self) -> Option<&Store> {
+        self.store.as_ref()
+    }
+
     /// The answer to a question.
     ///
     /// # Errors

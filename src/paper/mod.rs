@@ -26,6 +26,7 @@ pub mod drawing;
 pub mod figures;
 pub mod pipeline;
 pub mod readme;
+pub mod standing;
 pub mod study;
 pub mod verdict;
 pub mod wording;

@@ -48,6 +48,22 @@ pub struct PictureRecord {
     pub tables: Vec<TableRecord>,
 }
 
+impl PictureRecord {
+    /// As it is written beside the picture, NAME.json.
+    pub fn to_json(&self) -> Vec<u8> {
+        let mut json = serde_json::to_vec_pretty(self).expect("a record is plain data");
+        json.push(b'\n');
+        json
+    }
+
+    /// The files that it vouches for: name and digest of the picture's own, then of its tables'.
+    pub fn files(&self) -> Vec<(String, &Hash)> {
+        let PictureEntry { name, png, svg, pdf, .. } = &self.hashes;
+        let drawn = [("png", png), ("svg", svg), ("pdf", pdf)].map(|(ending, hash)| (format!("{name}.{ending}"), hash));
+        drawn.into_iter().chain(self.tables.iter().map(|t| (t.file.clone(), &t.sha256))).collect()
+    }
+}
+
 /// What is known about a table's file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TableRecord {
@@ -116,7 +132,7 @@ pub fn pixel_hash(pixels: &Pixels) -> Hash {
 }
 
 /// What a picture's panels ask, label by label; a study's questions are named after their kind.
-fn parts(picture: &Picture) -> Vec<(String, AnyQuestion)> {
+pub(super) fn parts(picture: &Picture) -> Vec<(String, AnyQuestion)> {
     match &picture.view {
         View::Study(study) => (study.questions)().into_iter().map(|q| (q.kind().to_owned(), q)).collect(),
         _ => picture.panels.iter().map(|p| (p.label.clone(), Arc::new(Run(p.run.clone())) as AnyQuestion)).collect(),

@@ -13,6 +13,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::NamedTempFile;
 
+use super::Hash;
+
 /// A file or folder that could not be read or written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot {action} {}: {source}", path.display())]
@@ -366,6 +368,14 @@ pub const LARGEST_TEXT: u64 = 16 << 20;
 /// If it cannot be read, or is larger.
 pub fn read(path: &Path) -> Result<Vec<u8>, FileError> {
     File::open(path).and_then(|f| at_most(f, LARGEST)).map_err(FileError::new("read", path))
+}
+
+/// The digest of a file, however large, and its length.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn digest(path: &Path) -> Result<(Hash, u64), FileError> {
+    File::open(path).and_then(Hash::of_stream).map_err(FileError::new("read", path))
 }
 
 /// Reads a whole text file of at most [`LARGEST_TEXT`] bytes.

@@ -50,27 +50,34 @@ const LARGEST_TREE: u64 = 4 << 30;
 /// # Errors
 /// If the folder or a file cannot be read, or there is more of them than fits in memory.
 pub fn read_tree(folder: &Path, wanted: &dyn Fn(&str) -> bool) -> Result<Tree, FileError> {
-    let (files, dangling) = read_tree_with(folder, wanted, &|file| file)?;
+    let read = |path: String, file: &Path| Ok(FileBytes { bytes: files::read(file)?, path });
+    let (files, dangling) = visit_tree(folder, wanted, &read)?;
     Ok(Tree { files, dangling })
 }
 
-/// [`read_tree`] that keeps of each file what `keep` makes of it, several side by side: the files' rests, and what was met and not read.
+/// Goes to every file that [`read_tree`] reads, several side by side, with its path inside the folder and the place where it is: what `visit` makes of
+/// each, and what was met and is not there.
 ///
 /// # Errors
-/// As [`read_tree`].
-pub fn read_tree_with<T: Send>(
+/// As [`read_tree`], and what `visit` says.
+pub fn visit_tree<T: Send>(
     folder: &Path,
     wanted: &dyn Fn(&str) -> bool,
-    keep: &(dyn Fn(FileBytes) -> T + Sync),
+    visit: &(dyn Fn(String, &Path) -> Result<T, FileError> + Sync),
 ) -> Result<(Vec<T>, Vec<String>), FileError> {
     let mut walk = Walk { wanted, files: Vec::new(), dangling: Vec::new(), bytes: 0 };
     walk.folder(folder, "", DEPTH)?;
     let Walk { mut files, mut dangling, .. } = walk;
     files.sort();
     dangling.sort();
-    let read = |path: String| Ok(keep(FileBytes { bytes: files::read(&folder.join(&path))?, path }));
-    let kept: Result<Vec<T>, FileError> = files.into_par_iter().map(read).collect();
-    Ok((kept?, dangling))
+    let made: Result<Vec<T>, FileError> = files
+        .into_par_iter()
+        .map(|path| {
+            let file = folder.join(&path);
+            visit(path, &file)
+        })
+        .collect();
+    Ok((made?, dangling))
 }
 
 struct Walk<'a> {

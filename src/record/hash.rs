@@ -1,6 +1,7 @@
 //! SHA-256, as lower-case hexadecimal text.
 
 use std::fmt::Write as _;
+use std::io::{self, Read};
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -48,6 +49,30 @@ impl Hash {
         for part in parts {
             digest.update(part);
         }
+        Self::finish(digest)
+    }
+
+    /// The digest of everything in a stream, and how many bytes that is. No more than a piece of it is in memory at a time.
+    ///
+    /// # Errors
+    /// If the stream cannot be read.
+    pub fn of_stream(mut stream: impl Read) -> io::Result<(Self, u64)> {
+        let (mut digest, mut length) = (Sha256::new(), 0);
+        let mut piece = vec![0; 1 << 16];
+        loop {
+            match stream.read(&mut piece) {
+                Ok(0) => return Ok((Self::finish(digest), length)),
+                Ok(n) => {
+                    digest.update(&piece[..n]);
+                    length += n as u64;
+                }
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    fn finish(digest: Sha256) -> Self {
         let mut text = String::with_capacity(64);
         for byte in digest.finalize() {
             // Writing to a String cannot fail.
@@ -118,6 +143,38 @@ fn write_scalar<T: Serialize + ?Sized>(value: &T, into: &mut Vec<u8>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_stream_has_the_digest_of_its_bytes() {
+        /// Gives seven bytes at a time, and is interrupted before each.
+        struct Slow<'a>(&'a [u8], bool);
+        impl Read for Slow<'_> {
+            fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+                self.1 = !self.1;
+                if self.1 {
+                    return Err(io::ErrorKind::Interrupted.into());
+                }
+                let n = self.0.len().min(7).min(into.len());
+                into[..n].copy_from_slice(&self.0[..n]);
+                self.0 = &self.0[n..];
+                Ok(n)
+            }
+        }
+        /// Breaks.
+        struct Broken;
+        impl Read for Broken {
+            fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+                Err(io::Error::other("broken"))
+            }
+        }
+        let bytes: Vec<u8> = (0..200_000u32).map(|i| (i % 251) as u8).collect();
+        for n in [0, 1, 6, 7, 8, 65_535, 65_536, 65_537, 200_000] {
+            let whole = (Hash::of(&bytes[..n]), n as u64);
+            assert_eq!(Hash::of_stream(&bytes[..n]).unwrap(), whole);
+            assert_eq!(Hash::of_stream(Slow(&bytes[..n], false)).unwrap(), whole);
+        }
+        assert!(Hash::of_stream(Broken).is_err());
+    }
 
     #[test]
     fn known_digest() {

@@ -18,7 +18,7 @@ pub mod manifest;
 pub mod merkle;
 
 pub use files::{FileError, write};
-pub use folder::{FileBytes, Tree, read_tree, read_tree_with};
+pub use folder::{FileBytes, Tree, read_tree, visit_tree};
 pub use hash::Hash;
 pub use journal::Journal;
 pub use manifest::{Layer, Manifest, PanelEntry, PictureEntry, VerdictEntry, listed};

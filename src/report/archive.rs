@@ -7,7 +7,6 @@ use super::assemble::{MadeFile, media_type};
 use super::html::address;
 use super::model::{Report, indented};
 use super::names;
-use crate::record::FileBytes;
 use crate::render::read_provenance;
 
 /// Date of the release, as CITATION.cff has it. RO-Crate asks for a date of publication; a clock would make the bytes of this file
@@ -40,7 +39,7 @@ pub(super) const PROCEEDINGS: &str = "Proc. 5th International Conference on Stru
 /// The metadata of a folder that holds `made` and what the report adds to it (`added`: name and bytes).
 pub fn archive(report: &Report, made: &[MadeFile], added: &[(&str, &[u8])]) -> Vec<u8> {
     let own = [names::PAGE, names::REPORT, names::VERDICTS, names::ARCHIVE];
-    let added = added.iter().map(|(name, bytes)| FileBytes { path: (*name).to_owned(), bytes: bytes.to_vec() }.into());
+    let added = added.iter().map(|(name, bytes)| MadeFile::of((*name).to_owned(), bytes.to_vec()));
     let added: Vec<MadeFile> = added.collect();
     let mut files: Vec<&MadeFile> = made.iter().filter(|f| !own.contains(&f.path.as_str())).chain(&added).collect();
     files.sort_by_key(|file| &file.path);

@@ -1,6 +1,7 @@
 //! From files to a report.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use rayon::prelude::*;
 use serde::Deserialize;
@@ -15,7 +16,7 @@ use crate::job::spec::Method;
 use crate::paper::Reading;
 use crate::paper::pipeline::{PanelRecord, TableRecord, pixel_hash};
 use crate::paper::wording;
-use crate::record::{FileBytes, Hash, Layer, Manifest, PictureEntry};
+use crate::record::{FileBytes, FileError, Hash, Layer, Manifest, PictureEntry, files};
 use crate::render::{Pixels, Shrink, decode_png, encode_preview, shrunk};
 
 /// The record beside a picture. Verdicts are read loosely: their evidence may hold numbers that JSON writes as null.
@@ -49,15 +50,25 @@ pub struct MadeFile {
     pub bytes: Vec<u8>,
 }
 
-impl From<FileBytes> for MadeFile {
-    fn from(file: FileBytes) -> Self {
-        let (size, sha256) = (file.bytes.len() as u64, Hash::of(&file.bytes));
-        let is_read = !file.path.ends_with(".csv") || space::camera(file.folder()).is_some();
-        Self { bytes: if is_read { file.bytes } else { Vec::new() }, path: file.path, size, sha256 }
-    }
-}
-
 impl MadeFile {
+    /// The file at `place`, whose path inside the figures' folder is `path`.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub fn read(path: String, place: &Path) -> Result<Self, FileError> {
+        let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
+        if path.ends_with(".csv") && space::camera(folder).is_none() {
+            let (sha256, size) = files::digest(place)?;
+            return Ok(Self { path, size, sha256, bytes: Vec::new() });
+        }
+        Ok(Self::of(path, files::read(place)?))
+    }
+
+    /// A file of these bytes.
+    pub(super) fn of(path: String, bytes: Vec<u8>) -> Self {
+        Self { path, size: bytes.len() as u64, sha256: Hash::of(&bytes), bytes }
+    }
+
     fn folder(&self) -> &str {
         self.path.rsplit_once('/').map_or("", |(folder, _)| folder)
     }

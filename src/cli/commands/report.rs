@@ -7,7 +7,7 @@ use serde_json::json;
 use crate::cli::speak::print_json;
 use crate::cli::{CliError, Exit, in_pool, print};
 use crate::paper::{Figure, figures};
-use crate::record::{self, FileBytes, read_tree, read_tree_with};
+use crate::record::{self, FileBytes, read_tree, visit_tree};
 use crate::report::{Links, MadeFile, Report, archive, assemble, names, page};
 
 /// Write a self-contained page about the figures in a folder, and beside it report.json, verdicts.json and RO-Crate metadata.
@@ -36,7 +36,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 
 fn report(arguments: &Arguments) -> Result<Exit, CliError> {
     let folder = &arguments.figures;
-    let (made, _) = read_tree_with(folder, &|_| true, &MadeFile::from)
+    let (made, _) = visit_tree(folder, &|_| true, &MadeFile::read)
         .map_err(|e| CliError::Usage(format!("{e}; run `make figures` first, or name another --figures")))?;
     let report = assemble(&made, &references(arguments.expected.as_deref())?);
     if report.figures.is_empty() {
