@@ -227,6 +227,10 @@ bench-keep: ## benchmarks, kept as what `make bench` compares with
 	@$(CARGO) bench --locked --bench steppers -- --save-baseline kept
 	@$(CARGO) bench --locked --bench render -- --save-baseline kept
 
+.PHONY: rehearse
+rehearse: ## a job of a workflow, its own lines, in a fresh clone: make rehearse JOB=ci.yml/package (needs Python with PyYAML; scripts/rehearse.py)
+	@python3 scripts/rehearse.py $(JOB) $(MATRIX)
+
 # What is built once needs no notes for the next time; they take more room on the disk than all the rest.
 ci: export CARGO_INCREMENTAL = 0
 ci: lint test ## what CI runs; nothing in it rests on a store
