@@ -92,7 +92,11 @@ fn files_are_checked_out_as_they_are_committed() {
     }
     let rules = text(".gitattributes");
     let rules: Vec<&str> = rules.lines().filter(|l| !l.is_empty() && !l.starts_with('#')).collect();
-    assert_eq!(rules, ["* -text"], "a rule more may undo the first: see what it does to `git ls-files --eol` under core.autocrlf=true");
+    assert_eq!(
+        rules,
+        ["* -text"],
+        "a rule more may undo the first: see what it does to `git ls-files --eol` under core.autocrlf=true"
+    );
 }
 
 /// Cargo reads every member of a workspace, also of those that it does not build: an image is built from sources that are whole.
