@@ -631,7 +631,7 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         fs::create_dir(at(".twofold-Folder.tmp")).unwrap();
         let left = [".twofold-Folder.tmp", ".twofold-a-b_c+.tmp", ".twofold-seven77.tmp"];
-        for name in [left[1], left[2], ".twofold-abcdef.tmp", ".twofold-ABCDEF.tmp"] {
+        for name in [left[1], left[2], ".twofold-abcdef.tmp", ".twofold-UVWXYZ.tmp"] {
             fs::write(at(name), b"half").unwrap();
         }
         assert_eq!(sweep(folder.path()), 2);
