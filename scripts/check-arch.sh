@@ -57,7 +57,7 @@ emulator() {
     touch "$root/.emulates"
 }
 
-# With wine, 1.6 GB.
+# With wine, 1.2 GB and what it needs.
 with_wine() {
     [ ! -e "$root/.wine" ] || return 0
     bare && { inside apt-get update && inside apt-get install -y --no-install-recommends wine wine64; } > "$work/apt.log" 2>&1 || return 1
@@ -127,7 +127,7 @@ under_wine() {
         with_wine || { echo "the root could not be made: see $work/*.log" >&2; return 2; }
         cp --remove-destination "$1" "$root/src/twofold.exe"
         shift
-        inside env WINEDEBUG=-all WINEDLLOVERRIDES=mscoree,mshtml= WINEPREFIX=/src/wine wine /src/twofold.exe "$@"
+        inside env WINEDEBUG=-all WINEDLLOVERRIDES=mscoree,mshtml= WINEPREFIX=/src/wine XDG_RUNTIME_DIR=/tmp wine /src/twofold.exe "$@"
     fi
 }
 
