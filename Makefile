@@ -196,7 +196,7 @@ symbols: ## no program and no module asks the platform for mathematics: all of t
 	TWOFOLD_PROGRAMS="$$found $(PROGRAMS)" $(CARGO) test --locked --quiet --test binary -- --ignored --nocapture
 
 .PHONY: check-arch check-levels reprotest
-check-arch: ## the same bytes on arm64, s390x, i686, riscv64 and wasm, emulated: make check-arch TARGETS="s390x" (Debian; scripts/check-arch.sh says what it needs)
+check-arch: ## the same bytes on arm64, s390x, i686, riscv64 and wasm, emulated (and on windows, by wine, if named): make check-arch TARGETS="s390x" (Debian; scripts/check-arch.sh says what it needs)
 	@sh scripts/check-arch.sh $(TARGETS)
 
 check-levels: ## the same bytes at every level of optimisation, with fat LTO, and for this processor: make check-levels LEVELS="s z"

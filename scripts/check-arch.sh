@@ -3,7 +3,9 @@
 #
 #   scripts/check-arch.sh [TARGET...]      (make check-arch; Debian or Ubuntu; wasm32 wants PyPI's package wasmtime)
 #
-# Targets: aarch64, s390x (big-endian), i686 (32 bits), riscv64, wasm32. i686 runs without emulation where the kernel takes it.
+# Targets: aarch64, s390x (big-endian), i686 (32 bits), riscv64, wasm32; these if nothing is said. i686 runs without emulation where the kernel takes it.
+# And windows (x86-64): under wine, which is not Windows, and on the processor itself. COMPILER=rustup only, with gcc-mingw-w64-x86-64: Debian's unstable suite has no
+# standard library for it. Wine is this machine's if that starts the program, else that of the suite, in the root.
 #
 # COMPILER=rustup: the project's own compiler, the target's standard library from rustup, a cross linker from Debian (gcc-aarch64-linux-gnu libc6-dev-arm64-cross, ...) and
 # qemu-user-static. qemu 7.2 is too old for s390x: it draws wrong pixels (11.1 draws the right ones with the same program).
@@ -36,18 +38,30 @@ fi
 [ $# -gt 0 ] || set -- aarch64 s390x i686 riscv64 wasm32
 mkdir -p "$work"
 
-# The root, with an emulator and the C libraries of the other machines: what it takes to run what was built before.
-emulator() {
-    [ ! -e "$root/.emulates" ] || return 0
+# The bare root.
+bare() {
     [ -e "$root/etc/debian_version" ] || debootstrap --variant=minbase sid "$root" "$mirror" > "$work/debootstrap.log" 2>&1 || return 1
     # A mirror may be a picture of some past day.
     echo 'Acquire::Check-Valid-Until "false";' > "$root/etc/apt/apt.conf.d/00mirror"
+    mkdir -p "$root/src"
+}
+
+# With an emulator and the C libraries of the other machines: what it takes to run what was built before.
+emulator() {
+    [ ! -e "$root/.emulates" ] || return 0
+    bare || return 1
     {
         inside apt-get update && inside apt-get install -y --no-install-recommends qemu-user libc6-arm64-cross libgcc-s1-arm64-cross libc6-s390x-cross libgcc-s1-s390x-cross \
             libc6-riscv64-cross libgcc-s1-riscv64-cross libc6-i386-cross libgcc-s1-i386-cross
     } > "$work/apt.log" 2>&1 || return 1
-    mkdir -p "$root/src"
     touch "$root/.emulates"
+}
+
+# With wine, 1.2 GB and what it needs.
+with_wine() {
+    [ ! -e "$root/.wine" ] || return 0
+    bare && { inside apt-get update && inside apt-get install -y --no-install-recommends wine wine64; } > "$work/apt.log" 2>&1 || return 1
+    touch "$root/.wine"
 }
 
 # And a compiler, cross linkers, and the standard libraries of the other targets. Those packages are unpacked, not installed: what they depend on (the compiler's own
@@ -100,12 +114,29 @@ build() {
         made=$root/src/twofold/target/$triple/release
     fi
     mkdir -p "$work/$target-$compiler"
-    for file in twofold twofold.wasm; do [ ! -e "$made/$file" ] || cp "$made/$file" "$work/$target-$compiler/"; done
+    for file in twofold twofold.exe twofold.wasm; do [ ! -e "$made/$file" ] || cp "$made/$file" "$work/$target-$compiler/"; done
     echo "$version, level $level" > "$work/$target-$compiler/compiler"
+}
+
+# A program under wine, whose own folder is in the scratch folder. It opens no window and needs no display.
+under_wine() {
+    export WINEDEBUG=-all WINEDLLOVERRIDES=mscoree,mshtml= WINEPREFIX="$work/wine"
+    if wine "$1" --version > /dev/null 2>&1; then
+        wine "$@"
+    else
+        with_wine || { echo "the root could not be made: see $work/*.log" >&2; return 2; }
+        cp --remove-destination "$1" "$root/src/twofold.exe"
+        shift
+        inside env WINEDEBUG=-all WINEDLLOVERRIDES=mscoree,mshtml= WINEPREFIX=/src/wine XDG_RUNTIME_DIR=/tmp wine /src/twofold.exe "$@"
+    fi
 }
 
 # The program on its own kind of machine. The C library is that of the cross compiler.
 on_it() {
+    if [ "$target" = windows ]; then
+        under_wine "$work/$target-$compiler/twofold.exe" "$@"
+        return
+    fi
     libraries=/usr/$cross
     if [ "$compiler" != rustup ] && [ "$target" != wasm32 ]; then
         emulator || { echo "the root could not be made: see $work/*.log" >&2; return 2; }
@@ -133,12 +164,14 @@ for target in "$@"; do
         i686) triple=i686-unknown-linux-gnu cross=i686-linux-gnu ;;
         riscv64) triple=riscv64gc-unknown-linux-gnu cross=riscv64-linux-gnu ;;
         wasm32) triple=wasm32-wasip1 cross= ;;
-        *) echo "$target: not one of aarch64, s390x, i686, riscv64, wasm32"; exit 2 ;;
+        windows) triple=x86_64-pc-windows-gnu cross=x86_64-w64-mingw32 ;;
+        *) echo "$target: not one of aarch64, s390x, i686, riscv64, wasm32, windows"; exit 2 ;;
     esac
     emulated=$target
     [ "$target" != i686 ] || emulated=i386
     compiler=${COMPILER:-}
     [ -n "$compiler" ] || if by_rustup; then compiler=rustup; else compiler=debian; fi
+    [ "$target $compiler" != "windows debian" ] || { echo "$target: Debian's compiler has no standard library for it; rustup's, or $cross-gcc, is missing"; bad=1; continue; }
     [ "$compiler" != rustup ] || by_rustup || { echo "$target: rustup has no standard library for it, or $cross-gcc is missing"; bad=1; continue; }
     if [ "$only" != run ]; then
         build > "$work/$target.build.log" 2>&1 || { echo "$target: NOT BUILT: see $work/$target.build.log"; bad=1; continue; }

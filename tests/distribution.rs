@@ -84,6 +84,21 @@ fn versions_agree() {
     assert!(text(".github/workflows/ci.yml").contains(&format!("rust-version: {channel}\n")));
 }
 
+/// Git for Windows ends lines with two characters if nobody says otherwise, also of files that are compiled in or compared byte for byte.
+#[test]
+fn files_are_checked_out_as_they_are_committed() {
+    if workflows().is_empty() {
+        return;
+    }
+    let rules = text(".gitattributes");
+    let rules: Vec<&str> = rules.lines().filter(|l| !l.is_empty() && !l.starts_with('#')).collect();
+    assert_eq!(
+        rules,
+        ["* -text"],
+        "a rule more may undo the first: see what it does to `git ls-files --eol` under core.autocrlf=true"
+    );
+}
+
 /// Cargo reads every member of a workspace, also of those that it does not build: an image is built from sources that are whole.
 #[test]
 fn the_image_is_built_from_a_whole_workspace() {

@@ -16,6 +16,7 @@ use crate::job;
 static BARS: OnceLock<MultiProgress> = OnceLock::new();
 
 /// Takes bars off the screen.
+#[cfg(unix)]
 pub(super) fn clear() {
     if let Some(bars) = BARS.get() {
         // A terminal that went away shows none.

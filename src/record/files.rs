@@ -10,6 +10,8 @@ use std::fs::{self, File, Metadata, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::Duration;
 
 use tempfile::NamedTempFile;
 
@@ -138,7 +140,13 @@ pub fn try_place(path: &Path) -> Result<(), FileError> {
     match place(path).map_err(FileError::new("write", path))? {
         // Opening a pipe would wait for its reader.
         Place::Stream => Ok(()),
-        Place::File { at, .. } => try_folder(folder_of(&at)),
+        Place::File { at, old } => {
+            if cfg!(windows) && old.is_some() {
+                // A spreadsheet that shows a file there does not let it be replaced: better said now than after an hour.
+                OpenOptions::new().append(true).open(&at).map_err(FileError::new("write", path))?;
+            }
+            try_folder(folder_of(&at))
+        }
     }
 }
 
@@ -288,11 +296,38 @@ impl Temporary {
     fn persist(self, place: &Path) -> io::Result<()> {
         let Self { file, known } = self;
         let mine = under_way();
-        let done = file.persist(place);
+        // Not tempfile's own way: of the two that Windows has to replace a file, it knows only the one that stops at a file which somebody reads.
+        let (open, temporary) = file.into_parts();
+        let done = temporary.keep().map_err(|e| e.error).and_then(|temporary| {
+            patiently(|| fs::rename(&temporary, place)).inspect_err(|_| drop(fs::remove_file(&temporary)))
+        });
+        drop(open);
         drop(mine);
         drop(known);
-        done.map(drop).map_err(|e| e.error)
+        done
     }
+}
+
+/// How often something is tried again that another process stands in the way of, and how long is waited between.
+const TRIES: usize = 50;
+const PAUSE: Duration = Duration::from_millis(10);
+
+/// Does something to a file that Windows refuses for as long as somebody else looks at the file: another of our processes, a search index, a
+/// virus scanner. That is over soon. Other systems let everybody look at what is replaced.
+fn patiently(mut act: impl FnMut() -> io::Result<()>) -> io::Result<()> {
+    // "Access is denied" and "it is being used by another process", by Windows' numbers.
+    let in_use = |e: &io::Error| cfg!(windows) && matches!(e.raw_os_error(), Some(5 | 32));
+    try_again(&mut act, &in_use)
+}
+
+fn try_again(act: &mut dyn FnMut() -> io::Result<()>, in_use: &dyn Fn(&io::Error) -> bool) -> io::Result<()> {
+    for _ in 0..TRIES {
+        match act() {
+            Err(e) if in_use(&e) => thread::sleep(PAUSE),
+            done => return done,
+        }
+    }
+    act()
 }
 
 /// Removes the temporary files that dead processes left in `folder`, and says how many. Those of living ones are locked and stay.
@@ -606,7 +641,7 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         fs::create_dir(at(".twofold-Folder.tmp")).unwrap();
         let left = [".twofold-Folder.tmp", ".twofold-a-b_c+.tmp", ".twofold-seven77.tmp"];
-        for name in [left[1], left[2], ".twofold-abcdef.tmp", ".twofold-ABCDEF.tmp"] {
+        for name in [left[1], left[2], ".twofold-abcdef.tmp", ".twofold-UVWXYZ.tmp"] {
             fs::write(at(name), b"half").unwrap();
         }
         assert_eq!(sweep(folder.path()), 2);
@@ -676,6 +711,74 @@ mod tests {
         second.persist(&folder.path().join("x")).unwrap();
         assert_eq!(known(), 0);
         assert_eq!(names(folder.path()), ["x"]);
+    }
+
+    #[test]
+    fn who_stands_in_the_way_for_a_moment_is_waited_for() {
+        let busy = |e: &io::Error| e.kind() == io::ErrorKind::ResourceBusy;
+        let refused_times = |times: usize, kind: io::ErrorKind| {
+            let mut tried = 0;
+            let done = try_again(
+                &mut || {
+                    tried += 1;
+                    if tried > times { Ok(()) } else { Err(kind.into()) }
+                },
+                &busy,
+            );
+            (done.map_err(|e| e.kind()), tried)
+        };
+        assert_eq!(refused_times(0, io::ErrorKind::ResourceBusy), (Ok(()), 1));
+        assert_eq!(refused_times(3, io::ErrorKind::ResourceBusy), (Ok(()), 4));
+        // Not for ever, and not for what will not pass.
+        let (never, tried) = refused_times(usize::MAX, io::ErrorKind::ResourceBusy);
+        assert_eq!((never, tried), (Err(io::ErrorKind::ResourceBusy), TRIES + 1));
+        assert_eq!(refused_times(3, io::ErrorKind::StorageFull), (Err(io::ErrorKind::StorageFull), 1));
+    }
+
+    /// What cannot be put in its place leaves nothing, and what is there stays.
+    #[test]
+    fn a_place_that_is_taken_meanwhile_leaves_no_litter() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = folder.path().join("x");
+        let temporary = Temporary::new_in(folder.path()).unwrap();
+        fs::create_dir_all(place.join("deeper")).unwrap();
+        assert!(temporary.persist(&place).is_err());
+        assert_eq!(names(folder.path()), ["x"]);
+        assert!(place.join("deeper").is_dir());
+    }
+
+    /// Windows: a program may keep a file for itself alone.
+    #[cfg(windows)]
+    #[test]
+    fn a_file_that_another_program_keeps_for_itself_is_told_beforehand() {
+        use std::os::windows::fs::OpenOptionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x");
+        write(&path, b"old").unwrap();
+        let alone = OpenOptions::new().read(true).share_mode(0).open(&path).unwrap();
+        assert!(try_place(&path).unwrap_err().to_string().contains("cannot write"));
+        assert!(write(&path, b"new").is_err());
+        drop(alone);
+        try_place(&path).unwrap();
+        write(&path, b"new").unwrap();
+        assert_eq!((read(&path).unwrap().as_slice(), names(folder.path())), (&b"new"[..], vec!["x".to_owned()]));
+    }
+
+    /// Windows: while somebody reads it, a file is replaced as soon as he is done.
+    #[cfg(windows)]
+    #[test]
+    fn a_file_that_is_read_is_replaced_after_that() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x");
+        write(&path, b"old").unwrap();
+        let reader = File::open(&path).unwrap();
+        let letting_go = thread::spawn(move || {
+            thread::sleep(PAUSE * 5);
+            drop(reader);
+        });
+        write(&path, b"new").unwrap();
+        letting_go.join().unwrap();
+        assert_eq!((read(&path).unwrap().as_slice(), names(folder.path())), (&b"new"[..], vec!["x".to_owned()]));
     }
 
     #[test]
