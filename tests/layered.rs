@@ -79,6 +79,88 @@ fn before_the_first_visit_its_error_is_no_larger_than_dormand_princes() {
     }
 }
 
+/// Starts from which orbits go into the layer, or are in it, and are held there until they reach the two-fold, at about t = 2.5.
+fn held() -> impl Iterator<Item = [f64; 3]> {
+    (0..24).map(|k| {
+        let part = f64::from(k) / 24.0;
+        [[11e-3, 0.0, -12e-3, 3e-3, -5e-3, 8e-3][k as usize % 6], 0.3 + 0.15 * part, 0.45 - 0.15 * part]
+    })
+}
+
+/// The state in which an orbit ends.
+fn end(field: &Field, start: [f64; 3], t_end: f64, mut method: impl Stepper<3>) -> SVector<f64, 3> {
+    drive(field, start.into(), &Course::to(t_end), &mut method, &mut Ignore, &()).unwrap().x
+}
+
+#[test]
+fn while_an_orbit_is_held_its_error_is_no_larger_than_dormand_princes() {
+    for eps in [1e-3, 4e-3, 2e-2] {
+        let field = Field::Smooth(Smoothed {
+            system: Caricature::with_reinjection(1e-1, 1e-4),
+            transition: Transition::Tanh,
+            eps,
+        });
+        for t_end in [0.1, 0.5, 1.0, 1.8] {
+            let truth: Vec<_> =
+                held().map(|start| end(&field, start, t_end, Taylor::extended(tolerance(1e-20)))).collect();
+            for size in [1e-6, 1.0536712e-8, 1e-10, 1e-12] {
+                // Of all starts together, root mean square: a single one may be lucky.
+                let error = |find: &dyn Fn([f64; 3]) -> SVector<f64, 3>| {
+                    let squares = held().zip(&truth).map(|(start, truth)| (find(start) - truth).norm_squared());
+                    (squares.sum::<f64>() / truth.len() as f64).sqrt()
+                };
+                let layered = error(&|start| end(&field, start, t_end, Layered::new(tolerance(size))));
+                let dopri5 = error(&|start| end(&field, start, t_end, Dopri5::new(tolerance(size))));
+                println!("eps {eps}, t {t_end}, tolerance {size:e}: layered {layered:e}, dopri5 {dopri5:e}");
+                // Both may be far better than they need be.
+                assert!(layered <= dopri5.max(0.1 * size), "eps {eps}, t {t_end}, {size:e}: {layered:e} {dopri5:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn sections_are_met_while_an_orbit_is_held_and_where_it_leaves() {
+    // Up to the two-fold and out of it: with eps = 2e-2 a passage loses few digits.
+    let field = Field::Smooth(Smoothed {
+        system: Caricature::with_reinjection(1e-1, 1e-4),
+        transition: Transition::Tanh,
+        eps: 2e-2,
+    });
+    let passages = |plane: (usize, f64), method: &mut dyn FnMut(&mut SectionRecorder<3>, [f64; 3])| {
+        let mut all = Vec::new();
+        for start in held().step_by(5) {
+            let mut recorder = SectionRecorder::<3>::new(plane.0, plane.1);
+            method(&mut recorder, start);
+            all.push(recorder.crossings().to_vec());
+        }
+        all
+    };
+    let t_end = 4.0;
+    for plane in [(0, 0.0), (0, 1e-3), (1, 0.0), (1, 0.1), (2, 0.0)] {
+        let layered = passages(plane, &mut |recorder, start| {
+            let mut method = Layered::new(tolerance(1e-13));
+            let end = drive(&field, start.into(), &Course::to(t_end), &mut method, recorder, &()).unwrap();
+            assert_eq!(end.t, t_end);
+        });
+        let taylor = passages(plane, &mut |recorder, start| {
+            let mut method = Taylor::new(tolerance(1e-15));
+            let end = drive(&field, start.into(), &Course::to(t_end), &mut method, recorder, &()).unwrap();
+            assert_eq!(end.t, t_end);
+        });
+        let mut worst = 0.0_f64;
+        assert!(layered.iter().any(|found| !found.is_empty()), "{plane:?}");
+        for (layered, taylor) in layered.iter().zip(&taylor) {
+            assert_eq!(layered.len(), taylor.len(), "{plane:?}: {layered:?} {taylor:?}");
+            for (l, t) in layered.iter().zip(taylor) {
+                worst = worst.max(error(l, t));
+                assert!(error(l, t) < 1e-9 && l.direction == t.direction, "{plane:?}: {l:?} {t:?}");
+            }
+        }
+        println!("{plane:?}: {} crossings, {worst:e}", layered.iter().map(Vec::len).sum::<usize>());
+    }
+}
+
 #[test]
 fn sections_inside_the_layer_are_those_of_the_taylor_method() {
     // Planes in the middle of the layer, off it, at its edge, and far outside.

@@ -68,12 +68,12 @@ pub(super) mod control {
 #[derive(Clone, Debug)]
 pub struct Dopri5<const N: usize> {
     tolerance: Tolerance,
-    statistics: Statistics,
-    t: f64,
-    x: SVector<f64, N>,
+    pub(super) statistics: Statistics,
+    pub(super) t: f64,
+    pub(super) x: SVector<f64, N>,
     /// f(x): the last stage of the previous step.
     pub(super) fsal: SVector<f64, N>,
-    t_end: f64,
+    pub(super) t_end: f64,
     pub(super) max_step: f64,
     /// Step to try next.
     pub(super) h: f64,
@@ -151,7 +151,7 @@ impl<const N: usize> Dopri5<N> {
 
     /// Its square.
     #[inline]
-    fn mean_square(&self, e: &SVector<f64, N>, x: impl Fn(usize) -> f64) -> f64 {
+    pub(super) fn mean_square(&self, e: &SVector<f64, N>, x: impl Fn(usize) -> f64) -> f64 {
         let mut sum = 0.0;
         for i in 0..N {
             let q = e[i] / (self.tolerance.atol + self.tolerance.rtol * x(i));

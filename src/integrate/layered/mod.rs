@@ -9,13 +9,15 @@
 //! clock to land on a surface: Henon 1982.)
 //!
 //! An orbit that does not cross - it slides along the layer, or touches it and turns back - is followed through it by
-//! [`Dopri5`] in time, with steps that move u by [`STRIDE`] at most; so is every orbit where u is not a sum of states.
+//! [`Dopri5`] in time, with steps that move u by [`STRIDE`] at most, and with tanh u for a state beside the others (`Sliding`). Where u is not a sum of
+//! states every orbit is followed so through the layer, and by [`Dopri5`] alone.
 //!
 //! The edge lies where 1 - tanh u is a hundredth of the tolerance: what is dropped outside is never more than that part of the field.
 
 mod contact;
 mod crossing;
 mod gauss;
+mod sliding;
 
 use std::sync::Arc;
 
@@ -23,6 +25,7 @@ use nalgebra::SVector;
 
 use self::contact::{Contact, MOST};
 use self::crossing::{Collocation, Crossing, Layer, Section};
+use self::sliding::Sliding;
 use super::Dopri5;
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
 use crate::num::elementary::{exp, ln, rough_exp2, rough_log2};
@@ -73,6 +76,7 @@ pub struct Layered<const N: usize> {
     arc: Polynomial<N>,
     crossing: Crossing<N>,
     inner: Dopri5<N>,
+    sliding: Sliding,
 }
 
 /// What is known of an equation.
@@ -195,6 +199,7 @@ impl<const N: usize> Layered<N> {
             arc: Polynomial { coefficients: [[0.0; MOST]; N], count: degree + 1 },
             crossing: Crossing::none(),
             inner: Dopri5::new(tolerance),
+            sliding: Sliding::default(),
         }
     }
 
@@ -389,15 +394,24 @@ impl<const N: usize> Layered<N> {
         if begin {
             self.inner.restart(field, self.t, self.x, self.t_end, self.max_step)?;
         }
-        let speeds = self.speeds(field);
-        let fastest = speeds[0].abs().max(speeds[1].abs());
-        self.inner.max_step = self.max_step.min(STRIDE / fastest);
-        self.inner.h = self.inner.h.min(self.inner.max_step);
-        let step = self.inner.step(field)?;
-        (self.t, self.x) = (step.t1, step.x1);
+        let u = if let Some(Equation { layer: Some(layer), .. }) = &self.equation {
+            if begin {
+                self.sliding = Sliding::begin(&self.inner, field, layer);
+            }
+            self.sliding.step(&mut self.inner, field, layer, self.max_step)?;
+            (self.t, self.x) = (self.inner.t, self.inner.x);
+            self.sliding.u
+        } else {
+            let speeds = self.speeds(field);
+            let fastest = speeds[0].abs().max(speeds[1].abs());
+            self.inner.max_step = self.max_step.min(STRIDE / fastest);
+            self.inner.h = self.inner.h.min(self.inner.max_step);
+            let step = self.inner.step(field)?;
+            (self.t, self.x) = (step.t1, step.x1);
+            self.layer_variable()
+        };
         self.statistics.evaluations += self.inner.statistics().evaluations - evaluations;
         self.statistics.rejected += self.inner.statistics().rejected - rejected;
-        let u = self.layer_variable();
         self.place = if u.abs() >= self.edge + BEYOND {
             Place::Outside { side: u.signum(), leaving: false }
         } else {
