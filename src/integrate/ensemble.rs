@@ -214,6 +214,8 @@ struct All<'a, E, O, M: Fn(usize) -> O, const N: usize, const K: usize> {
     finished: &'a mut dyn FnMut(usize, End<O, N>),
 }
 
+// No other processor has wider registers here.
+#[cfg(target_arch = "x86_64")]
 impl<'a, E, O, M: Fn(usize) -> O, const N: usize, const K: usize> All<'a, E, O, M, N, K> {
     fn in_registers<const L: usize>(self) -> All<'a, E, O, M, N, L> {
         let Self { equations, runs, common, observer, finished } = self;
