@@ -386,6 +386,11 @@ impl Elementary for Ball {
             // 1 - erf x < exp(-x^2)/x
             return Self::new(DoubleDouble::from_f64(1.0_f64.copysign(x.midpoint.high())), 1e-62).widened(spread);
         }
+        if size < 1e-50 {
+            // |erf x - 2 x/sqrt(pi)| < |x|^3; the terms of a series would soon be below all numbers, and never small beside x.
+            let line = x * Self::from_f64(2.0) / Self::pi().sqrt();
+            return line.widened(up(size * 1e-100)).widened(spread);
+        }
         // 2/sqrt(pi) exp(-x^2) sum of 2^n x^(2n+1)/(1 3 5 ... (2n+1)), all terms of one sign (Abramowitz & Stegun 7.1.6).
         let square = x * x;
         let (mut term, mut sum, mut n) = (x, x, 0.0);
@@ -592,5 +597,23 @@ mod tests {
         assert!(erf.midpoint().high() == -1.0 && (1e-62..1.1e-62).contains(&erf.radius()), "{erf:?}");
         assert_eq!(thick(3.0, 0.5).times_power_of_two(-1).midpoint().high(), 1.5);
         assert_eq!(thick(-3.0, 0.5).sign(), point(-1.0));
+    }
+
+    /// Its series never came to an end about zero: no term is small beside a sum that is below all numbers.
+    #[test]
+    fn erf_is_a_line_about_zero() {
+        let thick = |x: f64, radius: f64| Ball::new(DoubleDouble::from_f64(x), radius);
+        for size in [5e-324, 1e-310, 1e-300, 1e-291, 1e-150, 0.99e-50, 1.01e-50, 1e-40] {
+            for x in [size, -size] {
+                let (erf, line) = (thick(x, 0.0).erf(), x * std::f64::consts::FRAC_2_SQRT_PI);
+                let away = (erf.midpoint().high() - line).abs();
+                assert!(away <= 1e-15 * size + 1e-320 && erf.radius() >= 0.0, "{x}: {erf:?}");
+                assert!(erf.radius() <= 1e-30 * size + 1e-300, "{x}: {erf:?}");
+            }
+        }
+        for radius in [5e-324, 1e-300, 1e-20, 0.5] {
+            let erf = thick(0.0, radius).erf();
+            assert!(erf.midpoint().high() == 0.0 && (1.12 * radius..=1.14 * radius + 1e-300).contains(&erf.radius()));
+        }
     }
 }
