@@ -64,8 +64,8 @@ impl MadeFile {
         Ok(Self::of(path, files::read(place)?))
     }
 
-    /// A file of these bytes.
-    pub(super) fn of(path: String, bytes: Vec<u8>) -> Self {
+    /// A file of these bytes, whose path inside the figures' folder is `path`.
+    pub fn of(path: String, bytes: Vec<u8>) -> Self {
         Self { path, size: bytes.len() as u64, sha256: Hash::of(&bytes), bytes }
     }
 

@@ -5,11 +5,10 @@
 //! records, not known here. Same input, same bytes: no clock, no path of the machine.
 //!
 //! ```
-//! use twofold::record::FileBytes;
-//! use twofold::report::{Links, assemble, page};
+//! use twofold::report::{Links, MadeFile, assemble, page};
 //! // No record vouches for this file, so it counts for nothing.
-//! let file = FileBytes { path: "own/table.csv".into(), bytes: b"t,x\n".to_vec() };
-//! let report = assemble(&[file.into()], &[]);
+//! let file = MadeFile::of("own/table.csv".into(), b"t,x\n".to_vec());
+//! let report = assemble(&[file], &[]);
 //! assert_eq!((report.summary.pictures, report.summary.panels), (0, 0));
 //! assert!(page(&report, Links::Beside).starts_with(b"<!DOCTYPE html>"));
 //! ```
