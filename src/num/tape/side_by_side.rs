@@ -9,7 +9,8 @@ use pulp::Simd;
 
 use super::super::registers::{Aligned, Registers};
 use super::super::scalar::Elementary;
-use super::{Code, Output, Program};
+use super::choice::Code;
+use super::program::{Output, Program};
 
 /// Numbers in `K` registers.
 type Bundle<S, const K: usize> = [<S as Simd>::f64s; K];
@@ -61,7 +62,7 @@ impl Program {
         x: [Bundle<S, K>; N],
         numbers: &[Aligned<Bundle<S, K>>],
     ) -> [Bundle<S, K>; N] {
-        assert!(numbers.len() == self.code.len() + N, "a number an instruction and a value");
+        assert!(numbers.len() == 2 * self.code.len() + N, "two numbers an instruction, one a value");
         self.evaluate_with(set, x, OfLanes::<S, K>(numbers))
     }
 
@@ -125,29 +126,52 @@ impl Program {
                     let $c = if i.c == written { value } else { results[usize::from(i.c) & last].0 };
                     each!($k => $result);
                 }};
-                // With the instruction's number and the third operand.
-                (c, $k:ident, $c:ident, $fixed:ident => $result:expr) => {{
+                // With the third.
+                (c, $k:ident, $c:ident => $result:expr) => {{
                     let $c = if i.c == written { value } else { results[usize::from(i.c) & last].0 };
-                    let $fixed = numbers.at(set, place, i.fixed);
                     each!($k => $result);
                 }};
-                // With the instruction's number.
-                ($k:ident, $fixed:ident => $result:expr) => {{
-                    let $fixed = numbers.at(set, place, i.fixed);
-                    each!($k => $result);
-                }};
+            }
+            // The instruction's numbers.
+            macro_rules! f {
+                () => {
+                    numbers.at(set, 2 * place, i.f)
+                };
+            }
+            macro_rules! g {
+                () => {
+                    numbers.at(set, 2 * place + 1, i.g)
+                };
             }
             match i.code {
                 Code::Add => each!(b, k, b => set.add_f64s(a[k], b[k])),
                 Code::Sub => each!(b, k, b => set.sub_f64s(a[k], b[k])),
                 Code::Mul => each!(b, k, b => set.mul_f64s(a[k], b[k])),
                 Code::Div => each!(b, k, b => set.div_f64s(a[k], b[k])),
-                Code::AddFixed => each!(k, fixed => set.add_f64s(a[k], fixed[k])),
-                Code::SubFixed => each!(k, fixed => set.sub_f64s(a[k], fixed[k])),
-                Code::FixedSub => each!(k, fixed => set.sub_f64s(fixed[k], a[k])),
-                Code::MulFixed => each!(k, fixed => set.mul_f64s(a[k], fixed[k])),
-                Code::DivFixed => each!(k, fixed => set.div_f64s(a[k], fixed[k])),
-                Code::FixedDiv => each!(k, fixed => set.div_f64s(fixed[k], a[k])),
+                Code::AddFixed => {
+                    let f = f!();
+                    each!(k => set.add_f64s(a[k], f[k]))
+                }
+                Code::SubFixed => {
+                    let f = f!();
+                    each!(k => set.sub_f64s(a[k], f[k]))
+                }
+                Code::FixedSub => {
+                    let f = f!();
+                    each!(k => set.sub_f64s(f[k], a[k]))
+                }
+                Code::MulFixed => {
+                    let f = f!();
+                    each!(k => set.mul_f64s(a[k], f[k]))
+                }
+                Code::DivFixed => {
+                    let f = f!();
+                    each!(k => set.div_f64s(a[k], f[k]))
+                }
+                Code::FixedDiv => {
+                    let f = f!();
+                    each!(k => set.div_f64s(f[k], a[k]))
+                }
                 Code::Neg => value = (-number).parts(),
                 Code::Tanh => value = number.tanh().parts(),
                 Code::Exp => value = number.exp().parts(),
@@ -166,9 +190,61 @@ impl Program {
                 Code::TimesSum => each!(b c, k, b, c => set.mul_f64s(c[k], set.add_f64s(a[k], b[k]))),
                 Code::DifferenceTimes => each!(b c, k, b, c => set.mul_f64s(set.sub_f64s(a[k], b[k]), c[k])),
                 Code::TimesDifference => each!(b c, k, b, c => set.mul_f64s(c[k], set.sub_f64s(a[k], b[k]))),
-                Code::FixedSubTimes => each!(c, k, c, fixed => set.mul_f64s(set.sub_f64s(fixed[k], a[k]), c[k])),
-                Code::TimesFixedSub => each!(c, k, c, fixed => set.mul_f64s(c[k], set.sub_f64s(fixed[k], a[k]))),
+                Code::FixedSubTimes => {
+                    let f = f!();
+                    each!(c, k, c => set.mul_f64s(set.sub_f64s(f[k], a[k]), c[k]))
+                }
+                Code::TimesFixedSub => {
+                    let f = f!();
+                    each!(c, k, c => set.mul_f64s(c[k], set.sub_f64s(f[k], a[k])))
+                }
+                Code::ScaledPlus => {
+                    let (f, g) = (f!(), g!());
+                    each!(k => set.add_f64s(set.mul_f64s(a[k], g[k]), f[k]))
+                }
+                Code::MinusScaled => {
+                    let (f, g) = (f!(), g!());
+                    each!(k => set.sub_f64s(f[k], set.mul_f64s(a[k], g[k])))
+                }
+                Code::SumScaled => {
+                    let (f, g) = (f!(), g!());
+                    each!(k => set.mul_f64s(set.add_f64s(a[k], f[k]), g[k]))
+                }
+                Code::LineTimes => {
+                    let (f, g) = (f!(), g!());
+                    each!(c, k, c => set.mul_f64s(set.sub_f64s(f[k], set.mul_f64s(a[k], g[k])), c[k]))
+                }
+                Code::TimesLine => {
+                    let (f, g) = (f!(), g!());
+                    each!(c, k, c => set.mul_f64s(c[k], set.sub_f64s(f[k], set.mul_f64s(a[k], g[k]))))
+                }
+                Code::Squares => each!(b, k, b => set.add_f64s(set.mul_f64s(a[k], a[k]), set.mul_f64s(b[k], b[k]))),
+                Code::ThreeSquares => each!(b c, k, b, c => {
+                    let two = set.add_f64s(set.mul_f64s(a[k], a[k]), set.mul_f64s(b[k], b[k]));
+                    set.add_f64s(two, set.mul_f64s(c[k], c[k]))
+                }),
+                Code::TanhOfQuotient => {
+                    let f = f!();
+                    each!(k => set.div_f64s(a[k], f[k]));
+                    value = Registers::<S, K>::new(set, value).tanh().parts();
+                }
                 Code::Blend => each!(b c, k, b, c => set.add_f64s(b[k], set.mul_f64s(set.sub_f64s(a[k], b[k]), c[k]))),
+                Code::BlendFromFixed => {
+                    let f = f!();
+                    each!(c, k, c => set.add_f64s(f[k], set.mul_f64s(set.sub_f64s(a[k], f[k]), c[k])))
+                }
+                Code::BlendToFixed => {
+                    let f = f!();
+                    each!(b c, k, b, c => set.add_f64s(b[k], set.mul_f64s(set.sub_f64s(f[k], b[k]), c[k])))
+                }
+                Code::BlendOfSums => {
+                    let (f, g) = (f!(), g!());
+                    each!(c, k, c => {
+                        let base = set.add_f64s(a[k], g[k]);
+                        let difference = set.sub_f64s(set.add_f64s(a[k], f[k]), base);
+                        set.add_f64s(base, set.mul_f64s(difference, c[k]))
+                    })
+                }
             }
             results[usize::from(i.to) & last] = Aligned(value);
             written = i.to;
@@ -177,7 +253,7 @@ impl Program {
         for i in 0..N {
             out[i] = match self.outputs[i] {
                 Output::Register(at) => results[usize::from(at) & last].0,
-                Output::Fixed(value) => numbers.at(set, self.code.len() + i, value),
+                Output::Fixed(value) => numbers.at(set, 2 * self.code.len() + i, value),
             };
         }
         out
@@ -205,6 +281,12 @@ mod tests {
             // Pairs of operations that are one instruction, in every order.
             let a = (a * y + x) - (y + a * x) * (x + a) + (a * x - b) * (b - a * y) + b * (x - a) + (x - b) * y;
             let b = b + (a - b) * y + (c - a) * x + y * (c - b) + x * (a + b);
+            // With numbers, two of them too, and three operations and more.
+            let d = crate::num::tape::Recorded::from_f64(1.7);
+            let a = a + (c - b) * y + x * (c - a) + (a * c + d) * (d - b * c) + ((b + c) * d) * ((d - x * c) * y);
+            let b = b + a * (d - y * c) + (x * x + y * y) * (a * a + b * b + y * y) + (x / d).tanh();
+            let (e, g) = (c + (a - c) * x, y + (c - y) * x);
+            let b = b + e * ((a + d) + ((a + c) - (a + d)) * g);
             vec![a + (x - c).atan(), b + y.erf() * (x * y).sign() + c * (x + c)]
         }))
     }
