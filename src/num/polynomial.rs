@@ -584,6 +584,78 @@ mod tests {
         assert!(form(&|x| vec![x[1], (c(1.0) - x[2]) * r2(x), c(1.0)]).is_none());
         assert!(form(&|x| vec![x[1] * x[2], (c(1.0) - x[1]) * r2(x), c(1.0)]).is_none());
         assert!(form(&|x| vec![x[1], x[1] + (c(1.0) - x[1]) * r2(x), c(1.0)]).is_none());
+        // A square counts more than the others, a product is no square, one stands for the third, a number is added to the three.
+        let sum = |x: &[Recorded], [f, g, h]: [f64; 3]| {
+            x[0].squared().scale(f) + x[1].squared().scale(g) + x[2].squared().scale(h)
+        };
+        assert!(form(&|x| vec![x[1], sum(x, [1.0, 2.0, 1.0]), c(1.0)]).is_none());
+        assert!(form(&|x| vec![x[1], sum(x, [1.0, 1.0, 2.0]), c(1.0)]).is_none());
+        assert!(form(&|x| vec![x[1], x[0] * x[1] + x[1].squared() + x[2].squared(), c(1.0)]).is_none());
+        assert!(form(&|x| vec![x[1], x[0].squared() + x[1].squared() + x[0] * x[1], c(1.0)]).is_none());
+        assert!(form(&|x| vec![x[1], (r2(x) + c(1.0)) * (c(2.0) - x[1]), c(1.0)]).is_none());
+    }
+
+    /// The series by `flow` and those of its tape.
+    fn agree(tape: &Tape, flow: &Flow, x: &[f64]) {
+        let (mut found, mut solution) = (Series::default(), Solution::new(12, tape, Constants::Binary));
+        flow.expand(x, 12, &mut found);
+        solution.expand(x);
+        for i in 0..x.len() {
+            for (k, want) in solution.component(i).iter().enumerate() {
+                let got = found.component(i)[k];
+                assert!((got - want).abs() <= 1e-13 * (1.0 + want.abs()), "{i} {k}: {got} {want}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_radial_equation_with_every_number_in_it() {
+        let c = |v: f64| Recorded::from_f64(v);
+        let tape = Tape::record(3, |x| {
+            let r2 = x[0].squared() + x[1].squared() + x[2].squared();
+            let first = c(0.7) + x[0].scale(0.3) - x[1].scale(1.1) + x[2].scale(0.2);
+            vec![first, c(-0.4) + (c(0.5) - x[1].scale(0.6)) * r2, c(0.9) + (x[2].scale(0.8) - c(0.2)) * r2]
+        });
+        let flow = Flow::new(&tape, 1.0).unwrap();
+        assert!(flow.radial.is_some() && !flow.has_layer());
+        agree(&tape, &flow, &[0.3, -0.7, 0.4]);
+    }
+
+    #[test]
+    fn like_terms_and_factors_of_products_are_put_together() {
+        let tape = Tape::record(2, |x| {
+            let three = x[0] + x[0].scale(2.0);
+            vec![three - x[1].scale(3.0) * x[0].scale(2.0), x[0] * x[1] + x[1].scale(0.5)]
+        });
+        let reduced = Reduced::new(&tape, 1.0).unwrap();
+        assert_eq!(reduced.derivatives[0].terms, [(0, 3.0), (2, -6.0)]);
+        // y x and x y are one.
+        assert_eq!(reduced.products.len(), 1);
+        agree(&tape, &Flow::new(&tape, 1.0).unwrap(), &[0.3, -0.7]);
+    }
+
+    #[test]
+    fn what_is_wanted_twice_is_a_series_of_its_own_and_nothing_else() {
+        let sums = |f: &dyn Fn(&[Recorded]) -> Vec<Recorded>| Flow::new(&Tape::record(2, f), 1.0).unwrap().sums.len();
+        let one = Recorded::one;
+        assert_eq!(sums(&|x| vec![x[0] * x[1], x[0]]), 0);
+        assert_eq!(sums(&|x| vec![x[0] * x[1], x[0] * x[1] + x[0]]), 1);
+        // In a sum, and in a factor, which is one too.
+        assert_eq!(sums(&|x| vec![x[0] * x[1], (one() + x[0] * x[1]) * x[0]]), 2);
+        assert_eq!(sums(&|x| vec![(one() + x[0]) * x[1], (one() + x[0]) * x[0]]), 1);
+    }
+
+    #[test]
+    fn there_are_series_for_as_many_as_there_is_room() {
+        let factors = |many: u32| {
+            Tape::record(2, |x| {
+                let product = |k| (x[0] + Recorded::from_f64(f64::from(k))) * x[1];
+                vec![(1..=many).map(product).fold(x[0], |sum, product| sum + product), x[0]]
+            })
+        };
+        assert_eq!(Flow::new(&factors(62), 1.0).map(|flow| flow.sums.len()).ok(), Some(62));
+        assert_eq!(Flow::new(&factors(63), 1.0).err(), Some(NotPolynomial::Size));
+        agree(&factors(40), &Flow::new(&factors(40), 1.0).unwrap(), &[0.01, -0.02]);
     }
 
     #[test]

@@ -268,3 +268,16 @@ fn bdf_is_never_the_more_accurate_formula() {
         assert!(error_ratio(q) >= 1.0, "order {q}: {}", error_ratio(q));
     }
 }
+
+/// What stability leaves of a step is a length, |lambda| h = Petzold's bound, however long the step that it is asked at; where accuracy allows less, it
+/// is accuracy's.
+#[test]
+fn the_longest_stable_step_does_not_depend_on_the_step_at_hand() {
+    for (lipschitz, h) in [(20.0, 1e-4), (20.0, 2e-3), (20.0, 0.5), (3e3, 1e-4), (3e3, 2e-3), (3e3, 0.5)] {
+        let longest = held(Family::Adams, 3, h).adams_growth(1e-18, 3, lipschitz) * h;
+        assert!((longest * lipschitz / 0.55 - 1.0).abs() < 1e-14, "{lipschitz} {h}: {longest}");
+    }
+    for lipschitz in [1.0, 1e-3] {
+        assert_eq!(held(Family::Adams, 3, 1e-4).adams_growth(1e-4, 3, lipschitz), growth(BIAS_SAME, 1e-4, 3));
+    }
+}
