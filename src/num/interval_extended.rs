@@ -616,4 +616,14 @@ mod tests {
             assert!(erf.midpoint().high() == 0.0 && (1.12 * radius..=1.14 * radius + 1e-300).contains(&erf.radius()));
         }
     }
+
+    #[test]
+    fn a_ball_is_subtracted_in_place() {
+        let (a, b) = (Ball::new(DoubleDouble::from_f64(1.5), 0.25), Ball::new(DoubleDouble::from_f64(0.5), 0.125));
+        let mut difference = a;
+        difference -= b;
+        assert_eq!(difference, a - b);
+        assert_eq!(difference.midpoint.to_f64(), 1.0);
+        assert!(difference.radius >= 0.375 && difference.radius < 0.3751);
+    }
 }

@@ -121,3 +121,17 @@ impl<const W: usize> Elementary for Lanes<W> {
         self.map(Elementary::sign)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_lane_is_added_and_subtracted_by_itself() {
+        let (a, b) = (Lanes([1.5, -2.0]), Lanes([0.25, 8.0]));
+        let (mut sum, mut difference) = (a, a);
+        sum += b;
+        difference -= b;
+        assert_eq!((sum.0, difference.0, (-a).0), ([1.75, 6.0], [1.25, -10.0], [-1.5, 2.0]));
+    }
+}

@@ -335,3 +335,22 @@ impl<S: Simd, const K: usize> Elementary for Registers<S, K> {
         self.map(Elementary::sign)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_lane_is_added_and_subtracted_by_itself() {
+        let set = pulp::Scalar;
+        let of = |values: [f64; 2]| Registers::<_, 2>::load(set, &values);
+        let (a, b) = (of([1.5, -2.0]), of([0.25, 8.0]));
+        let (mut sum, mut difference) = (a, a);
+        sum += b;
+        difference -= b;
+        assert_eq!((sum, difference, -a), (of([1.75, 6.0]), of([1.25, -10.0]), of([-1.5, 2.0])));
+        assert_ne!(a, of([1.5, 2.0]));
+        // A constant has no lanes until it is combined with a number that has.
+        assert_eq!(a + -Registers::from_f64(0.5), of([1.0, -2.5]));
+    }
+}
