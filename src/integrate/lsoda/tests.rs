@@ -281,3 +281,38 @@ fn the_longest_stable_step_does_not_depend_on_the_step_at_hand() {
         assert_eq!(held(Family::Adams, 3, 1e-4).adams_growth(1e-4, 3, lipschitz), growth(BIAS_SAME, 1e-4, 3));
     }
 }
+
+/// Petzold's test, said once more without its shortcut: BDF takes over where the step that accuracy leaves it is five times what accuracy and stability
+/// leave Adams.
+#[test]
+fn bdf_takes_over_where_its_step_is_five_times_as_long() {
+    let (mut stays, mut switches) = (0, 0);
+    for order in 1..=5 {
+        for h in [1e-3, 1.0, 30.0] {
+            // |lambda| h.
+            for reach in [0.02, 0.3, 2.0, 20.0, 300.0] {
+                for error in [1e-9, 1e-4, 0.1, 0.9] {
+                    let mut lsoda = held(Family::Adams, order, h);
+                    (lsoda.lipschitz, lsoda.lipschitz_seen, lsoda.predicted_size) = (reach / h, 1.0, 1.0);
+                    let adams = growth(BIAS_SAME, error, order).min(ADAMS_STABILITY[order - 1] / reach);
+                    let bdf = growth(BIAS_SAME, error * error_ratio(order), order);
+                    let change = lsoda.consider_switch(error);
+                    let said = format!("order {order}, h {h}, |lambda| h {reach}, error {error}: {adams} {bdf}");
+                    assert_eq!(change.is_some(), bdf >= SWITCH_RATIO * adams, "{said}");
+                    match change {
+                        Some(change) => {
+                            assert_eq!(
+                                (change.family, change.order, change.ratio),
+                                (Family::Bdf, order, bdf),
+                                "{said}"
+                            );
+                            switches += 1;
+                        }
+                        None => stays += 1,
+                    }
+                }
+            }
+        }
+    }
+    assert!(stays > 30 && switches > 30, "{stays} {switches}");
+}
