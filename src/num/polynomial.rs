@@ -576,23 +576,28 @@ mod tests {
     fn other_forms_are_no_radial_ones() {
         let c = |v: f64| Recorded::from_f64(v);
         let r2 = |x: &[Recorded]| x[0].squared() + x[1].squared() + x[2].squared();
-        let form = |f: &dyn Fn(&[Recorded]) -> Vec<Recorded>| Flow::new(&Tape::record(3, f), 1.0).unwrap().radial;
-        assert!(form(&|x| vec![x[1], r2(x).scale(0.3), c(1.0) + (c(2.0) - x[2]) * r2(x)]).is_some());
-        // A square is missing, is doubled, a factor is of another state, a product is in the first component, a term beside the product.
-        assert!(form(&|x| vec![x[1], x[0].squared() + x[1].squared(), c(1.0)]).is_none());
-        assert!(form(&|x| vec![x[1], r2(x) + x[0].squared(), c(1.0)]).is_none());
-        assert!(form(&|x| vec![x[1], (c(1.0) - x[2]) * r2(x), c(1.0)]).is_none());
-        assert!(form(&|x| vec![x[1] * x[2], (c(1.0) - x[1]) * r2(x), c(1.0)]).is_none());
-        assert!(form(&|x| vec![x[1], x[1] + (c(1.0) - x[1]) * r2(x), c(1.0)]).is_none());
-        // A square counts more than the others, a product is no square, one stands for the third, a number is added to the three.
-        let sum = |x: &[Recorded], [f, g, h]: [f64; 3]| {
-            x[0].squared().scale(f) + x[1].squared().scale(g) + x[2].squared().scale(h)
+        // x', with y' and z' in this form or y' in another.
+        let form = |x: &dyn Fn(&[Recorded]) -> Recorded, y: &dyn Fn(&[Recorded]) -> Recorded| {
+            let tape = Tape::record(3, |v| vec![x(v), y(v), c(1.0) + (c(2.0) - v[2]) * r2(v)]);
+            Flow::new(&tape, 1.0).unwrap().radial
         };
-        assert!(form(&|x| vec![x[1], sum(x, [1.0, 2.0, 1.0]), c(1.0)]).is_none());
-        assert!(form(&|x| vec![x[1], sum(x, [1.0, 1.0, 2.0]), c(1.0)]).is_none());
-        assert!(form(&|x| vec![x[1], x[0] * x[1] + x[1].squared() + x[2].squared(), c(1.0)]).is_none());
-        assert!(form(&|x| vec![x[1], x[0].squared() + x[1].squared() + x[0] * x[1], c(1.0)]).is_none());
-        assert!(form(&|x| vec![x[1], (r2(x) + c(1.0)) * (c(2.0) - x[1]), c(1.0)]).is_none());
+        let linear = |x: &[Recorded]| x[1] + x[2];
+        assert!(form(&linear, &|x| r2(x).scale(0.3)).is_some());
+        assert!(form(&linear, &|x| (c(1.0) - x[1]) * r2(x)).is_some());
+        assert!(form(&|x| x[1] * x[2], &|x| (c(1.0) - x[1]) * r2(x)).is_none());
+        let other = |y: &dyn Fn(&[Recorded]) -> Recorded| assert_eq!(form(&linear, y), None);
+        // A square is missing, is doubled, the factor is of another state, there is a term beside the product, or nothing at all.
+        other(&|x| x[0].squared() + x[1].squared());
+        other(&|x| r2(x) + x[0].squared());
+        other(&|x| (c(1.0) - x[2]) * r2(x));
+        other(&|x| x[1] + (c(1.0) - x[1]) * r2(x));
+        other(&|_| c(1.0));
+        // A square counts more than the others, a product is no square, one stands for the third, a number is added to the three.
+        other(&|x| x[0].squared() + x[1].squared().scale(2.0) + x[2].squared());
+        other(&|x| x[0].squared() + x[1].squared() + x[2].squared().scale(2.0));
+        other(&|x| x[0] * x[1] + x[1].squared() + x[2].squared());
+        other(&|x| x[0].squared() + x[1].squared() + x[0] * x[1]);
+        other(&|x| (r2(x) + c(1.0)) * (c(2.0) - x[1]));
     }
 
     /// The series by `flow` and those of its tape.
@@ -619,6 +624,11 @@ mod tests {
         let flow = Flow::new(&tape, 1.0).unwrap();
         assert!(flow.radial.is_some() && !flow.has_layer());
         agree(&tape, &flow, &[0.3, -0.7, 0.4]);
+        let tape = Tape::record(3, |x| {
+            let r2 = x[0].squared() + x[1].squared() + x[2].squared();
+            vec![x[1], r2.scale(0.3), (c(2.0) - x[2]) * r2]
+        });
+        agree(&tape, &Flow::new(&tape, 1.0).unwrap(), &[0.3, -0.7, 0.4]);
     }
 
     #[test]
@@ -665,6 +675,9 @@ mod tests {
         assert_eq!(refused(|x| x[0] * x[0] / x[0]), Some(NotPolynomial::Operation("/")));
         assert_eq!(refused(|x| x[0].exp()), Some(NotPolynomial::Operation("exp")));
         assert_eq!(refused(|x| x[0].tanh() + (x[0] + x[0]).tanh()), Some(NotPolynomial::Layers));
+        // What no value needs may be anything.
+        let tape = Tape::record(1, |x| vec![x[0], x[0].exp()]);
+        assert!(Flow::new(&tape.select([0]), 1.0).is_ok() && Flow::new(&tape, 1.0).is_err());
         // tanh of a number is a number.
         assert_eq!(refused(|x| x[0] * Recorded::from_f64(0.3).tanh()), None);
     }
