@@ -533,6 +533,17 @@ mod tests {
         [1e-70, 1e-20, 0.003, 0.05, 0.11, 0.169, 0.18, 0.34, 0.7, 1.6, 2.9, 6.5, 11.5, 40.3, 150.1];
 
     #[test]
+    fn a_ball_of_an_interval_covers_it_and_hardly_more() {
+        for (low, high) in [(2.9, 3.1), (-3.1, -2.9), (-0.5, 4.0), (1e-9, 2e-9), (7.0, 7.0), (0.0, 0.0)] {
+            let interval = Interval::new(low, high).unwrap();
+            let ball = Ball::from_interval(interval).interval();
+            assert!(ball.lower() <= low && high <= ball.upper(), "{ball:?} leaves out some of {interval:?}");
+            let spare = 1e-15 * high.abs().max(low.abs());
+            assert!(ball.lower() >= low - spare && ball.upper() <= high + spare, "{ball:?} is wider than {interval:?}");
+        }
+    }
+
+    #[test]
     fn a_function_of_a_ball_contains_its_values_and_little_else() {
         for Function { name, ball, fine, spread, rounding, from } in functions() {
             for x in POINTS.iter().flat_map(|x| [*x, -x]).filter(|x| *x >= from) {
