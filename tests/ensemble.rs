@@ -11,6 +11,10 @@ use twofold::system::{Caricature, Smoothed, Transition};
 const TOLERANCE: Tolerance = Tolerance { rtol: 1.0536712e-8, atol: 1.0536712e-8 };
 const PLANE: Plane = Plane { coordinate: 1, value: 0.0 };
 
+/// Runs that are computed with two registers at a time, and with four, whatever the instruction set.
+const FEW: usize = 19;
+const MANY: u32 = 75;
+
 fn field() -> Smoothed<Caricature> {
     Smoothed { system: Caricature::with_reinjection(1e-1, 1e-4), transition: Transition::Tanh, eps: 1e-3 }
 }
@@ -90,6 +94,14 @@ fn a_lane_has_the_bits_of_a_run_alone_on_every_instruction_set() {
         // Fewer runs than lanes.
         let found = ensemble_with(set, &field(), &runs[..3], TOLERANCE, Some(PLANE), |_| recorder());
         assert_eq!(words(&found, crossings), expected[..3], "{set:?}, three runs");
+        // Enough for more registers at a time: as many as fill 32 lanes twice.
+        let twice: Vec<_> = runs.iter().chain(&backwards).copied().collect();
+        assert!(twice.len() >= 2 * 4 * 8);
+        let found = ensemble_with(set, &field(), &twice, TOLERANCE, Some(PLANE), |_| recorder());
+        let (found, mut other) = (words(&found[..runs.len()], crossings), words(&found[runs.len()..], crossings));
+        other.reverse();
+        assert_eq!(found, expected, "{set:?}, more registers");
+        assert_eq!(other, expected, "{set:?}, more registers, the second half");
     });
 }
 
@@ -133,7 +145,7 @@ fn failures_are_those_of_a_run_alone() {
         }
     }
     let runs: Vec<Run<1>> =
-        (0..19).map(|k| Run { start: vector![f64::from(k) - 4.0], course: Course::to(1.0) }).collect();
+        (0..MANY).map(|k| Run { start: vector![0.25 * f64::from(k) - 4.0], course: Course::to(1.0) }).collect();
     let word = |summary: &Result<twofold::integrate::Summary<1>, twofold::integrate::Failure>| format!("{summary:?}");
     let expected: Vec<_> = runs
         .iter()
@@ -144,8 +156,11 @@ fn failures_are_those_of_a_run_alone() {
         .collect();
     assert!(expected.iter().any(|e| e.starts_with("Err")) && expected[0].starts_with("Ok"), "{expected:?}");
     on_every_set(|set| {
-        let found = ensemble_with(set, &Exploding, &runs, TOLERANCE, None, |_| Ignore);
-        assert_eq!(found.iter().map(|end| word(&end.summary)).collect::<Vec<_>>(), expected, "{set:?}");
+        for count in [FEW, runs.len()] {
+            let found = ensemble_with(set, &Exploding, &runs[..count], TOLERANCE, None, |_| Ignore);
+            let found: Vec<_> = found.iter().map(|end| word(&end.summary)).collect();
+            assert_eq!(found, expected[..count], "{set:?}, {count} runs");
+        }
     });
 }
 
@@ -159,8 +174,8 @@ fn a_trial_that_has_no_value_is_repeated_as_in_a_run_alone() {
         }
     }
     let coarse = Tolerance { rtol: 1e-2, atol: 1e-2 };
-    let runs: Vec<Run<2>> = (0..19_u32)
-        .map(|k| Run { start: vector![0.3 + 0.1 * f64::from(k), 0.05 * f64::from(k % 3)], course: Course::to(9.0) })
+    let runs: Vec<Run<2>> = (0..MANY)
+        .map(|k| Run { start: vector![0.3 + 0.02 * f64::from(k), 0.05 * f64::from(k % 3)], course: Course::to(9.0) })
         .collect();
     let word = |summary: &Result<twofold::integrate::Summary<2>, twofold::integrate::Failure>| match summary {
         Ok(end) => format!("{:?} {:?} {:?}", end.x.map(f64::to_bits), end.t.to_bits(), end.statistics),
@@ -174,8 +189,11 @@ fn a_trial_that_has_no_value_is_repeated_as_in_a_run_alone() {
     assert!(expected.iter().any(|e| e.starts_with("NotFinite")), "{expected:?}");
     assert!(alone.iter().flatten().any(|end| end.statistics.rejected > 0), "{expected:?}");
     on_every_set(|set| {
-        let found = ensemble_with(set, &Edge, &runs, coarse, None, |_| Ignore);
-        assert_eq!(found.iter().map(|end| word(&end.summary)).collect::<Vec<_>>(), expected, "{set:?}");
+        for count in [FEW, runs.len()] {
+            let found = ensemble_with(set, &Edge, &runs[..count], coarse, None, |_| Ignore);
+            let found: Vec<_> = found.iter().map(|end| word(&end.summary)).collect();
+            assert_eq!(found, expected[..count], "{set:?}, {count} runs");
+        }
     });
 }
 

@@ -21,7 +21,7 @@ use super::schedule::{Kicker, Segment};
 use super::step::{Failure, Flow, Statistics, Step, Stepper, StopReason, Tolerance};
 use crate::num::elementary::kernels::{rough_exp2, rough_log2};
 use crate::num::{Aligned, Arithmetic, Mask, Registers};
-use crate::system::{Equations, WithRegisters};
+use crate::system::Equations;
 
 /// A start and what is to happen from there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -172,36 +172,19 @@ pub fn ensemble_watched<E, O, const N: usize>(
     E: Equations<N>,
     O: Observer<N>,
 {
-    let set = if set.is_here() { set } else { InstructionSet::best() };
     let all = All::<_, _, _, N, 1> { equations, runs, common, observer, finished };
-    match set {
-        InstructionSet::Portable => all.with_simd(Scalar),
-        InstructionSet::Avx2 | InstructionSet::Avx512 => equations.with_registers(InVectors { set, all }),
-    }
-}
-
-/// The whole task, in vector registers of the instruction set `set`, which is here.
-struct InVectors<'a, E, O, M: Fn(usize) -> O, const N: usize> {
-    set: InstructionSet,
-    all: All<'a, E, O, M, N, 1>,
-}
-
-impl<E: Equations<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> WithRegisters for InVectors<'_, E, O, M, N> {
-    fn with<const K: usize>(self) {
-        let Self { set, all } = self;
-        match set {
-            #[cfg(target_arch = "x86_64")]
-            InstructionSet::Avx2 => match pulp::x86::V3::try_new() {
-                Some(set) => Simd::vectorize(set, all.in_registers::<K>()),
-                None => all.with_simd(Scalar),
-            },
-            #[cfg(target_arch = "x86_64")]
-            InstructionSet::Avx512 => match pulp::x86::V4::try_new() {
-                Some(set) => Simd::vectorize(set, all.in_registers::<K>()),
-                None => all.with_simd(Scalar),
-            },
-            _ => all.with_simd(Scalar),
-        }
+    match if set.is_here() { set } else { InstructionSet::best() } {
+        #[cfg(target_arch = "x86_64")]
+        InstructionSet::Avx2 => match pulp::x86::V3::try_new() {
+            Some(set) => all.side_by_side(set),
+            None => all.with_simd(Scalar),
+        },
+        #[cfg(target_arch = "x86_64")]
+        InstructionSet::Avx512 => match pulp::x86::V4::try_new() {
+            Some(set) => all.side_by_side(set),
+            None => all.with_simd(Scalar),
+        },
+        _ => all.with_simd(Scalar),
     }
 }
 
@@ -216,8 +199,18 @@ struct All<'a, E, O, M: Fn(usize) -> O, const N: usize, const K: usize> {
 
 // No other processor has wider registers here.
 #[cfg(target_arch = "x86_64")]
-impl<'a, E, O, M: Fn(usize) -> O, const N: usize, const K: usize> All<'a, E, O, M, N, K> {
-    fn in_registers<const L: usize>(self) -> All<'a, E, O, M, N, L> {
+impl<'a, E: Equations<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> All<'a, E, O, M, N, 1> {
+    /// By as many registers at a time as suit the number of runs: while one waits for a quotient the others go on, and of four none waits long,
+    /// but they take 1.6 times as long as two for a step. That pays where runs fill their lanes at least twice.
+    fn side_by_side<S: Simd>(self, set: S) {
+        if self.runs.len() >= 2 * 4 * S::F64_LANES {
+            set.vectorize(self.in_registers::<4>());
+        } else {
+            set.vectorize(self.in_registers::<2>());
+        }
+    }
+
+    fn in_registers<const K: usize>(self) -> All<'a, E, O, M, N, K> {
         let Self { equations, runs, common, observer, finished } = self;
         All { equations, runs, common, observer, finished }
     }
@@ -236,7 +229,7 @@ impl<E: Equations<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, const K
         let width = Registers::<S, K>::WIDTH;
         let mut waiting = 0..runs.len();
         let numbers = if runs.is_empty() { 0 } else { equations.numbers(0).len() };
-        let mut state = State::<S, O, N, K>::idle(set, numbers);
+        let mut state = State::<S, O, N, K>::idle(set, numbers, equations.room());
         let mut unwatched = 0;
         loop {
             for l in 0..width {
@@ -302,6 +295,8 @@ struct State<S: Simd, O, const N: usize, const K: usize> {
     corner: [[S::f64s; K]; N],
     /// Those in the runs' equations.
     numbers: Vec<Aligned<[S::f64s; K]>>,
+    /// For what lies between in an evaluation; what is left there means nothing.
+    room: Vec<Aligned<[S::f64s; K]>>,
     lanes: Vec<Option<Lane<O, N>>>,
 }
 
@@ -316,7 +311,7 @@ fn put<V: pulp::bytemuck::Pod, const K: usize>(parts: &mut [V; K], lane: usize, 
 }
 
 impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> {
-    fn idle(set: S, numbers: usize) -> Self {
+    fn idle(set: S, numbers: usize, room: usize) -> Self {
         let (zero, one) = ([set.splat_f64s(0.0); K], [set.splat_f64s(1.0); K]);
         Self {
             set,
@@ -336,6 +331,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             fsal: [zero; N],
             corner: [zero; N],
             numbers: vec![Aligned(zero); numbers],
+            room: vec![Aligned(zero); room],
             lanes: (0..Registers::<S, K>::WIDTH).map(|_| None).collect(),
         }
     }
@@ -452,7 +448,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         let last = remaining.at_most(of(self.h) * number(1.000_000_1), set);
         let h = last.select(remaining, of(self.h));
 
-        let f = Derivative { set, equations, numbers: &self.numbers };
+        let mut f = Derivative { set, equations, numbers: &self.numbers, room: &mut self.room };
         let k2 = f.at(&advanced(&x0, h, [(&k1, A21)]));
         let k3 = f.at(&advanced(&x0, h, [(&k1, A31), (&k2, A32)]));
         let k4 = f.at(&advanced(&x0, h, [(&k1, A41), (&k2, A42), (&k3, A43)]));
@@ -648,21 +644,21 @@ struct Seen<S: Simd, const N: usize, const K: usize> {
 }
 
 /// The runs' equations with their numbers.
-#[derive(Clone, Copy)]
 struct Derivative<'a, E, S: Simd, const K: usize> {
     set: S,
     equations: &'a E,
     numbers: &'a [Aligned<[S::f64s; K]>],
+    room: &'a mut [Aligned<[S::f64s; K]>],
 }
 
 impl<E, S: Simd, const K: usize> Derivative<'_, E, S, K> {
     #[inline(always)]
-    fn at<const N: usize>(&self, x: &SVector<Registers<S, K>, N>) -> SVector<Registers<S, K>, N>
+    fn at<const N: usize>(&mut self, x: &SVector<Registers<S, K>, N>) -> SVector<Registers<S, K>, N>
     where
         E: Equations<N>,
     {
-        let Self { set, equations, numbers } = *self;
-        vector(set, &set.vectorize(Field { set, equations, numbers, x: Aligned(bare(x)) }).0)
+        let Self { set, equations, numbers, ref mut room } = *self;
+        vector(set, &set.vectorize(Field { set, equations, numbers, room, x: Aligned(bare(x)) }).0)
     }
 }
 
@@ -671,6 +667,7 @@ struct Field<'a, E, S: Simd, const N: usize, const K: usize> {
     set: S,
     equations: &'a E,
     numbers: &'a [Aligned<[S::f64s; K]>],
+    room: &'a mut [Aligned<[S::f64s; K]>],
     x: Aligned<[[S::f64s; K]; N]>,
 }
 
@@ -679,7 +676,7 @@ impl<E: Equations<N>, S: Simd, const N: usize, const K: usize> WithSimd for Fiel
     #[inline(always)]
     fn with_simd<T: Simd>(self, _: T) -> Self::Output {
         // The instruction set is that of the caller, who has chosen it.
-        Aligned(self.equations.eval_in_registers(self.set, self.x.0, self.numbers))
+        Aligned(self.equations.eval_in_registers(self.set, self.x.0, self.numbers, self.room))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Equations that are one function with other numbers in it: what a sweep over a parameter makes, and what can still be evaluated side by side.
 
-use super::{BoundField, VectorField, WithRegisters};
+use super::{BoundField, VectorField};
 use crate::num::{Aligned, Simd};
 
 /// The equations of several runs, which are done with the same operations.
@@ -14,9 +14,9 @@ pub trait Equations<const N: usize>: Sync {
     /// The numbers in that of run `run`, as [`Equations::eval_in_registers`] wants them; none if all runs have the same.
     #[doc(hidden)]
     fn numbers(&self, run: usize) -> &[f64];
-    /// As [`VectorField::with_registers`].
+    /// As [`VectorField::room`].
     #[doc(hidden)]
-    fn with_registers<W: WithRegisters>(&self, work: W);
+    fn room(&self) -> usize;
     /// In every lane, the value of that run's equation whose numbers are in the lane.
     #[doc(hidden)]
     fn eval_in_registers<S: Simd, const K: usize>(
@@ -24,6 +24,7 @@ pub trait Equations<const N: usize>: Sync {
         set: S,
         x: [[S::f64s; K]; N],
         numbers: &[Aligned<[S::f64s; K]>],
+        room: &mut [Aligned<[S::f64s; K]>],
     ) -> [[S::f64s; K]; N];
 }
 
@@ -35,8 +36,8 @@ impl<F: VectorField<N>, const N: usize> Equations<N> for F {
     fn numbers(&self, _: usize) -> &[f64] {
         &[]
     }
-    fn with_registers<W: WithRegisters>(&self, work: W) {
-        VectorField::with_registers(self, work);
+    fn room(&self) -> usize {
+        VectorField::room(self)
     }
     #[inline(always)]
     fn eval_in_registers<S: Simd, const K: usize>(
@@ -44,8 +45,9 @@ impl<F: VectorField<N>, const N: usize> Equations<N> for F {
         set: S,
         x: [[S::f64s; K]; N],
         _: &[Aligned<[S::f64s; K]>],
+        room: &mut [Aligned<[S::f64s; K]>],
     ) -> [[S::f64s; K]; N] {
-        VectorField::eval_in_registers(self, set, x)
+        VectorField::eval_in_registers(self, set, x, room)
     }
 }
 
@@ -88,8 +90,8 @@ impl<const N: usize> Equations<N> for Alike<N> {
     fn numbers(&self, run: usize) -> &[f64] {
         &self.numbers[run]
     }
-    fn with_registers<W: WithRegisters>(&self, work: W) {
-        VectorField::with_registers(&self.fields[0], work);
+    fn room(&self) -> usize {
+        VectorField::room(&self.fields[0])
     }
     #[inline(always)]
     fn eval_in_registers<S: Simd, const K: usize>(
@@ -97,8 +99,9 @@ impl<const N: usize> Equations<N> for Alike<N> {
         set: S,
         x: [[S::f64s; K]; N],
         numbers: &[Aligned<[S::f64s; K]>],
+        room: &mut [Aligned<[S::f64s; K]>],
     ) -> [[S::f64s; K]; N] {
-        self.fields[0].program().evaluate_with_numbers(set, x, numbers)
+        self.fields[0].program().evaluate_with_numbers(set, x, numbers, room)
     }
 }
 

@@ -9,9 +9,9 @@ use std::sync::Arc;
 use nalgebra::SVector;
 
 use super::instance::{BindError, run};
-use super::{Relaxation, System, Transition, VectorField, WithRegisters};
+use super::{Relaxation, System, Transition, VectorField};
 use crate::num::tape::{Program, Recorded, Replay, Tape};
-use crate::num::{Arithmetic, Elementary, Simd};
+use crate::num::{Aligned, Arithmetic, Elementary, Simd};
 
 /// An autonomous ordinary differential equation x' = f(x) as data.
 ///
@@ -307,13 +307,17 @@ impl<const N: usize> VectorField<N> for BoundField<N> {
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
         run(&self.program, x)
     }
-    /// Looking up what an instruction does costs the same for four registers as for two.
-    fn with_registers<W: WithRegisters>(&self, work: W) {
-        work.with::<4>();
+    fn room(&self) -> usize {
+        self.program.room()
     }
     #[inline(always)]
-    fn eval_in_registers<S: Simd, const K: usize>(&self, set: S, x: [[S::f64s; K]; N]) -> [[S::f64s; K]; N] {
-        self.program.evaluate_in_registers(set, x)
+    fn eval_in_registers<S: Simd, const K: usize>(
+        &self,
+        set: S,
+        x: [[S::f64s; K]; N],
+        room: &mut [Aligned<[S::f64s; K]>],
+    ) -> [[S::f64s; K]; N] {
+        self.program.evaluate_in_registers(set, x, room)
     }
     fn tape(&self) -> Arc<Tape> {
         self.tape.clone()

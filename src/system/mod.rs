@@ -34,7 +34,7 @@ use std::sync::Arc;
 use nalgebra::{SMatrix, SVector};
 
 use crate::num::tape::Recorded;
-use crate::num::{Dual, Elementary, Registers, Simd, Tape};
+use crate::num::{Aligned, Dual, Elementary, Registers, Simd, Tape};
 
 pub use alike::{Alike, Equations};
 pub use caricature::Caricature;
@@ -50,26 +50,24 @@ pub use smoothed::Smoothed;
 pub use transition::Transition;
 pub use wheel::Wheel;
 
-/// Work that is done with `K` vector registers side by side.
-#[doc(hidden)]
-pub trait WithRegisters {
-    /// Does it.
-    fn with<const K: usize>(self);
-}
-
 /// An autonomous ordinary differential equation x' = f(x) in `N` dimensions.
 pub trait VectorField<const N: usize>: Sync {
     /// The right-hand side f(x).
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
-    /// Does `work` with as many registers as suit this equation: with two, one goes on while the other waits for a quotient.
+    /// How many bundles of registers [`VectorField::eval_in_registers`] wants for what lies between: a power of two, or none.
     #[doc(hidden)]
-    fn with_registers<W: WithRegisters>(&self, work: W) {
-        work.with::<2>();
+    fn room(&self) -> usize {
+        0
     }
     /// The right-hand side at several states side by side, in the registers of an instruction set: in every lane the bits of [`VectorField::eval`].
     #[doc(hidden)]
     #[inline(always)]
-    fn eval_in_registers<S: Simd, const K: usize>(&self, set: S, x: [[S::f64s; K]; N]) -> [[S::f64s; K]; N] {
+    fn eval_in_registers<S: Simd, const K: usize>(
+        &self,
+        set: S,
+        x: [[S::f64s; K]; N],
+        _room: &mut [Aligned<[S::f64s; K]>],
+    ) -> [[S::f64s; K]; N] {
         // Loops by number: closures may stay calls, compiled for the wrong instruction set.
         let mut state = SVector::<Registers<S, K>, N>::from_element(Registers::splat(set, 0.0));
         for i in 0..N {

@@ -208,7 +208,8 @@ impl Terms<'_> {
                 _ => Choice::two(Code::Div, a, b),
             },
             Operation::Tanh(a) => match self.own(a) {
-                Some(Operation::Div(x, y)) if !self.is_fixed(x) => match self.fixed[y] {
+                // x is no number where y is one: the quotient would be one.
+                Some(Operation::Div(x, y)) => match self.fixed[y] {
                     Some(f) => Choice::one(Code::TanhOfQuotient, x).with(f, 0.0).around([a]),
                     None => Choice::one(Code::Tanh, a),
                 },

@@ -39,9 +39,7 @@ impl Program {
     /// Registers that an evaluation keeps on the stack.
     pub const ON_STACK: usize = 32;
     /// As many as most systems need: fewer are sooner cleared.
-    pub(super) const FEW: usize = 16;
-    /// As many as small systems need.
-    pub(super) const FEWEST: usize = 8;
+    const FEW: usize = 16;
     /// Most registers of a program.
     const MOST: usize = 1 << 16;
 

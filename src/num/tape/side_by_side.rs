@@ -42,7 +42,14 @@ impl<S: Simd, const K: usize> Numbers<S, K> for OfLanes<'_, S, K> {
 }
 
 impl Program {
-    /// The function's values at `x`: in every lane the bits of [`Program::evaluate`]. `N` is the number of variables and of values.
+    /// How many bundles of registers an evaluation wants for its results: a power of two. Whoever evaluates keeps them: to clear them at each evaluation
+    /// was a tenth of an ensemble's time.
+    pub(crate) fn room(&self) -> usize {
+        self.registers.max(self.variables).next_power_of_two()
+    }
+
+    /// The function's values at `x`: in every lane the bits of [`Program::evaluate`]. `N` is the number of variables and of values;
+    /// `room` is as long as [`Program::room`] says, and what is in it, before and after, means nothing.
     ///
     /// Always inlined, so that it is compiled with the instructions of whoever calls.
     #[inline(always)]
@@ -50,8 +57,9 @@ impl Program {
         &self,
         set: S,
         x: [Bundle<S, K>; N],
+        room: &mut [Aligned<Bundle<S, K>>],
     ) -> [Bundle<S, K>; N] {
-        self.evaluate_with(set, x, Own)
+        self.evaluate_with(set, x, Own, room)
     }
 
     /// The same with other numbers in each lane, those of [`Program::numbers`] in their order: in every lane the bits of the program that has them.
@@ -61,9 +69,10 @@ impl Program {
         set: S,
         x: [Bundle<S, K>; N],
         numbers: &[Aligned<Bundle<S, K>>],
+        room: &mut [Aligned<Bundle<S, K>>],
     ) -> [Bundle<S, K>; N] {
         assert!(numbers.len() == 2 * self.code.len() + N, "two numbers an instruction, one a value");
-        self.evaluate_with(set, x, OfLanes::<S, K>(numbers))
+        self.evaluate_with(set, x, OfLanes::<S, K>(numbers), room)
     }
 
     #[inline(always)]
@@ -72,40 +81,17 @@ impl Program {
         set: S,
         x: [Bundle<S, K>; N],
         numbers: impl Numbers<S, K>,
-    ) -> [Bundle<S, K>; N] {
-        assert!(N == self.variables && N == self.outputs.len(), "one number a variable and a value");
-        let zero = Aligned([set.splat_f64s(0.0); K]);
-        let x = x.map(Aligned);
-        let registers = self.registers.max(N);
-        // To clear sixteen where eight are enough was one thirteenth of an ensemble's time.
-        if registers <= Self::FEWEST {
-            let mut results = [zero; Self::FEWEST];
-            results[..N].copy_from_slice(&x);
-            self.run_in_registers(set, x, numbers, &mut results)
-        } else if registers <= Self::FEW {
-            let mut results = [zero; Self::FEW];
-            results[..N].copy_from_slice(&x);
-            self.run_in_registers(set, x, numbers, &mut results)
-        } else {
-            let mut results = vec![zero; registers.next_power_of_two()];
-            results[..N].copy_from_slice(&x);
-            self.run_in_registers(set, x, numbers, &mut results)
-        }
-    }
-
-    /// `results` is as long as a power of two that is not below the number of registers.
-    #[inline(always)]
-    fn run_in_registers<S: Simd, const K: usize, const N: usize>(
-        &self,
-        set: S,
-        x: [Aligned<Bundle<S, K>>; N],
-        numbers: impl Numbers<S, K>,
         results: &mut [Aligned<Bundle<S, K>>],
     ) -> [Bundle<S, K>; N] {
+        assert!(N == self.variables && N == self.outputs.len(), "one number a variable and a value");
+        assert!(results.len() == self.room(), "as much room as the program says");
         // The mask changes nothing and spares the way to a panic.
         let last = results.len() - 1;
+        for i in 0..N {
+            results[i & last] = Aligned(x[i]);
+        }
         // Most instructions use the result of the one before: it is at hand sooner than it could be written and read again.
-        let (mut value, mut written) = (x[0].0, u16::MAX);
+        let (mut value, mut written) = (x[0], u16::MAX);
         for (place, i) in self.code.iter().enumerate() {
             let a = if i.a == written { value } else { results[usize::from(i.a) & last].0 };
             let number = Registers::<S, K>::new(set, a);
@@ -249,7 +235,7 @@ impl Program {
             results[usize::from(i.to) & last] = Aligned(value);
             written = i.to;
         }
-        let mut out = x.map(|x| x.0);
+        let mut out = [value; N];
         for i in 0..N {
             out[i] = match self.outputs[i] {
                 Output::Register(at) => results[usize::from(at) & last].0,
@@ -302,7 +288,9 @@ mod tests {
             let value = |lane: usize, i: usize| (lane as f64 - 0.4 * width as f64) * 0.37 + i as f64 * 0.21;
             let lanes = [0, 1].map(|i| (0..width).map(|lane| value(lane, i)).collect::<Vec<_>>());
             let x = lanes.each_ref().map(|lanes| Registers::<S, K>::load(set, lanes).parts());
-            let found = self.0.evaluate_in_registers(set, x);
+            // What an earlier evaluation left there must not matter.
+            let mut room = vec![Aligned([set.splat_f64s(f64::NAN); K]); self.0.room()];
+            let found = self.0.evaluate_in_registers(set, x, &mut room);
             for lane in 0..width {
                 let mut alone = [0.0; 2];
                 self.0.evaluate(&[value(lane, 0), value(lane, 1)], &mut alone);
@@ -320,6 +308,7 @@ mod tests {
         Compared::<3>(&program).with_simd(Scalar);
         Arch::new().dispatch(Compared::<1>(&program));
         Arch::new().dispatch(Compared::<2>(&program));
+        Arch::new().dispatch(Compared::<4>(&program));
     }
 
     /// Programs that differ in a number, one in each lane.
@@ -340,7 +329,8 @@ mod tests {
                 })
                 .collect();
             let x = [0.7, -0.2].map(|x| Registers::<S, K>::splat(set, x).parts());
-            let found = programs[0].evaluate_with_numbers(set, x, &numbers);
+            let mut room = vec![Aligned([set.splat_f64s(f64::NAN); K]); programs[0].room()];
+            let found = programs[0].evaluate_with_numbers(set, x, &numbers, &mut room);
             for lane in 0..width {
                 let mut alone = [0.0; 2];
                 programs[lane].evaluate(&[0.7, -0.2], &mut alone);
@@ -357,14 +347,41 @@ mod tests {
         Differing::<3>.with_simd(Scalar);
         Arch::new().dispatch(Differing::<1>);
         Arch::new().dispatch(Differing::<2>);
+        Arch::new().dispatch(Differing::<4>);
     }
 
     #[test]
     fn a_value_may_be_a_number() {
         let program = Program::new(&Tape::record(2, |v| vec![v[1], crate::num::tape::Recorded::from_f64(2.5)]));
-        let found = program.evaluate_in_registers(Scalar, [[1.0], [3.0]]);
+        let mut room = [Aligned([f64::NAN]); 2];
+        let found = program.evaluate_in_registers(Scalar, [[1.0], [3.0]], &mut room);
         assert_eq!(found, [[3.0], [2.5]]);
         assert_eq!(program.numbers(), [0.0, 2.5], "one number a value; no instruction is needed");
-        assert_eq!(program.evaluate_with_numbers(Scalar, [[1.0], [3.0]], &[[0.0], [4.5]].map(Aligned)), [[3.0], [4.5]]);
+        let found = program.evaluate_with_numbers(Scalar, [[1.0], [3.0]], &[[0.0], [4.5]].map(Aligned), &mut room);
+        assert_eq!(found, [[3.0], [4.5]]);
+    }
+
+    /// A power of two that holds the variables and the registers: three variables want four, even if nothing is computed.
+    #[test]
+    fn room_holds_variables_and_registers() {
+        let copies = |n: usize| Program::new(&Tape::record(n, |v| v.to_vec()));
+        assert_eq!([1, 2, 3, 4, 5].map(|n| copies(n).room()), [1, 2, 4, 4, 8]);
+        // Of the twenty products each is wanted until the end: at least 21 registers at once.
+        let many = Program::new(&Tape::record(1, |v| {
+            let products: Vec<_> =
+                (1..=20).map(|k| (v[0] * crate::num::tape::Recorded::from_f64(k as f64)).tanh()).collect();
+            let (mut up, mut down) = (v[0], v[0]);
+            for k in 0..20 {
+                (up, down) = (up * products[k], down * products[19 - k]);
+            }
+            vec![up - down]
+        }));
+        assert_eq!(many.room(), 32);
+    }
+
+    #[test]
+    #[should_panic(expected = "as much room as the program says")]
+    fn less_room_is_refused() {
+        everything().evaluate_in_registers(Scalar, [[1.0], [3.0]], &mut [Aligned([0.0]); 2]);
     }
 }
