@@ -1,10 +1,11 @@
 """Runs the peers and our methods beside each other (make bench-peers): one table with ratios, and its picture.
 
     python run.py BUILD [ROUNDS]
+    python run.py draw
 
 BUILD holds the programs (run.sh makes them). Every program is run in each round, one after the other, and of each the least processor time is
 taken: other work on the machine then costs little. A program that is not there is said to be not run. Writes results.csv, results.md, results.svg
-beside this file.
+beside this file. `draw` makes the picture anew of the table.
 """
 
 import csv
@@ -151,27 +152,41 @@ WHITE = '<rect width="100%" height="100%" fill="#ffffff"/>'
 
 
 def draw(rows):
-    """Bars of seconds, by unit of work, on one logarithmic scale."""
+    """Seconds, by unit of work, as dots on one logarithmic scale with its decades."""
     import math
 
     rows = [row for row in rows if row[2]]
-    width, left, line = 900, 330, 18
-    low, high = 0.05, max(float(row[2]) for row in rows) * 1.5
-    scale = (width - left - 70) / math.log10(high / low)
-    parts, y, unit = [f'<text x="{left}" y="16" fill="#606060">processor seconds, logarithmic scale</text>'], 10, None
+    seconds = [float(row[2]) for row in rows]
+    width, left, line, top = 900, 330, 18, 28
+    low, high = math.floor(math.log10(min(seconds))), math.ceil(math.log10(max(seconds)))
+    at = lambda s: left + (math.log10(s) - low) / (high - low) * (width - left - 30)
+    parts, y, unit = [], top - 18, None
     for row in rows:
         if row[0] != unit:
             unit, y = row[0], y + 24
             parts.append(f'<text x="8" y="{y}" font-weight="bold">{unit}</text>')
         y += line
-        length = max(1.0, math.log10(max(float(row[2]), low) / low) * scale)
-        colour = "#b03060" if row[1].startswith("ours") else "#8090a0"
-        parts.append(f'<text x="{left - 8}" y="{y}" text-anchor="end">{row[1]}</text>')
-        parts.append(f'<rect x="{left}" y="{y - 11}" width="{length:.1f}" height="13" fill="{colour}"/>')
-        parts.append(f'<text x="{left + length + 6:.1f}" y="{y}">{row[2]} s</text>')
+        x = at(float(row[2]))
+        colour = "#b03060" if row[1].startswith("ours") else "#607080"
+        parts.append(f'<text x="{left - 10}" y="{y}" text-anchor="end">{row[1]}</text>')
+        parts.append(f'<line x1="{left}" y1="{y - 4}" x2="{x:.1f}" y2="{y - 4}" stroke="{colour}" stroke-opacity="0.35"/>')
+        parts.append(f'<circle cx="{x:.1f}" cy="{y - 4}" r="4.5" fill="{colour}"/>')
+        # To the left of its dot where the right is too narrow.
+        side = (x - 9, "end") if x > width - 90 else (x + 9, "start")
+        parts.append(f'<text x="{side[0]:.1f}" y="{y}" text-anchor="{side[1]}">{row[2]} s</text>')
+    decades = []
+    for k in range(low, high + 1):
+        x = at(10.0 ** k)
+        decades.append(f'<line x1="{x:.1f}" y1="{top - 8}" x2="{x:.1f}" y2="{y + 6}" stroke="#d8d8d8"/>')
+        decades.append(f'<text x="{x:.1f}" y="{top - 12}" text-anchor="middle" fill="#606060">{10.0 ** k:g} s</text>')
+    decades.append(f'<text x="8" y="{top - 12}" fill="#606060">processor seconds; ours in red</text>')
     style = 'font-family="sans-serif" font-size="12"'
-    svg = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{y + 20}" {style}>' + WHITE + "\n".join(parts) + "</svg>\n"
+    svg = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{y + 20}" {style}>' + WHITE + "\n".join(decades + parts) + "</svg>\n"
     (HERE / "results.svg").write_text(svg)
 
 
-main()
+if sys.argv[1] == "draw":
+    with open(HERE / "results.csv", newline="") as file:
+        draw(list(csv.reader(file))[1:])
+else:
+    main()
