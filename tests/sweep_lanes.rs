@@ -152,6 +152,44 @@ fn rows_that_lanes_do_not_take_are_computed_alone() {
     are_the_rows(&Sweep::new(five, axes(&["shift.x=1e-3*4"]), None).unwrap());
 }
 
+/// Rows whose verdict waits for an exponent: these share lanes too. (`job::exponent` has more of them, over shorter times.)
+#[test]
+fn rows_wait_for_exponents_together() {
+    let run = RunSpec { switch: SwitchSpec::tanh(1e-2), ..run(Caricature::with_reinjection(0.1, 1e-4).into(), 1000.0) };
+    let sweep = Sweep::new(run, axes(&["params.alpha=0.1,0.11,0.12"]), None).unwrap();
+    are_the_rows(&sweep);
+    // Whoever asks to stop while they are computed gets no rows, and who wants no more than one gets no more.
+    let numbers = [0, 1, 2];
+    let mut none = |row: Row| panic!("row {}", row.number());
+    let stopped = sweep.rows_together(&numbers, &NoExponents, &mut none);
+    let lanes = InstructionSet::best() != InstructionSet::Portable;
+    assert!(!lanes || stopped == Err(JobError::Interrupted), "{stopped:?}");
+    let mut words = Vec::new();
+    let enough = sweep.rows_together(&numbers, &(), &mut |row| {
+        words.push(row.outcome().to_owned());
+        false
+    });
+    assert_eq!(enough, Ok(()));
+    assert!(words == ["irregular"] || words == ["undecided"], "{words:?}");
+}
+
+/// Stops exponents.
+struct NoExponents;
+impl Progress for NoExponents {
+    fn begin<'a>(&'a self, label: &str, _: f64) -> Box<dyn JobWatch + 'a> {
+        if label.contains("exponent") { Box::new(Never) } else { Box::new(()) }
+    }
+}
+struct Never;
+impl Watch for Never {
+    fn reached(&self, _: f64) -> bool {
+        false
+    }
+}
+impl JobWatch for Never {
+    fn done(self: Box<Self>, _: &str) {}
+}
+
 /// Stops after so many questions.
 struct Refuses(AtomicU64);
 impl Watch for &Refuses {

@@ -16,10 +16,13 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use super::tangent::Tangent;
-use crate::integrate::{Dopri5, Failure, Kick, Kicker, Stepper, Tolerance, Watch};
+use crate::integrate::ensemble::{Carried, Common, InstructionSet, Run, Tolerances, ensemble_watched};
+use crate::integrate::{
+    Course, Dopri5, Failure, Flow, Kick, Kicker, Observer, Step, StepCap, Stepper, Tolerance, Watch,
+};
 use crate::num::elementary::{ln, sqrt};
 use crate::num::fit::mean;
-use crate::system::VectorField;
+use crate::system::{Equations, VectorField};
 
 /// A largest Lyapunov exponent.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -118,12 +121,11 @@ pub fn largest_watched<const N: usize, const M: usize, T: VectorField<M>>(
     let mut stepper = Dopri5::<M>::new(settings.tolerance);
     let mut kicker = settings.kick.map(|kick| Kicker::new(kick, kicked_states));
     let mut kicks = 1_u64;
-    // A start with no preferred direction; almost every vector turns into the fastest one.
-    let mut state = SVector::<f64, M>::from_fn(|i, _| if i < N { x0[i] } else { 1.0 / sqrt(N as f64) });
+    let mut state = begin::<N, M>(&x0);
     let mut rates = Vec::with_capacity(BLOCKS);
     let mut t = 0.0;
     for block in 0..=BLOCKS {
-        let end = settings.transient + settings.duration * block as f64 / BLOCKS as f64;
+        let end = block_end(settings, block);
         let start = t;
         let mut growth = -ln(length::<N, M>(&state));
         while t < end {
@@ -167,6 +169,86 @@ pub fn largest_watched<const N: usize, const M: usize, T: VectorField<M>>(
         }
     }
     Ok(mean_of(&rates, settings))
+}
+
+/// [`largest_watched`] for many orbits side by side in the lanes of vector registers: of each the number that it has alone, bit for bit, in the
+/// order of `starts`; `tangents` has a run for each. There are no kicks. Nothing if `watch` refuses.
+///
+/// # Panics
+/// If `settings` have kicks, or `tangents` are of fewer runs.
+pub fn largest_side_by_side<const N: usize, const M: usize, E: Equations<M>>(
+    set: InstructionSet,
+    tangents: &E,
+    starts: &[SVector<f64, N>],
+    settings: &Settings,
+    watch: &dyn Watch,
+) -> Option<Vec<Result<Exponent, Failure>>> {
+    const { assert!(M == 2 * N) };
+    assert!(settings.kick.is_none(), "orbits without kicks");
+    let Settings { tolerance, max_step, transient, duration, max_steps, .. } = *settings;
+    let stops: Vec<f64> = (0..=BLOCKS).map(|block| block_end(settings, block)).skip_while(|end| *end <= 0.0).collect();
+    let course = Course { step_cap: StepCap::Absolute(max_step), max_steps, ..Course::to(transient + duration) };
+    let runs: Vec<Run<M>> = starts.iter().map(|x0| Run { start: begin(x0), course }).collect();
+    let carried = Carried { first: N, range: [1.0 / RANGE, RANGE], stops: &stops };
+    let tolerances = Tolerances::All(tolerance);
+    let common = Common { tolerances, plane: None, corners: None, carried: Some(carried), watch };
+    let growth = |run: usize| Growth {
+        carried,
+        growth: -ln(carried.length(&runs[run].start)),
+        start: 0.0,
+        counted: transient <= 0.0,
+        rates: Vec::with_capacity(BLOCKS),
+    };
+    let mut found: Vec<Option<Result<Exponent, Failure>>> = vec![None; runs.len()];
+    ensemble_watched(set, tangents, &runs, common, growth, &mut |run, end| {
+        found[run] = Some(end.summary.and_then(|summary| {
+            if summary.statistics.steps >= max_steps {
+                let state = summary.x.iter().take(N).copied().collect();
+                return Err(Failure::TooManySteps { t: summary.t, limit: max_steps, state });
+            }
+            Ok(mean_of(&end.observer.rates, settings))
+        }));
+    });
+    found.into_iter().collect()
+}
+
+/// Gathers the rates of an orbit among others.
+struct Growth<'a> {
+    carried: Carried<'a>,
+    /// In this block, as the logarithm of a factor.
+    growth: f64,
+    /// When the block began.
+    start: f64,
+    /// Whether the block counts: the first, if there is a transient, does not.
+    counted: bool,
+    rates: Vec<f64>,
+}
+
+impl<const M: usize> Observer<M> for Growth<'_> {
+    fn step(&mut self, _: &Step<'_, M>) -> Flow {
+        Flow::Continue
+    }
+    fn rescaled(&mut self, _: f64, length: f64) {
+        self.growth += ln(length);
+    }
+    fn stopped(&mut self, t: f64, x: &SVector<f64, M>) {
+        let rest = ln(self.carried.length(x));
+        self.growth += rest;
+        if self.counted {
+            self.rates.push(self.growth / (t - self.start));
+        }
+        (self.growth, self.start, self.counted) = (-rest, t, true);
+    }
+}
+
+/// The state to begin with: a start with no preferred direction; almost every vector turns into the fastest one.
+fn begin<const N: usize, const M: usize>(x0: &SVector<f64, N>) -> SVector<f64, M> {
+    SVector::from_fn(|i, _| if i < N { x0[i] } else { 1.0 / sqrt(N as f64) })
+}
+
+/// When a block ends; the transient is block 0.
+fn block_end(settings: &Settings, block: usize) -> f64 {
+    settings.transient + settings.duration * block as f64 / BLOCKS as f64
 }
 
 /// The mean of the finished blocks.

@@ -13,6 +13,10 @@ pub trait Observer<const N: usize> {
     fn step(&mut self, step: &Step<'_, N>) -> Flow;
     /// The state jumped at time `t` (a kick).
     fn kick(&mut self, _t: f64, _before: &SVector<f64, N>, _after: &SVector<f64, N>) {}
+    /// Of runs side by side that carry a vector along ([`Carried`](super::ensemble::Carried)): its length was `length`, and is 1 again.
+    fn rescaled(&mut self, _t: f64, _length: f64) {}
+    /// Of the same: one of their stops is reached, in the state `x`.
+    fn stopped(&mut self, _t: f64, _x: &SVector<f64, N>) {}
 }
 
 /// An observer that ignores everything.

@@ -20,6 +20,7 @@ use super::driver::{Course, Observer, Summary, Watch};
 use super::schedule::{Kicker, Segment};
 use super::step::{Failure, Flow, Statistics, Step, Stepper, StopReason, Tolerance};
 use crate::num::elementary::kernels::{rough_exp2, rough_log2};
+use crate::num::elementary::sqrt;
 use crate::num::{Aligned, Arithmetic, Mask, Registers};
 use crate::system::Equations;
 
@@ -78,8 +79,29 @@ pub struct Common<'a, const N: usize> {
     /// A corner for each run, which ends as if its observer had stopped it ([`StopReason::Observer`]) at the first step's end where each component of
     /// the state is above the corner's.
     pub corners: Option<&'a [SVector<f64, N>]>,
+    /// A vector that each run carries along, as part of its state.
+    pub carried: Option<Carried<'a>>,
     /// Is asked now and then whether to go on; if not, runs that have not come to their end are given up.
     pub watch: &'a dyn Watch,
+}
+
+/// A vector that runs carry along, a tangent vector of their orbits: the components of the state from `first` on. It grows and shrinks without end, so
+/// it is brought to length 1 again where that is needed (Benettin, Galgani, Giorgilli & Strelcyn 1980), and the method starts anew. Observers hear of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Carried<'a> {
+    /// Which is the first of its components.
+    pub first: usize,
+    /// The least and the greatest length that a step may leave it with.
+    pub range: [f64; 2],
+    /// When methods start anew, in place of the schedules' restarts and kicks: increasing times, the last of them the end.
+    pub stops: &'a [f64],
+}
+
+impl Carried<'_> {
+    /// Its length in the state `x`.
+    pub fn length<const N: usize>(&self, x: &SVector<f64, N>) -> f64 {
+        sqrt(x.iter().skip(self.first).map(|v| v * v).sum())
+    }
 }
 
 /// The instructions that lanes are computed with.
@@ -152,7 +174,7 @@ where
     O: Observer<N>,
 {
     let mut ends: Vec<Option<End<O, N>>> = runs.iter().map(|_| None).collect();
-    let common = Common { tolerances: Tolerances::All(tolerance), plane, corners: None, watch: &() };
+    let common = Common { tolerances: Tolerances::All(tolerance), plane, corners: None, carried: None, watch: &() };
     ensemble_watched(set, equations, runs, common, observer, &mut |run, end| ends[run] = Some(end));
     ends.into_iter().flatten().collect()
 }
@@ -201,9 +223,10 @@ struct All<'a, E, O, M: Fn(usize) -> O, const N: usize, const K: usize> {
 #[cfg(target_arch = "x86_64")]
 impl<'a, E: Equations<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> All<'a, E, O, M, N, 1> {
     /// By as many registers at a time as suit the number of runs: while one waits for a quotient the others go on, and of four none waits long,
-    /// but they take 1.6 times as long as two for a step. That pays where runs fill their lanes at least twice.
+    /// but they take 1.6 times as long as two for a step. That pays where runs fill their lanes at least twice, and states
+    /// are few: six are no faster with four.
     fn side_by_side<S: Simd>(self, set: S) {
-        if self.runs.len() >= 2 * 4 * S::F64_LANES {
+        if N <= 4 && self.runs.len() >= 2 * 4 * S::F64_LANES {
             set.vectorize(self.in_registers::<4>());
         } else {
             set.vectorize(self.in_registers::<2>());
@@ -237,7 +260,14 @@ impl<E: Equations<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, const K
                     let Some(run) = waiting.next() else { break };
                     state.give(l, equations.numbers(run), common.corners.map(|corners| &corners[run]));
                     let tolerance = common.tolerances.of(run);
-                    if let Some(end) = state.begin(l, equations, run, &runs[run], tolerance, observer(run)) {
+                    let segments: Box<dyn Iterator<Item = Segment>> = match common.carried {
+                        None => Box::new(runs[run].course.schedule.segments(0.0, runs[run].course.t_end)),
+                        Some(Carried { stops, .. }) => {
+                            let stops = Vec::from(stops);
+                            Box::new(stops.into_iter().map(|end| Segment { end, kick: false }))
+                        }
+                    };
+                    if let Some(end) = state.begin(l, equations, run, &runs[run], segments, tolerance, observer(run)) {
                         finished(run, end);
                     }
                 }
@@ -348,16 +378,17 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
 
     /// Puts a run into an empty lane; gives its end if it needs no step.
     #[inline(never)]
+    #[allow(clippy::too_many_arguments)]
     fn begin<E: Equations<N>>(
         &mut self,
         l: usize,
         equations: &E,
         run: usize,
         Run { start, course }: &Run<N>,
+        mut segments: Box<dyn Iterator<Item = Segment>>,
         tolerance: Tolerance,
         observer: O,
     ) -> Option<End<O, N>> {
-        let mut segments = Box::new(course.schedule.segments(0.0, course.t_end));
         put(&mut self.rtol, l, tolerance.rtol);
         put(&mut self.atol, l, tolerance.atol);
         put(&mut self.steps, l, 0.0);
@@ -525,6 +556,21 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             beyond = Some(all.select(one, zero).parts());
             noted = noted.or(all);
         }
+        let mut outside = None;
+        if let Some(Carried { first, range: [least, most], .. }) = common.carried {
+            let mut square = zero;
+            for i in 0..N {
+                if i >= first {
+                    square += x1[i] * x1[i];
+                }
+            }
+            // Who attends to it decides; the margin is for the root's rounding.
+            let long = number(least * least * (1.0 + 1e-9)).at_most(square, set);
+            let short = square.at_most(number(most * most * (1.0 - 1e-9)), set);
+            let may = number(0.5).less(long.and(short).select(zero, one), set).and(accepted);
+            outside = Some(may.select(one, zero).parts());
+            noted = noted.or(may);
+        }
         if !noted.any() {
             return false;
         }
@@ -538,10 +584,11 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             last: lanes(last),
             met,
             beyond,
+            outside,
             x: bare(&x0),
             k: [bare(&k1), bare(&k3), bare(&k4), bare(&k5), bare(&k6), bare(&k7)],
         };
-        self.attend(equations, &seen, finished)
+        self.attend(equations, common, &seen, finished)
     }
 
     /// The scalar part of a step, for the lanes that need one. Says whether a lane has become empty.
@@ -549,13 +596,14 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
     fn attend<E: Equations<N>>(
         &mut self,
         equations: &E,
+        common: &Common<'_, N>,
         seen: &Seen<S, N, K>,
         finished: &mut dyn FnMut(usize, End<O, N>),
     ) -> bool {
         let mut emptied = false;
         for l in 0..Registers::<S, K>::WIDTH {
             let Some(run) = self.lanes[l].as_ref().map(|lane| lane.run) else { continue };
-            if let Some(stop) = self.attend_one(l, equations, seen) {
+            if let Some(stop) = self.attend_one(l, equations, common, seen) {
                 if let Some(end) = self.finish(l, stop) {
                     finished(run, end);
                 }
@@ -570,6 +618,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         &mut self,
         l: usize,
         equations: &E,
+        common: &Common<'_, N>,
         seen: &Seen<S, N, K>,
     ) -> Option<Result<StopReason, Failure>> {
         let yes = |parts: &[S::f64s; K]| get(parts, l) > 0.5;
@@ -588,7 +637,22 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             }
             return None;
         }
-        let (t1, x1, steps) = (get(&self.t, l), self.state(l), get(&self.steps, l));
+        let (t1, mut x1, steps) = (get(&self.t, l), self.state(l), get(&self.steps, l));
+        if let (true, Some(carried)) = (seen.outside.as_ref().is_some_and(yes), &common.carried) {
+            let (length, [least, most]) = (carried.length(&x1), carried.range);
+            if !(least..=most).contains(&length) {
+                for i in carried.first..N {
+                    x1[i] /= length;
+                    put(&mut self.x[i], l, x1[i]);
+                }
+                self.lanes[l].as_mut()?.observer.rescaled(t1, length);
+                if !yes(&seen.last)
+                    && let Some(failure) = self.restart(l, equations)
+                {
+                    return Some(Err(failure));
+                }
+            }
+        }
         let lane = self.lanes[l].as_mut()?;
         let mut flow = Flow::Continue;
         if seen.met.as_ref().is_some_and(yes) {
@@ -610,6 +674,9 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         }
         if stop.is_some() || !yes(&seen.last) {
             return stop.map(Ok);
+        }
+        if common.carried.is_some() {
+            lane.observer.stopped(t1, &x1);
         }
         if let (true, Some(kicker)) = (lane.segment.kick, lane.kicker.as_mut()) {
             let kicked = kicker.apply(x1);
@@ -638,6 +705,8 @@ struct Seen<S: Simd, const N: usize, const K: usize> {
     last: [S::f64s; K],
     met: Option<[S::f64s; K]>,
     beyond: Option<[S::f64s; K]>,
+    /// Where what is carried may be too short or too long.
+    outside: Option<[S::f64s; K]>,
     x: [[S::f64s; K]; N],
     /// Stages 1, 3, 4, 5, 6, 7.
     k: [[[S::f64s; K]; N]; 6],

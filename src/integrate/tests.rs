@@ -717,8 +717,13 @@ fn lanes_are_runs_alone() {
             let cycled: Vec<_> = (0..count).map(|i| runs[often(i)]).collect();
             let sizes: Vec<_> = (0..count).map(|i| sizes[often(i)]).collect();
             let corners: Option<Vec<_>> = corners.as_ref().map(|all| (0..count).map(|i| all[often(i)]).collect());
-            let common =
-                Common { tolerances: Tolerances::Each(&sizes), plane, corners: corners.as_deref(), watch: &() };
+            let common = Common {
+                tolerances: Tolerances::Each(&sizes),
+                plane,
+                corners: corners.as_deref(),
+                carried: None,
+                watch: &(),
+            };
             let mut ends = vec![None; count];
             ensemble_watched(
                 set,
@@ -742,7 +747,7 @@ fn lanes_are_runs_alone() {
             let long =
                 [Run { start: START.into(), course: Course { step_cap: StepCap::Absolute(1e-3), ..Course::to(50.0) } }];
             let tolerances = Tolerances::All(size);
-            let common = Common { tolerances, plane: None, corners: None, watch: &Refuses };
+            let common = Common { tolerances, plane: None, corners: None, carried: None, watch: &Refuses };
             ensemble_watched(set, &field, &long, common, |_| Ignore, &mut |_, _| finished += 1);
             assert_eq!(finished, 0, "{set:?}");
             ensemble_watched(set, &field, &runs[..3], common, |_| Ignore, &mut |_, _| finished += 1);

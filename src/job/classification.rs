@@ -100,6 +100,13 @@ const LENGTHS: Lengths = Lengths {
     hysteretic_average: 2_000.0,
 };
 
+/// A judgement, or what it waits for.
+pub(super) enum SoFar<T> {
+    Judged(T),
+    /// Neighbours part, or not: the points do not say.
+    Awaits(Box<LargestExponent>),
+}
+
 impl Classification {
     fn evidence(&self, desk: &Desk<'_>) -> Result<Evidence, JobError> {
         // What cannot be judged is not computed.
@@ -108,41 +115,60 @@ impl Classification {
     }
 
     /// The evidence that an answer to the run's question gives.
-    pub(super) fn evidence_of(&self, desk: &Desk<'_>, answer: &Answer) -> Result<Evidence, JobError> {
+    fn evidence_of(&self, desk: &Desk<'_>, answer: &Answer) -> Result<Evidence, JobError> {
+        match self.so_far(desk, answer)? {
+            SoFar::Judged(evidence) => Ok(evidence),
+            SoFar::Awaits(exponent) => self.with_exponent(answer, exponent.found(&*desk.ask(&*exponent)?)),
+        }
+    }
+
+    /// What an answer to the run's question comes to without the orbit's exponent.
+    pub(super) fn so_far(&self, desk: &Desk<'_>, answer: &Answer) -> Result<SoFar<Evidence>, JobError> {
         let run = &self.run;
         let (end, section) = section(run, answer)?;
         let random_exits = matches!(run.switch, SwitchSpec::Filippov { exit: ExitRule::Random { .. }, .. });
-        let mut question = attractor::Question {
+        let mut question = self.asked();
+        if question.kicked {
+            // Without its chance a random exit rule is no rule: there is nothing to compare with.
+            let reference = if random_exits { None } else { Some(self.noise_free_structure(desk)?) };
+            question.reference = reference.as_deref();
+            return Ok(SoFar::Judged(classify(&section, &question, &self.thresholds)));
+        }
+        let evidence = classify(&section, &question, &self.thresholds);
+        Ok(match evidence.verdict {
+            Verdict::Chaotic { .. } | Verdict::Undecided { .. } => SoFar::Awaits(Box::new(self.exponent(end))),
+            _ => SoFar::Judged(evidence),
+        })
+    }
+
+    /// The evidence with the exponent that was awaited; `None` if that orbit could not be followed.
+    pub(super) fn with_exponent(&self, answer: &Answer, exponent: Option<Exponent>) -> Result<Evidence, JobError> {
+        let (_, section) = section(&self.run, answer)?;
+        Ok(classify(&section, &attractor::Question { lyapunov: exponent, ..self.asked() }, &self.thresholds))
+    }
+
+    /// What is asked of the section's points.
+    fn asked(&self) -> attractor::Question<'static> {
+        let run = &self.run;
+        let random_exits = matches!(run.switch, SwitchSpec::Filippov { exit: ExitRule::Random { .. }, .. });
+        attractor::Question {
             t_end: Some(run.t_end),
             shown_from: 0.5 * run.t_end,
             kicked: run.schedule.kick.is_some() || random_exits,
             lyapunov: None,
             reference: None,
-        };
-        if question.kicked {
-            // Without its chance a random exit rule is no rule: there is nothing to compare with.
-            let reference = if random_exits { None } else { Some(self.noise_free_structure(desk)?) };
-            question.reference = reference.as_deref();
-            return Ok(classify(&section, &question, &self.thresholds));
         }
-        let evidence = classify(&section, &question, &self.thresholds);
-        if let Verdict::Chaotic { .. } | Verdict::Undecided { .. } = evidence.verdict {
-            question.lyapunov = self.exponent(desk, end)?;
-            return Ok(classify(&section, &question, &self.thresholds));
-        }
-        Ok(evidence)
     }
 
-    /// The largest exponent of the run's system, from its final state; `None` if that orbit could not be followed.
-    fn exponent(&self, desk: &Desk<'_>, start: Vec<f64>) -> Result<Option<Exponent>, JobError> {
+    /// The largest exponent of the run's system, from its final state.
+    fn exponent(&self, start: Vec<f64>) -> LargestExponent {
         let settings = match self.run.switch {
             SwitchSpec::Hysteretic { .. } => {
                 lyapunov::Settings { duration: LENGTHS.hysteretic_average, ..lyapunov::Settings::default() }
             }
             _ => lyapunov::Settings::default(),
         };
-        let question = LargestExponent { system: self.run.system.clone(), switch: self.run.switch, start, settings };
-        Ok(desk.ask(&question)?.fact("exponent").ok())
+        LargestExponent { system: self.run.system.clone(), switch: self.run.switch, start, settings }
     }
 
     /// The same run without kicks, from starts a little apart.
@@ -303,11 +329,16 @@ mod tests {
         let hysteretic = SwitchSpec::hysteretic(1e-2, crate::system::Relaxation::Single);
         for (switch, duration) in [(SwitchSpec::tanh(1e-2), 10_000.0), (hysteretic, 2000.0)] {
             let question = run(cases::decays(2), switch, 9.0);
-            let exponent = question.exponent(&desk, vec![1.0, 1.0]).unwrap().unwrap();
+            let of = |q: &Classification| {
+                let exponent = q.exponent(vec![1.0, 1.0]);
+                exponent.found(&desk.ask(&exponent).unwrap())
+            };
+            let exponent = of(&question).unwrap();
             assert!((exponent.value + 1.0).abs() < 1e-5 && exponent.duration == duration, "{exponent:?}");
         }
         let leaving = run(cases::smooth(&["x", "y"], "x + 1", &["x*x", "-y"]), SwitchSpec::tanh(1e-2), 0.5);
-        assert_eq!(leaving.exponent(&desk, vec![1.0, 1.0]).unwrap(), None);
+        let exponent = leaving.exponent(vec![1.0, 1.0]);
+        assert_eq!(exponent.found(&desk.ask(&exponent).unwrap()), None);
     }
 
     /// Three oscillators of frequencies that have no common measure, seen in the positions of two of them: nothing captures that.

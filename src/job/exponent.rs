@@ -11,8 +11,9 @@ use super::spec::SwitchSpec;
 use crate::analyse::lyapunov::{self, Exponent};
 use crate::analyse::tangent::Tangent;
 use crate::integrate::Watch;
+use crate::integrate::ensemble::InstructionSet;
 use crate::num::tape::Program;
-use crate::system::{Compiled, Field, Hysteretic, Smoothed, System};
+use crate::system::{Alike, BoundField, Compiled, Field, Hysteretic, Smoothed, System};
 
 /// The largest Lyapunov exponent of the orbit from `start`. Fact: `exponent` ([`Exponent`]), or `failure` with the reason if the orbit
 /// could not be followed (it leaves, or its motion is set-valued and has no tangent flow).
@@ -29,6 +30,62 @@ pub struct LargestExponent {
 }
 
 impl LargestExponent {
+    /// The exponent that an answer has, if the orbit could be followed.
+    pub(super) fn found(&self, answer: &Answer) -> Option<Exponent> {
+        answer.fact("exponent").ok()
+    }
+
+    /// The exponents of several questions that differ in start and in the equation's numbers alone, side by side in the lanes of vector registers: of each
+    /// what its answer has ([`LargestExponent::found`]), bit for bit. Nothing if they differ in more, or lanes have no room for their equation.
+    ///
+    /// # Errors
+    /// [`JobError::Interrupted`] if `watch` asks to stop.
+    pub(super) fn side_by_side(
+        questions: &[&Self],
+        set: InstructionSet,
+        watch: &dyn Watch,
+    ) -> Result<Option<Vec<Option<Exponent>>>, JobError> {
+        let Some(first) = questions.first() else { return Ok(Some(Vec::new())) };
+        let alike = |q: &&Self| q.settings == first.settings && q.start.len() == first.start.len();
+        let smoothed = |q: &&Self| matches!(q.switch, SwitchSpec::Smoothed { .. });
+        if first.settings.kick.is_some() || !questions.iter().all(|q| alike(q) && smoothed(q)) {
+            return Ok(None);
+        }
+        match first.start.len() {
+            2 => Self::in_lanes::<2, 4>(questions, set, watch),
+            3 => Self::in_lanes::<3, 6>(questions, set, watch),
+            4 => Self::in_lanes::<4, 8>(questions, set, watch),
+            _ => Ok(None),
+        }
+    }
+
+    fn in_lanes<const N: usize, const M: usize>(
+        questions: &[&Self],
+        set: InstructionSet,
+        watch: &dyn Watch,
+    ) -> Result<Option<Vec<Option<Exponent>>>, JobError> {
+        let fields: Option<Vec<BoundField<M>>> = questions.iter().map(|q| q.tangent()?.bind().ok()).collect();
+        let Some(tangents) = fields.and_then(Alike::new) else { return Ok(None) };
+        let starts: Vec<_> = questions.iter().map(|q| SVector::<f64, N>::from_column_slice(&q.start)).collect();
+        let settings = &questions[0].settings;
+        match lyapunov::largest_side_by_side::<N, M, _>(set, &tangents, &starts, settings, watch) {
+            Some(found) => Ok(Some(found.into_iter().map(Result::ok).collect())),
+            None => Err(JobError::Interrupted),
+        }
+    }
+
+    /// The smoothed equation with its variational equation, as data: the operations that [`LargestExponent::exponent`] goes through.
+    fn tangent(&self) -> Option<Field> {
+        let SwitchSpec::Smoothed { eps, transition } = self.switch else { return None };
+        Some(match self.system.compiled() {
+            Some(Compiled::Caricature(system)) => {
+                let field = Smoothed { system, transition, eps };
+                Field::record(["x", "y", "z", "dx", "dy", "dz"], &Tangent::<_, 1>(&field))
+            }
+            _ => Field::smoothed(&self.system, transition, eps).variational(1),
+        })
+    }
+
     fn exponent(&self, watch: &dyn Watch) -> Result<Exponent, String> {
         let start = |i: usize| self.start.get(i).copied().unwrap_or(f64::NAN);
         let dimension = self.system.dimension();
@@ -133,7 +190,7 @@ mod tests {
     use crate::integrate::Tolerance;
     use crate::integrate::filippov::{ExitRule, Side};
     use crate::job::cases;
-    use crate::system::{Caricature, Relaxation};
+    use crate::system::{Caricature, Relaxation, Transition};
 
     fn question(system: System, switch: SwitchSpec, duration: f64) -> LargestExponent {
         let tolerance = Tolerance { rtol: 1e-9, atol: 1e-9 };
@@ -172,6 +229,87 @@ mod tests {
                 question.compute(&Desk::quiet(), &()).unwrap().fact::<Exponent>("exponent").unwrap()
             });
             assert!((a.value - b.value).abs() < 1e-4, "{a:?} {b:?}");
+        }
+    }
+
+    /// Orbits side by side have the exponents that they have alone: the compiled caricature's with numbers of their own, files' systems of two to four states,
+    /// every transition function; some that cannot be followed, and vectors that shrink by far more than a step may.
+    #[test]
+    fn exponents_side_by_side_are_those_alone() {
+        let compiled = |alpha: f64| System::from(Caricature::with_reinjection(alpha, 1e-5));
+        let caricature = |alpha: f64, switch: SwitchSpec| {
+            let question = question(compiled(alpha), switch, 4.0);
+            let settings = lyapunov::Settings { transient: 1.0, ..question.settings };
+            LargestExponent { start: vec![0.2, alpha, -1.0], settings, ..question }
+        };
+        let smoothed = |eps: f64, transition: Transition| SwitchSpec::Smoothed { eps, transition };
+        let mut all: Vec<(Vec<LargestExponent>, bool)> = Vec::new();
+        let transitions =
+            [Transition::PerturbedTanh { sigma: 0.1 }, Transition::Arctan, Transition::Algebraic, Transition::Erf];
+        for transition in transitions {
+            all.push(((1..4).map(|k| caricature(0.1 * f64::from(k), smoothed(1e-2, transition))).collect(), true));
+        }
+        let tanh =
+            |k: u32| caricature(0.1 + 0.002 * f64::from(k), smoothed(1e-2 / f64::from(1 + k % 3), Transition::Tanh));
+        let mut many: Vec<_> = (0..70).map(tanh).collect();
+        many[7].start[0] = f64::NAN;
+        many[9].start[1] = 1e200;
+        all.push((many, true));
+        for (states, growth) in [(2, "0.9"), (3, "0.9"), (4, "-2")] {
+            let of = |k: u32| {
+                let names = ["x", "y", "z", "w"];
+                let mut fields: Vec<String> = names.iter().map(|name| format!("0 - {name}*{k}")).collect();
+                fields[0] = format!("x*({growth} - x*x) + tanh(y)");
+                let fields: Vec<&str> = fields[..states].iter().map(String::as_str).collect();
+                let system = cases::smooth(&names[..states], "y - 0.3", &fields);
+                let start = vec![0.1 * f64::from(k); states];
+                LargestExponent { start, ..question(system, SwitchSpec::tanh(1e-2), 20.0) }
+            };
+            all.push(((2..7).map(of).collect(), true));
+        }
+        // No exponent before its time: a budget of steps.
+        let poor = |k: u32| {
+            let question = caricature(0.1 + 0.01 * f64::from(k), SwitchSpec::tanh(1e-2));
+            let settings = lyapunov::Settings { max_steps: 500, ..question.settings };
+            LargestExponent { settings, ..question }
+        };
+        all.push(((0..3).map(poor).collect(), true));
+        // Settings that differ, kicks, other equations, five states.
+        let [mut a, b] = [0.1, 0.2].map(|alpha| caricature(alpha, SwitchSpec::tanh(1e-2)));
+        all.push((vec![a.clone(), caricature(0.1, smoothed(1e-2, Transition::Erf))], false));
+        all.push((vec![a.clone(), caricature(0.1, hysteretic())], false));
+        a.settings.duration = 10.0;
+        all.push((vec![a.clone(), b.clone()], false));
+        a.settings.kick = Some(crate::integrate::Kick {
+            every: 1.0,
+            size: 1e-3,
+            law: crate::integrate::KickLaw::Sphere,
+            seed: 1,
+            stream: 1,
+        });
+        all.push((vec![a.clone(), a], false));
+        let five = question(cases::decays(5), SwitchSpec::tanh(1e-2), 9.0);
+        all.push((vec![five.clone(), five], false));
+        for (questions, together) in all {
+            let alone: Vec<Option<Exponent>> = questions
+                .iter()
+                .map(|question| question.found(&question.compute(&Desk::quiet(), &()).unwrap()))
+                .collect();
+            let bits = |all: &[Option<Exponent>]| -> Vec<_> {
+                all.iter().map(|e| e.map(|e| [e.value, e.standard_error, e.duration].map(f64::to_bits))).collect()
+            };
+            let questions: Vec<_> = questions.iter().collect();
+            for set in InstructionSet::ALL.into_iter().filter(|set| set.is_here()) {
+                let found = LargestExponent::side_by_side(&questions, set, &()).unwrap();
+                assert_eq!(found.is_some(), together, "{:?}", questions[0]);
+                if let Some(found) = found {
+                    assert_eq!(bits(&found), bits(&alone), "{set:?} {:?}", questions[0]);
+                }
+            }
+            if questions.len() == 70 {
+                let none = |i: usize| alone[i].is_none();
+                assert!(none(7) && none(9) && !none(8), "{alone:?}");
+            }
         }
     }
 

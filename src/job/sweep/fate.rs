@@ -5,9 +5,10 @@ use serde_json::{Value, json};
 
 use super::far;
 use crate::analyse::attractor::{Evidence, Verdict};
+use crate::analyse::lyapunov::Exponent;
 use crate::integrate::Watch;
 use crate::job::answer::{Answer, Stop};
-use crate::job::classification::Classification;
+use crate::job::classification::{Classification, SoFar};
 use crate::job::desk::Desk;
 use crate::job::question::{JobError, Question};
 use crate::job::run::Run;
@@ -153,16 +154,39 @@ impl Fate {
     /// # Errors
     ///
     /// Whatever the computation met.
-    pub(super) fn judged(&self, desk: &Desk<'_>, answer: &Answer) -> Result<Outcome, JobError> {
+    fn judged(&self, desk: &Desk<'_>, answer: &Answer) -> Result<Outcome, JobError> {
+        match self.so_far(desk, answer)? {
+            SoFar::Judged(outcome) => Ok(outcome),
+            SoFar::Awaits(exponent) => self.with_exponent(answer, exponent.found(&*desk.ask(&*exponent)?)),
+        }
+    }
+
+    /// The same without the orbit's exponent.
+    ///
+    /// # Errors
+    ///
+    /// As [`Fate::judged`].
+    pub(super) fn so_far(&self, desk: &Desk<'_>, answer: &Answer) -> Result<SoFar<Outcome>, JobError> {
         if answer.stop == Stop::Interrupted {
             return Err(JobError::Interrupted);
         }
         let state: Vec<f64> = answer.fact("state")?;
         if self.is_far().is_some_and(|far| far(&state)) {
-            Outcome::far(answer)
-        } else {
-            Outcome::of(&self.0.evidence_of(desk, answer)?, answer)
+            return Ok(SoFar::Judged(Outcome::far(answer)?));
         }
+        Ok(match self.0.so_far(desk, answer)? {
+            SoFar::Judged(evidence) => SoFar::Judged(Outcome::of(&evidence, answer)?),
+            SoFar::Awaits(exponent) => SoFar::Awaits(exponent),
+        })
+    }
+
+    /// What the answer comes to with the exponent that was awaited.
+    ///
+    /// # Errors
+    ///
+    /// If the answer is none to the run's question.
+    pub(super) fn with_exponent(&self, answer: &Answer, exponent: Option<Exponent>) -> Result<Outcome, JobError> {
+        Outcome::of(&self.0.with_exponent(answer, exponent)?, answer)
     }
 }
 
@@ -170,7 +194,6 @@ impl Fate {
 mod tests {
     use super::*;
     use crate::analyse::attractor::{Cycle, Rate};
-    use crate::analyse::lyapunov::Exponent;
     use crate::integrate::Statistics;
     use crate::job::cases;
     use crate::job::spec::Observation;

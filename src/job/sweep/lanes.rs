@@ -4,13 +4,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::SVector;
 
-use super::{Fate, Row, Sweep, far};
+use super::{Fate, Outcome, Row, Sweep, far};
 use crate::analyse::SectionRecorder;
 use crate::analyse::path::MOST_POINTS;
 use crate::integrate::ensemble::{Common, End, InstructionSet, Plane, Run, Tolerances, ensemble_watched};
 use crate::integrate::{Course, StopReason, Summary, Watch};
+use crate::job::answer::Answer;
+use crate::job::classification::SoFar;
 use crate::job::desk::{Desk, Progress};
-use crate::job::question::{JobError, question_hash};
+use crate::job::exponent::LargestExponent;
+use crate::job::question::{JobError, Question, question_hash};
 use crate::job::recording::{Data, Recording};
 use crate::job::spec::{Method, Observation, RunSpec, SwitchSpec};
 use crate::job::table::Entry;
@@ -52,6 +55,14 @@ impl Cell {
                 Some(Plane { coordinate, value })
             }
             _ => None,
+        }
+    }
+
+    /// Its row.
+    fn row(&self, outcome: Result<Outcome, JobError>) -> Row {
+        match outcome {
+            Ok(outcome) => Row::found(self.number, self.settings.clone(), &self.key, outcome),
+            Err(error) => Row::failed(self.number, self.settings.clone(), Some(&self.key), error.to_string()),
         }
     }
 
@@ -269,31 +280,40 @@ fn side_by_side<E: Equations<N>, const N: usize>(
     let display = progress.begin("cells side by side", first.t_end);
     let watch = Both { display: &*display, enough };
     let tolerances: Vec<_> = cells.iter().map(|cell| cell.run().method.tolerance).collect();
-    let common = Common { tolerances: Tolerances::Each(&tolerances), plane, corners, watch: &watch };
+    let common = Common { tolerances: Tolerances::Each(&tolerances), plane, corners, carried: None, watch: &watch };
     let observer = |_| match plane {
         Some(Plane { coordinate, value }) => SectionRecorder::<N>::new(coordinate, value),
         None => SectionRecorder::<N>::new(0, 0.0),
     };
     let mut interrupted = false;
     let mut unfinished = cells.len();
+    // Runs whose verdict waits for an exponent, which costs many times what the run does: those are computed together too.
+    let mut waiting: Vec<Waiting> = Vec::new();
     ensemble_watched(set, equations, &runs, common, observer, &mut |i, end| {
         unfinished -= 1;
         if interrupted || enough.load(Ordering::Relaxed) {
             return;
         }
-        let Cell { number, settings, question, key } = &cells[i];
+        let question = &cells[i].question;
         // What is asked of a run's end is asked at a desk of its own, as if the row were alone.
         let desk = Desk::new(None, progress);
-        let outcome = recorded(end).and_then(|recording| question.judged(&desk, &recording.to_answer(&question.0.run)));
-        let row = match outcome {
-            Ok(outcome) => Row::found(*number, settings.clone(), key, outcome),
+        let outcome = recorded(end).and_then(|recording| {
+            let answer = recording.to_answer(&question.0.run);
+            Ok((question.so_far(&desk, &answer)?, answer))
+        });
+        let outcome = match outcome {
+            Ok((SoFar::Judged(outcome), _)) => Ok(outcome),
+            Ok((SoFar::Awaits(exponent), answer)) => {
+                waiting.push(Waiting { cell: i, answer, exponent });
+                return;
+            }
             Err(JobError::Interrupted) => {
                 interrupted = true;
                 return;
             }
-            Err(error) => Row::failed(*number, settings.clone(), Some(key), error.to_string()),
+            Err(error) => Err(error),
         };
-        if !take(row) {
+        if !take(cells[i].row(outcome)) {
             enough.store(true, Ordering::Relaxed);
         }
     });
@@ -303,6 +323,59 @@ fn side_by_side<E: Equations<N>, const N: usize>(
         return Err(JobError::Interrupted);
     }
     display.done("");
+    if enough.load(Ordering::Relaxed) {
+        return Ok(());
+    }
+    exponents(set, cells, waiting, progress, enough, take)
+}
+
+/// A run that has come to its end, and the exponent that its verdict waits for.
+struct Waiting {
+    /// Which of the cells.
+    cell: usize,
+    answer: Answer,
+    exponent: Box<LargestExponent>,
+}
+
+/// The rows of runs that wait for exponents: these side by side, if there are enough and they share an equation, else one after the other.
+fn exponents(
+    set: InstructionSet,
+    cells: &[Cell],
+    waiting: Vec<Waiting>,
+    progress: &dyn Progress,
+    enough: &AtomicBool,
+    take: &mut dyn FnMut(Row) -> bool,
+) -> Result<(), JobError> {
+    let mut found = None;
+    if waiting.len() >= FEWEST {
+        let questions: Vec<&LargestExponent> = waiting.iter().map(|w| &*w.exponent).collect();
+        let display = progress.begin("exponents side by side", questions[0].extent());
+        let watch = Both { display: &*display, enough };
+        let together = LargestExponent::side_by_side(&questions, set, &watch);
+        match &together {
+            Err(_) => display.done("interrupted"),
+            Ok(_) => display.done(""),
+        }
+        match together {
+            // Nobody wants the rows.
+            Err(_) if enough.load(Ordering::Relaxed) => return Ok(()),
+            together => found = together?,
+        }
+    }
+    for (i, Waiting { cell, answer, exponent }) in waiting.into_iter().enumerate() {
+        let known = match &found {
+            Some(found) => Ok(found[i]),
+            None => Desk::new(None, progress).ask(&*exponent).map(|answer| exponent.found(&answer)),
+        };
+        let outcome = known.and_then(|exponent| cells[cell].question.with_exponent(&answer, exponent));
+        if outcome == Err(JobError::Interrupted) {
+            return Err(JobError::Interrupted);
+        }
+        if !take(cells[cell].row(outcome)) {
+            enough.store(true, Ordering::Relaxed);
+            return Ok(());
+        }
+    }
     Ok(())
 }
 
