@@ -156,8 +156,20 @@ fn rows_that_lanes_do_not_take_are_computed_alone() {
 #[test]
 fn rows_wait_for_exponents_together() {
     let run = RunSpec { switch: SwitchSpec::tanh(1e-2), ..run(Caricature::with_reinjection(0.1, 1e-4).into(), 1000.0) };
-    let sweep = Sweep::new(run, axes(&["params.alpha=0.1,0.11,0.12"]), None).unwrap();
+    let sweep = Sweep::new(run.clone(), axes(&["params.alpha=0.1,0.11,0.12"]), None).unwrap();
     are_the_rows(&sweep);
+    // Of runs that do not share lanes too, by whatever method.
+    let methods = Sweep::new(run, axes(&["method=lsoda,radau5,layered", "params.alpha=0.11,0.12"]), None).unwrap();
+    are_the_rows(&methods);
+    let groups = Exponents::default();
+    let mut words = Vec::new();
+    let mut take = |row: Row| {
+        words.push(row.outcome().to_owned());
+        true
+    };
+    methods.rows_together(&[0, 1, 2, 3, 4, 5], &groups, &mut take).unwrap();
+    assert!(words.iter().filter(|word| ["irregular", "undecided"].contains(&word.as_str())).count() >= 3, "{words:?}");
+    assert_eq!(groups.0.into_inner(), u64::from(InstructionSet::best() != InstructionSet::Portable));
     // Whoever asks to stop while they are computed gets no rows, and who wants no more than one gets no more.
     let numbers = [0, 1, 2];
     let mut none = |row: Row| panic!("row {}", row.number());
@@ -171,6 +183,16 @@ fn rows_wait_for_exponents_together() {
     });
     assert_eq!(enough, Ok(()));
     assert!(words == ["irregular"] || words == ["undecided"], "{words:?}");
+}
+
+/// Counts how often exponents are computed side by side.
+#[derive(Default)]
+struct Exponents(AtomicU64);
+impl Progress for Exponents {
+    fn begin<'a>(&'a self, label: &str, _: f64) -> Box<dyn JobWatch + 'a> {
+        self.0.fetch_add(u64::from(label == "exponents side by side"), Ordering::Relaxed);
+        Box::new(())
+    }
 }
 
 /// Stops exponents.

@@ -131,14 +131,7 @@ impl Question for Fate {
     }
 
     fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
-        let run = &self.0.run;
-        let answer = match (&self.is_far(), run.switch) {
-            // Filippov motion has no layer to be stiff in: it gets to its end.
-            (Some(is_far), SwitchSpec::Smoothed { .. } | SwitchSpec::Hysteretic { .. }) => {
-                simulate_until(run, is_far, watch)?.to_answer(run)
-            }
-            _ => Run(run.clone()).compute(desk, watch)?,
-        };
+        let answer = self.run(desk, watch)?;
         Ok(Answer::of_tables(Vec::new()).with_fact("outcome", &self.judged(desk, &answer)?))
     }
 }
@@ -147,6 +140,22 @@ impl Fate {
     /// Whether a state is one that no orbit of the run's system comes back from.
     fn is_far(&self) -> Option<impl Fn(&[f64]) -> bool + use<>> {
         far::corner(&self.0.run).map(|c| move |x: &[f64]| x[1] > c && x[2] > c)
+    }
+
+    /// The answer to the run's question; of a run that goes far, up to there.
+    ///
+    /// # Errors
+    ///
+    /// Whatever the computation met.
+    pub(super) fn run(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+        let run = &self.0.run;
+        match (&self.is_far(), run.switch) {
+            // Filippov motion has no layer to be stiff in: it gets to its end.
+            (Some(is_far), SwitchSpec::Smoothed { .. } | SwitchSpec::Hysteretic { .. }) => {
+                Ok(simulate_until(run, is_far, watch)?.to_answer(run))
+            }
+            _ => Run(run.clone()).compute(desk, watch),
+        }
     }
 
     /// What the answer to the run's question comes to.

@@ -27,6 +27,9 @@ const FEWEST: usize = 3;
 /// other parameters can have.
 const ENOUGH: usize = 32;
 
+/// Rows that lanes do not compute wait for others' exponents until so many are asked for: lanes are full then, twice over, and a run that is killed has not lost many.
+const TOGETHER: usize = 32;
+
 /// States of the systems that run in lanes: compiled once for each number of them, the usual ones.
 const STATES: std::ops::RangeInclusive<usize> = 2..=4;
 
@@ -151,6 +154,12 @@ impl Watch for Both<'_> {
     }
 }
 
+/// A row, or a run that has come to its end and waits for an exponent.
+enum Begun {
+    Row(Row),
+    Waits(Box<Cell>, Answer, Box<LargestExponent>),
+}
+
 impl Sweep {
     /// Whether these two rows would share lanes on this machine: then it pays to ask for many at once.
     pub fn share_lanes(&self, a: u64, b: u64) -> bool {
@@ -211,12 +220,50 @@ impl Sweep {
                 single.extend(group.cells.iter().map(|cell| cell.number));
             }
         }
+        // One after the other, and their exponents some at a time.
+        let (mut cells, mut waiting) = (Vec::new(), Vec::new());
         for number in single {
-            if !take(self.row(number, progress)?) {
-                return Ok(());
+            match self.begun(set, number, progress)? {
+                Begun::Row(row) => {
+                    if !take(row) {
+                        return Ok(());
+                    }
+                }
+                Begun::Waits(cell, answer, exponent) => {
+                    waiting.push(Waiting { cell: cells.len(), answer, exponent });
+                    cells.push(*cell);
+                }
+            }
+            if waiting.len() == TOGETHER {
+                exponents(set, &cells, std::mem::take(&mut waiting), progress, &enough, take)?;
+                cells.clear();
+                if enough.load(Ordering::Relaxed) {
+                    return Ok(());
+                }
             }
         }
-        Ok(())
+        exponents(set, &cells, waiting, progress, &enough, take)
+    }
+
+    /// A row that lanes do not compute; without its exponent, if lanes may compute that.
+    fn begun(&self, set: InstructionSet, number: u64, progress: &dyn Progress) -> Result<Begun, JobError> {
+        let smoothed = |cell: &Cell| matches!(cell.run().switch, SwitchSpec::Smoothed { .. });
+        let Some(cell) = self.cell(number).filter(|cell| set != InstructionSet::Portable && smoothed(cell)) else {
+            return Ok(Begun::Row(self.row(number, progress)?));
+        };
+        let desk = Desk::new(None, progress);
+        let display = progress.begin(&cell.question.label(), cell.question.extent());
+        let judged = cell.question.run(&desk, &*display).and_then(|answer| {
+            let so_far = cell.question.so_far(&desk, &answer)?;
+            Ok((so_far, answer))
+        });
+        display.done(if judged.is_ok() { "" } else { "failed" });
+        Ok(match judged {
+            Ok((SoFar::Awaits(exponent), answer)) => Begun::Waits(Box::new(cell), answer, exponent),
+            Ok((SoFar::Judged(outcome), _)) => Begun::Row(cell.row(Ok(outcome))),
+            Err(JobError::Interrupted) => return Err(JobError::Interrupted),
+            Err(error) => Begun::Row(cell.row(Err(error))),
+        })
     }
 
     /// Says whether lanes could compute them.
