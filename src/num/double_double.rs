@@ -24,7 +24,7 @@ pub struct DoubleDouble {
 
 /// a + b = s + e exactly (Knuth).
 #[inline]
-pub(super) fn two_sum(a: f64, b: f64) -> (f64, f64) {
+pub(super) const fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let s = a + b;
     let bb = s - a;
     (s, (a - (s - bb)) + (b - bb))
@@ -32,7 +32,7 @@ pub(super) fn two_sum(a: f64, b: f64) -> (f64, f64) {
 
 /// a + b = s + e exactly, for |a| >= |b| (Dekker 1971).
 #[inline]
-fn quick_two_sum(a: f64, b: f64) -> (f64, f64) {
+const fn quick_two_sum(a: f64, b: f64) -> (f64, f64) {
     let s = a + b;
     (s, b - (s - a))
 }
@@ -42,7 +42,7 @@ const SPLITTER: f64 = 134_217_729.0;
 
 /// a = high + low, each of at most 26 bits (Dekker 1971, after Veltkamp).
 #[inline]
-fn split(a: f64) -> (f64, f64) {
+const fn split(a: f64) -> (f64, f64) {
     let t = SPLITTER * a;
     let high = t - (t - a);
     (high, a - high)
@@ -50,7 +50,7 @@ fn split(a: f64) -> (f64, f64) {
 
 /// a b = p + e exactly, unless a part over- or underflows (Dekker 1971).
 #[inline]
-pub(super) fn two_product(a: f64, b: f64) -> (f64, f64) {
+pub(super) const fn two_product(a: f64, b: f64) -> (f64, f64) {
     let p = a * b;
     let ((a1, a2), (b1, b2)) = (split(a), split(b));
     (p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2)
@@ -79,7 +79,7 @@ impl DoubleDouble {
 
     /// The number `high + low`, for parts of any size.
     #[inline]
-    pub fn new(high: f64, low: f64) -> Self {
+    pub const fn new(high: f64, low: f64) -> Self {
         let (high, low) = two_sum(high, low);
         Self { high, low }
     }
@@ -130,13 +130,13 @@ impl DoubleDouble {
 
     /// The nearest `f64`.
     #[inline]
-    pub fn high(self) -> f64 {
+    pub const fn high(self) -> f64 {
         self.high
     }
 
     /// What [`DoubleDouble::high`] leaves out.
     #[inline]
-    pub fn low(self) -> f64 {
+    pub const fn low(self) -> f64 {
         self.low
     }
 
@@ -146,15 +146,49 @@ impl DoubleDouble {
         if self.high < 0.0 { -self } else { self }
     }
 
+    /// The accurate sum: relative error below 2 EPSILON also under cancellation.
     #[inline]
-    fn times_f64(self, b: f64) -> Self {
+    pub(super) const fn plus(self, other: Self) -> Self {
+        let (s, e) = two_sum(self.high, other.high);
+        let (t, f) = two_sum(self.low, other.low);
+        let (s, e) = quick_two_sum(s, e + t);
+        let (high, low) = quick_two_sum(s, e + f);
+        Self { high, low }
+    }
+
+    #[inline]
+    pub(super) const fn negative(self) -> Self {
+        Self { high: -self.high, low: -self.low }
+    }
+
+    #[inline]
+    pub(super) const fn times(self, other: Self) -> Self {
+        let (p, e) = two_product(self.high, other.high);
+        let (high, low) = quick_two_sum(p, e + (self.high * other.low + self.low * other.high));
+        Self { high, low }
+    }
+
+    /// Long division: three quotients.
+    #[inline]
+    pub(super) const fn divided_by(self, other: Self) -> Self {
+        let q1 = self.high / other.high;
+        let r = self.plus(other.times_f64(q1).negative());
+        let q2 = r.high / other.high;
+        let r = r.plus(other.times_f64(q2).negative());
+        let q3 = r.high / other.high;
+        let (high, low) = quick_two_sum(q1, q2);
+        Self { high, low }.plus_f64(q3)
+    }
+
+    #[inline]
+    const fn times_f64(self, b: f64) -> Self {
         let (p, e) = two_product(self.high, b);
         let (high, low) = quick_two_sum(p, e + self.low * b);
         Self { high, low }
     }
 
     #[inline]
-    fn plus_f64(self, b: f64) -> Self {
+    const fn plus_f64(self, b: f64) -> Self {
         let (s, e) = two_sum(self.high, b);
         let (high, low) = quick_two_sum(s, e + self.low);
         Self { high, low }
@@ -224,14 +258,9 @@ impl PartialOrd for DoubleDouble {
 
 impl Add for DoubleDouble {
     type Output = Self;
-    /// The accurate sum: relative error below 2 EPSILON also under cancellation.
     #[inline]
     fn add(self, other: Self) -> Self {
-        let (s, e) = two_sum(self.high, other.high);
-        let (t, f) = two_sum(self.low, other.low);
-        let (s, e) = quick_two_sum(s, e + t);
-        let (high, low) = quick_two_sum(s, e + f);
-        Self { high, low }
+        self.plus(other)
     }
 }
 
@@ -247,7 +276,7 @@ impl Neg for DoubleDouble {
     type Output = Self;
     #[inline]
     fn neg(self) -> Self {
-        Self { high: -self.high, low: -self.low }
+        self.negative()
     }
 }
 
@@ -255,27 +284,16 @@ impl Mul for DoubleDouble {
     type Output = Self;
     #[inline]
     fn mul(self, other: Self) -> Self {
-        let (p, e) = two_product(self.high, other.high);
-        let (high, low) = quick_two_sum(p, e + (self.high * other.low + self.low * other.high));
-        Self { high, low }
+        self.times(other)
     }
 }
 
 impl Div for DoubleDouble {
     type Output = Self;
-    /// Long division: three quotients; two by an `f64`.
+    /// Three quotients; two by an `f64`.
     #[inline]
     fn div(self, other: Self) -> Self {
-        if other.low == 0.0 {
-            return self.over(other.high);
-        }
-        let q1 = self.high / other.high;
-        let r = self - other.times_f64(q1);
-        let q2 = r.high / other.high;
-        let r = r - other.times_f64(q2);
-        let q3 = r.high / other.high;
-        let (high, low) = quick_two_sum(q1, q2);
-        Self { high, low }.plus_f64(q3)
+        if other.low == 0.0 { self.over(other.high) } else { self.divided_by(other) }
     }
 }
 

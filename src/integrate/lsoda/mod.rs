@@ -215,15 +215,14 @@ impl<const N: usize> Lsoda<N> {
     /// The weighted maximum norm.
     #[inline]
     fn norm(&self, v: &SVector<f64, N>) -> f64 {
-        let mut largest = 0.0;
+        let (mut largest, mut sum) = (0.0_f64, 0.0);
         for (v, w) in v.iter().zip(&self.weights) {
             let size = v.abs() * w;
-            // Not f64::max, which would lose a NaN.
-            if size > largest || size.is_nan() {
-                largest = size;
-            }
+            largest = larger(largest, size);
+            sum += size;
         }
-        largest
+        // A NaN is lost in a comparison, and kept in a sum.
+        if sum.is_nan() { not_a_number() } else { largest }
     }
 
     /// The matrix norm that belongs to it: max_i w_i sum_j |J_ij| / w_j.
@@ -376,12 +375,12 @@ impl<const N: usize> Lsoda<N> {
                 if !converged && !self.held && (iteration > 0 || self.family == Family::Bdf) {
                     if iteration > 0 {
                         let rate = if change <= 1024.0 * change_before { change / change_before } else { 1024.0 };
-                        largest_rate = largest_rate.max(rate);
-                        self.rate = (0.2 * self.rate).max(rate);
+                        largest_rate = larger(largest_rate, rate);
+                        self.rate = larger(0.2 * self.rate, rate);
                     }
                     if change * (1.5 * self.rate).min(1.0) <= tolerance {
                         converged = true;
-                        self.lipschitz_seen = self.lipschitz_seen.max(largest_rate / (self.h * l0));
+                        self.lipschitz_seen = larger(self.lipschitz_seen, largest_rate / (self.h * l0));
                         if self.lipschitz_seen != 0.0 {
                             self.lipschitz = self.lipschitz_seen;
                         }
@@ -408,20 +407,41 @@ impl<const N: usize> Lsoda<N> {
         }
     }
 
+    /// Whether no order allows a step that is worth it, by the errors at the next lower, this and the next higher order, and stability is far
+    /// from dictating one: so most selections end, without a root. False may also mean that it is not known.
+    fn nothing_to_gain(&self, lower: f64, same: f64, higher: f64) -> bool {
+        let q = self.order;
+        let stable = || {
+            let least = 1.1 * LEAST_GAIN * (self.h * self.lipschitz).max(1e-6);
+            ADAMS_STABILITY[q.max(2) - 2..ADAMS_ORDERS.min(q + 1)].iter().all(|limit| *limit > least)
+        };
+        lower > NO_GAIN_LOWER[q - 1]
+            && same > NO_GAIN_SAME[q]
+            && higher > NO_GAIN_HIGHER[q + 1]
+            && (self.family == Family::Bdf || stable())
+    }
+
     /// The order and the step ratio for going on, from `error` at the present order. After a failed step
     /// (`failures` > 0) no higher order is considered. `None`: leave both as they are.
     fn select(&mut self, error: f64, failures: u32) -> Option<Change> {
         let (q, formula) = (self.order, self.formula());
-        let mut higher = 0.0;
-        if failures == 0 && q < self.family.highest_order() {
-            let error = self.norm(&(self.correction - self.correction_before)) / formula.higher;
-            higher = growth(BIAS_HIGHER, error, q + 1);
+        let may_rise = failures == 0 && q < self.family.highest_order();
+        let higher_error = if may_rise {
+            self.norm(&(self.correction - self.correction_before)) / formula.higher
+        } else {
+            f64::INFINITY
+        };
+        let lower_error = if q > 1 { self.norm(self.history.column(q)) / formula.lower } else { f64::INFINITY };
+        if failures == 0 && self.nothing_to_gain(lower_error, error, higher_error) {
+            if self.family == Family::Adams {
+                self.lipschitz_seen = 0.0;
+            }
+            self.until_selection = 3;
+            return None;
         }
+        let mut higher = if may_rise { growth(BIAS_HIGHER, higher_error, q + 1) } else { 0.0 };
         let mut same = growth(BIAS_SAME, error, q);
-        let mut lower = 0.0;
-        if q > 1 {
-            lower = growth(BIAS_LOWER, self.norm(self.history.column(q)) / formula.lower, q - 1);
-        }
+        let mut lower = if q > 1 { growth(BIAS_LOWER, lower_error, q - 1) } else { 0.0 };
         let mut stability = f64::INFINITY;
         if self.family == Family::Adams {
             if q < ADAMS_ORDERS {
@@ -520,6 +540,20 @@ impl<const N: usize> Lsoda<N> {
         self.renew_matrix = true;
         self.until_selection = 5;
     }
+}
+
+/// The larger of two numbers, the first if the second is none. `f64::max` minds a NaN in the first too, which takes four more instructions in a chain
+/// that every iteration waits for.
+#[inline(always)]
+fn larger(known: f64, new: f64) -> f64 {
+    if new > known { new } else { known }
+}
+
+/// In a function of its own, so that it is jumped to and not computed and masked in every norm.
+#[cold]
+#[inline(never)]
+fn not_a_number() -> f64 {
+    f64::NAN
 }
 
 /// Error of the BDF formula over error of the Adams formula of the same order, for the same y_(q+1): an e stands for

@@ -51,3 +51,36 @@ const _: () = assert!(SWITCH_ORDERS <= ADAMS_ORDERS);
 pub(super) fn growth(bias: f64, error: f64, order: usize) -> f64 {
     1.0 / (bias * (rough_pow(error, 1.0 / (order + 1) as f64) + 1e-6))
 }
+
+/// Errors at the orders 0, 1, ... above which [`growth`] stays below [`LEAST_GAIN`]: 1 / (bias LEAST_GAIN), to the power order + 1, and a
+/// millionth more for the roundings.
+const fn no_gain(bias: f64) -> [f64; ADAMS_ORDERS + 2] {
+    let base = 1.0 / (bias * LEAST_GAIN);
+    let mut errors = [1.000_001 * base; ADAMS_ORDERS + 2];
+    let mut order = 1;
+    while order < errors.len() {
+        errors[order] = errors[order - 1] * base;
+        order += 1;
+    }
+    errors
+}
+
+pub(super) const NO_GAIN_SAME: [f64; ADAMS_ORDERS + 2] = no_gain(BIAS_SAME);
+pub(super) const NO_GAIN_LOWER: [f64; ADAMS_ORDERS + 2] = no_gain(BIAS_LOWER);
+pub(super) const NO_GAIN_HIGHER: [f64; ADAMS_ORDERS + 2] = no_gain(BIAS_HIGHER);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn above_these_errors_no_order_gains_enough_and_below_them_each_does() {
+        for (bias, errors) in [(BIAS_SAME, NO_GAIN_SAME), (BIAS_LOWER, NO_GAIN_LOWER), (BIAS_HIGHER, NO_GAIN_HIGHER)] {
+            for (order, error) in errors.into_iter().enumerate() {
+                assert!(growth(bias, error, order) < LEAST_GAIN, "bias {bias}, order {order}");
+                // The 1e-6 beside the root counts for up to that much of the gain, as often as the order says in the error.
+                assert!(growth(bias, error * (1.0 - 4e-5), order) > LEAST_GAIN, "bias {bias}, order {order}");
+            }
+        }
+    }
+}

@@ -54,6 +54,17 @@ fn head<T: Pointwise>(x: T) -> T {
     x.map(|v| f64::from_bits(v.to_bits() & !((1 << 27) - 1)))
 }
 
+/// (tanh s - s)/s^3 on |s| <= ln(2)/4 as a polynomial in s^2: with it tanh s is approximated to 2^-60, relatively.
+const TANH: [f64; 7] = [
+    -0.333_333_333_333_333_3,
+    0.133_333_333_333_328_36,
+    -0.053_968_253_965_606_51,
+    0.021_869_488_006_597_864,
+    -0.008_863_185_040_949_143,
+    0.003_589_652_526_481_452_7,
+    -0.001_395_382_800_521_272,
+];
+
 /// Hyperbolic tangent.
 ///
 /// With a = |x| = k ln(2)/2 + r, |r| <= ln(2)/4, T = tanh r and m = 2^-k: tanh a = [(1 - m) + (1 + m) T] / [(1 + m) + (1 - m) T]. T is
@@ -61,23 +72,19 @@ fn head<T: Pointwise>(x: T) -> T {
 /// exact products corrects the quotient. So the only error of size is the last rounding.
 #[inline(always)]
 pub(crate) fn tanh<T: Pointwise>(x: T) -> T {
+    // The comparison is false for NaN, which goes through.
+    let (quotient, correction) = unrounded_tanh(x.map(|v| if v.abs() > TANH_IS_ONE { TANH_IS_ONE } else { v.abs() }));
+    (quotient + correction).map2(x, f64::copysign)
+}
+
+/// For 0 <= a <= [`TANH_IS_ONE`], as the sum of two numbers.
+#[inline(always)]
+pub(super) fn unrounded_tanh<T: Pointwise>(a: T) -> (T, T) {
     const TWO_OVER_LN_2: f64 = 2.885_390_081_777_926_8;
     // ln(2)/2 = C1 + C2: C1 has 44 bits, so that k C1 is exact for k <= 56.
     const C1: f64 = 0.346_573_590_279_945_17;
     const C2: f64 = 2.748_961_509_354_185_6e-14;
-    // (tanh s - s)/s^3 on |s| <= ln(2)/4 as a polynomial in s^2: T is within 2^-60 of tanh s, relatively.
-    const P: [f64; 7] = [
-        -0.333_333_333_333_333_3,
-        0.133_333_333_333_328_36,
-        -0.053_968_253_965_606_51,
-        0.021_869_488_006_597_864,
-        -0.008_863_185_040_949_143,
-        0.003_589_652_526_481_452_7,
-        -0.001_395_382_800_521_272,
-    ];
     let one = T::from_f64(1.0);
-    // The comparison is false for NaN, which goes through.
-    let a = x.map(|v| if v.abs() > TANH_IS_ONE { TANH_IS_ONE } else { v.abs() });
     let rounded = a * T::from_f64(TWO_OVER_LN_2) + T::from_f64(ROUNDER);
     let k = rounded - T::from_f64(ROUNDER);
     let m = rounded.map(|v| f64::from_bits(1023_u64.wrapping_sub(v.to_bits()) << 52));
@@ -86,7 +93,7 @@ pub(crate) fn tanh<T: Pointwise>(x: T) -> T {
     let low = k * T::from_f64(C2);
     let r = s - low;
     let u = r * r;
-    let c = (r * u) * polynomial7(u, P) - low;
+    let c = (r * u) * polynomial7(u, TANH) - low;
 
     // 1 - m and 1 + m, exact sums of two.
     let (minus, plus) = (one - m, one + m);
@@ -110,7 +117,15 @@ pub(crate) fn tanh<T: Pointwise>(x: T) -> T {
     let d_tail = (d - d_head) + d_rest;
     let q_tail = quotient - q_head;
     let remainder = (((n - q_head * d_head) - q_tail * d_head) - quotient * d_tail) + n_rest;
-    (quotient + remainder * inverse).map2(x, f64::copysign)
+    (quotient, remainder * inverse)
+}
+
+/// The same for 0 <= a <= ln(2)/4, to the bit: there k = 0 and m = 1, hence d = 2 without a rest, n and its rest are twice s + c, rounded, and
+/// what that leaves, and the quotient is s + c rounded.
+#[inline(always)]
+pub(super) fn unreduced_tanh(a: f64) -> f64 {
+    let u = a * a;
+    a + (a * u) * polynomial7(u, TANH)
 }
 
 /// Exponential, base e.
