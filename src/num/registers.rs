@@ -293,6 +293,10 @@ impl<S: Simd, const K: usize> Elementary for Registers<S, K> {
     #[inline(always)]
     fn tanh(self) -> Self {
         let Some(set) = self.set else { return Self { constant: Elementary::tanh(self.constant), ..self } };
+        // A number by itself is sooner looked up.
+        if S::F64_LANES == 1 {
+            return self.map(Elementary::tanh);
+        }
         // The kernel gives +-1 there as well; this only saves its work where every lane is outside its layer.
         let inside = self.size().less(Self::splat(set, TANH_IS_ONE), set);
         let nan = self.map(|v| if v.is_nan() { 0.0 } else { 1.0 }).less(Self::splat(set, 0.5), set);

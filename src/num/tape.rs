@@ -480,7 +480,8 @@ impl<'a> Replay<'a> {
                 (p, q) => p.or(q),
             },
             Operation::Sub(a, b) => match (slopes[a], slopes[b]) {
-                (Some(p), Some(q)) => Some(p - q),
+                // Of two fields that differ by a number, say.
+                (Some(p), Some(q)) => (p != q).then(|| p - q),
                 (p, q) => p.or(q.map(|q| -q)),
             },
             Operation::Mul(a, b) => match (slopes[a], slopes[b]) {

@@ -33,9 +33,11 @@ pub(super) struct Formula {
     pub same: f64,
     /// |e - e_before| / `higher` is the error at order q + 1.
     pub higher: f64,
+    /// The corrector's iteration has converged where what is left of it is below this: an error of 1/(2 (q + 2)).
+    pub converged: f64,
 }
 
-const NOTHING: Formula = Formula { l: [0.0; COLUMNS], lower: 0.0, same: 0.0, higher: 0.0 };
+const NOTHING: Formula = Formula { l: [0.0; COLUMNS], lower: 0.0, same: 0.0, higher: 0.0, converged: 0.0 };
 
 /// The product p(s) (s + root), for a polynomial of degree `degree`.
 const fn times(p: [f64; COLUMNS], degree: usize, root: f64) -> [f64; COLUMNS] {
@@ -94,6 +96,7 @@ pub(super) static ADAMS: [Formula; ADAMS_ORDERS] = {
     while q <= ADAMS_ORDERS {
         let formula = &mut table[q - 1];
         formula.same = 1.0 / gamma[q];
+        formula.converged = 0.5 / (q + 2) as f64 * formula.same;
         if q > 1 {
             formula.lower = 1.0 / (gamma[q - 1] * factorial[q]);
         }
@@ -122,11 +125,25 @@ pub(super) static BDF: [Formula; BDF_ORDERS] = {
         // factorial = (q - 1)!: y_q q! / q is h^q x^(q) / q.
         formula.lower = 1.0 / factorial;
         formula.same = (q + 1) as f64 / formula.l[0];
+        formula.converged = 0.5 / (q + 2) as f64 * formula.same;
         formula.higher = (q + 2) as f64 / formula.l[0];
         factorial *= q as f64;
         q += 1;
     }
     table
+};
+
+/// Error of the BDF formula over error of the Adams formula of the same order, for the same y_(q+1), orders 1 to 5 at indices 0 to 4: an e stands for
+/// l_q e, whatever the family. From 1 (order 1, the same formula) upwards.
+pub(super) static ERROR_RATIO: [f64; BDF_ORDERS] = {
+    let mut ratios = [0.0; BDF_ORDERS];
+    let mut q = 1;
+    while q <= BDF_ORDERS {
+        let (adams, bdf) = (&ADAMS[q - 1], &BDF[q - 1]);
+        ratios[q - 1] = adams.same * adams.l[q] / (bdf.same * bdf.l[q]);
+        q += 1;
+    }
+    ratios
 };
 
 /// How far along the negative real axis the predictor-corrector Adams methods of orders 1 to 12 are stable, as

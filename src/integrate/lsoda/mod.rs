@@ -39,7 +39,7 @@ use super::linear::Lu;
 use super::step::{Failure, Statistics, Step, Stepper, Tolerance, finite};
 use crate::num::elementary::{rough_pow, sqrt};
 use crate::system::{VectorField, jacobian};
-use coefficients::{ADAMS, ADAMS_ORDERS, ADAMS_STABILITY, BDF, BDF_ORDERS, Formula};
+use coefficients::{ADAMS, ADAMS_ORDERS, ADAMS_STABILITY, BDF, BDF_ORDERS, ERROR_RATIO, Formula};
 use nordsieck::Nordsieck;
 use selection::*;
 
@@ -339,7 +339,7 @@ impl<const N: usize> Lsoda<N> {
         let (y0, y1) = (*self.history.x(), *self.history.column(1));
         let size = self.norm(&y0);
         self.predicted_size = size;
-        let tolerance = 0.5 / (self.order + 2) as f64 * formula.same;
+        let tolerance = formula.converged;
         let most = if self.held { 200 } else { MOST_ITERATIONS };
         let mut new_matrix = false;
         'start: loop {
@@ -488,8 +488,8 @@ impl<const N: usize> Lsoda<N> {
                     return self.stability_bound.then_some(Change { family: Family::Bdf, order: q, ratio: 2.0 });
                 }
                 // The same derivative, through the other formula's constants.
-                let bdf_error = error * error_ratio(q);
-                // At equal accuracy BDF is never the longer step by SWITCH_RATIO (see `error_ratio`), so stability must
+                let bdf_error = error * ERROR_RATIO[q - 1];
+                // At equal accuracy BDF is never the longer step by SWITCH_RATIO (see [`ERROR_RATIO`]), so stability must
                 // decide: BDF's growth, at most 1/(bias error^(1/(q+1))), against SWITCH_RATIO times the stable growth.
                 // Raised to the power q + 1 this needs no root; nearly every step ends here.
                 let bound = self.lipschitz * self.h / (SWITCH_RATIO * BIAS_SAME * ADAMS_STABILITY[q - 1]);
@@ -505,7 +505,7 @@ impl<const N: usize> Lsoda<N> {
                 (bdf >= SWITCH_RATIO * adams).then_some(Change { family: Family::Bdf, order: q, ratio: bdf })
             }
             Family::Bdf => {
-                let adams_error = error / error_ratio(q);
+                let adams_error = error / ERROR_RATIO[q - 1];
                 let adams = self.adams_growth(adams_error, q, self.jacobian_norm);
                 let bdf = growth(BIAS_SAME, error, q);
                 if adams * SWITCH_RATIO < 5.0 * bdf {
@@ -554,13 +554,6 @@ fn larger(known: f64, new: f64) -> f64 {
 #[inline(never)]
 fn not_a_number() -> f64 {
     f64::NAN
-}
-
-/// Error of the BDF formula over error of the Adams formula of the same order, for the same y_(q+1): an e stands for
-/// l_q e, whatever the family. From 1 (order 1, the same formula) upwards.
-fn error_ratio(q: usize) -> f64 {
-    let (adams, bdf) = (&ADAMS[q - 1], &BDF[q - 1]);
-    adams.same * adams.l[q] / (bdf.same * bdf.l[q])
 }
 
 impl<const N: usize> Stepper<N> for Lsoda<N> {

@@ -49,8 +49,19 @@ const _: () = assert!(SWITCH_ORDERS <= ADAMS_ORDERS);
 
 /// The factor by which the step may grow at `order` if its error was `error`. The 1e-6 keeps it finite at error 0.
 pub(super) fn growth(bias: f64, error: f64, order: usize) -> f64 {
-    1.0 / (bias * (rough_pow(error, 1.0 / (order + 1) as f64) + 1e-6))
+    1.0 / (bias * (rough_pow(error, ROOTS[order]) + 1e-6))
 }
+
+/// 1 / (order + 1).
+static ROOTS: [f64; ADAMS_ORDERS + 2] = {
+    let mut roots = [1.0; ADAMS_ORDERS + 2];
+    let mut order = 1;
+    while order < roots.len() {
+        roots[order] = 1.0 / (order + 1) as f64;
+        order += 1;
+    }
+    roots
+};
 
 /// Errors at the orders 0, 1, ... above which [`growth`] stays below [`LEAST_GAIN`]: 1 / (bias LEAST_GAIN), to the power order + 1, and a
 /// millionth more for the roundings.
