@@ -128,23 +128,25 @@ impl Program {
     #[inline]
     pub fn evaluate<S: Elementary>(&self, x: &[S], out: &mut [S]) {
         assert!(x.len() == self.variables && out.len() == self.outputs.len(), "one number a variable and a value");
+        // Wider numbers than `f64` take so long that how a register is found does not matter: one loop is compiled for them, not three.
+        let wide = const { size_of::<S>() > size_of::<f64>() };
         if self.registers <= Self::FEW {
             let mut registers = [S::zero(); Self::FEW];
             registers[..x.len()].copy_from_slice(x);
-            self.run(&mut registers, out);
+            if wide { self.run(registers.as_mut_slice(), out) } else { self.run(&mut registers, out) }
         } else if self.registers <= Self::ON_STACK {
             let mut registers = [S::zero(); Self::ON_STACK];
             registers[..x.len()].copy_from_slice(x);
-            self.run(&mut registers, out);
+            if wide { self.run(registers.as_mut_slice(), out) } else { self.run(&mut registers, out) }
         } else {
             let mut registers = vec![S::zero(); self.registers];
             registers[..x.len()].copy_from_slice(x);
-            self.run(&mut registers, out);
+            self.run(registers.as_mut_slice(), out);
         }
     }
 
     #[inline]
-    fn run<S: Elementary, R: Results<S>>(&self, r: &mut R, out: &mut [S]) {
+    fn run<S: Elementary, R: Results<S> + ?Sized>(&self, r: &mut R, out: &mut [S]) {
         for i in &self.code {
             let a = r.get(i.a);
             // Made where they are used, most instructions have none.
@@ -241,7 +243,7 @@ impl<S: Copy, const M: usize> Results<S> for [S; M] {
     }
 }
 
-impl<S: Copy> Results<S> for Vec<S> {
+impl<S: Copy> Results<S> for [S] {
     #[inline(always)]
     fn get(&self, i: u16) -> S {
         self[usize::from(i)]
