@@ -160,12 +160,6 @@ impl<const N: usize> Dopri5<N> {
         sum / N as f64
     }
 
-    /// 1 / (atol + rtol |x_i|).
-    #[inline(always)]
-    pub(super) fn weights(&self, x: &SVector<f64, N>) -> SVector<f64, N> {
-        x.map(|x| 1.0 / (self.tolerance.atol + self.tolerance.rtol * x.abs()))
-    }
-
     fn first_step<F: VectorField<N>>(&mut self, field: &F) -> f64 {
         let x = self.x;
         let longest = self.max_step.min(self.t_end - self.t);

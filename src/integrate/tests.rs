@@ -869,16 +869,16 @@ const TAYLOR_EXTENDED: &str = "
     circle: 1 steps, 0 passages, a9f72a752dc73906
 ";
 const LAYERED: &str = "
-    plain: 723 steps, 8 passages, d67da5d440a162f4
-    coarse: 664 steps, 8 passages, 158465d8f1123641
+    plain: 722 steps, 8 passages, 074a86aae90dc67b
+    coarse: 664 steps, 8 passages, e6d90520f738cdfe
     fine: 12 steps, 4 passages, e192f821a28eb49e
     sphere: 22 steps, 4 passages, b8b795aec9690f3d
     cube: 124 steps, 4 passages, 191ed510dee34386
     normal: 84 steps, 4 passages, 12dee75ab60af41c
     circle of two: 22 steps, 4 passages, d0e8a8778279389a
     cap: 202 steps, 4 passages, ed0ce0daa616b78b
-    few: 20 steps, 6 passages, aa7fedbfb7d457e0
-    wide layer: 75 steps, 4 passages, 443769a4ac988ed3
+    few: 20 steps, 6 passages, 47ec5d18ae480d38
+    wide layer: 74 steps, 4 passages, 2caca41c7f9d162a
     circle: 3 steps, 2 passages, 4d87cfb48a50c53e
     crossed: 0 steps, 0 passages, 297971188355b02c
     crossed, coarse: 0 steps, 0 passages, feb98159fad565d4
@@ -889,15 +889,15 @@ const LAYERED: &str = "
     below: 4 steps, 1 passages, 0e16de79f323fe3c
     below: 2 steps, 2 passages, 672515d160e018f6
     turning: 7 steps, 2 passages, 3dc9536c3c0aef3d
-    turning: 30 steps, 3 passages, 90db978ee16020f9
-    sliding: 272 steps, 0 passages, 9a50dce84be34f65
-    sliding: 37 steps, 1 passages, 6c536992546ddb13
-    landing: 296 steps, 0 passages, 488b130d8c2de68c
-    landing: 42 steps, 1 passages, 24ed867dce7dacc1
-    leaving: 30 steps, 0 passages, f67892dd46cf34f0
-    leaving: 17 steps, 1 passages, b9a3c08338aca556
-    grazing: 288 steps, 1 passages, 3531feb533642ad7
-    grazing: 32 steps, 0 passages, 4839b876f591499a
+    turning: 29 steps, 3 passages, 57e882b9095efd8e
+    sliding: 273 steps, 0 passages, a917db2e4f8fc64b
+    sliding: 37 steps, 1 passages, df3154a468d641da
+    landing: 297 steps, 0 passages, a96c1a54804e6bb6
+    landing: 42 steps, 1 passages, 0c65e5c96b8945a0
+    leaving: 30 steps, 0 passages, 159c50518a58c6e0
+    leaving: 17 steps, 1 passages, 7dee35836bf88bf8
+    grazing: 289 steps, 1 passages, b5b33fcd96b142af
+    grazing: 32 steps, 0 passages, b8d019ecb0832f44
     refused: 0 steps, 0 passages, cb46b50074f7eeab
     refused: 0 steps, 0 passages, 85c1a8489a82dcda
     refused: 0 steps, 0 passages, fdf97625a935fed9
@@ -914,11 +914,11 @@ const HYSTERETIC: &str = "
     plain: 215 steps, 3 passages, d75509c823bb6bc1
     plain: 44 steps, 3 passages, 38863e7c1c4c588e
     plain: 71 steps, 3 passages, 0903aaae328908ca
-    plain: 56 steps, 3 passages, 36b08018e75b6cea
+    plain: 56 steps, 3 passages, 8a2e6e4c053a0d24
     kicked: 335 steps, 3 passages, a09cbe745de3a817
     kicked: 60 steps, 3 passages, 3d3c3023211a060f
     kicked: 89 steps, 3 passages, e0e3ca15c72f87b3
-    kicked: 56 steps, 3 passages, 866558bcaba7161a
+    kicked: 56 steps, 3 passages, 9c5cb9bccaa2a509
 ";
 const FILIPPOV_IN_SPACE: &str = "
     all: 689 steps, 0 passages, aaf7f23628b21bcb
