@@ -215,7 +215,14 @@ impl<const N: usize> Lsoda<N> {
     /// The weighted maximum norm.
     #[inline]
     fn norm(&self, v: &SVector<f64, N>) -> f64 {
-        norm(v, &self.weights)
+        let (mut largest, mut sum) = (0.0_f64, 0.0);
+        for (v, w) in v.iter().zip(&self.weights) {
+            let size = v.abs() * w;
+            largest = larger(largest, size);
+            sum += size;
+        }
+        // A NaN is lost in a comparison, and kept in a sum.
+        if sum.is_nan() { not_a_number() } else { largest }
     }
 
     /// The matrix norm that belongs to it: max_i w_i sum_j |J_ij| / w_j.
@@ -231,10 +238,9 @@ impl<const N: usize> Lsoda<N> {
         largest
     }
 
-    fn weigh(&mut self) -> SVector<f64, N> {
+    fn weigh(&mut self) {
         let Tolerance { rtol, atol } = self.tolerance;
         self.weights = self.history.x().map(|x| 1.0 / (rtol * x.abs() + atol));
-        self.weights
     }
 
     /// The first step, Radhakrishnan & Hindmarsh (1993), sec. 3.5: such that an Euler step would make an error
@@ -311,10 +317,6 @@ impl<const N: usize> Lsoda<N> {
     }
 
     /// Evaluates the Jacobian and factorises I - h l_0 J.
-    ///
-    /// Out of line, as whatever few steps do: where the equation is inlined beside a loop, what it makes of that loop's constants is computed before every
-    /// loop, whether it is wanted or not.
-    #[inline(never)]
     fn make_matrix<F: VectorField<N>>(&mut self, field: &F, x: &SVector<f64, N>) -> Result<(), NotConverged> {
         let j = jacobian(field, x);
         let h = self.h * self.formula().l[0];
@@ -330,51 +332,44 @@ impl<const N: usize> Lsoda<N> {
     }
 
     /// Solves the corrector equation e = h f(y_0 + l_0 e) - y_1 from e = 0, by functional iteration (Adams) or Newton
-    /// iteration with a kept matrix (BDF). Returns e and the error of the step in units of the tolerance.
-    ///
-    /// What a step waits for - the prediction, the weights, e - is passed on in registers. Through memory it would be written in the halves of a
-    /// register that suit one function and read in those that suit another, which a processor can do only when the writing is over.
-    #[inline(always)]
-    fn correct<F: VectorField<N>>(
-        &mut self,
-        field: &F,
-        [y0, y1]: [SVector<f64, N>; 2],
-        weights: &SVector<f64, N>,
-    ) -> Result<(SVector<f64, N>, f64), NotConverged> {
+    /// iteration with a kept matrix (BDF). Returns the error of the step in units of the tolerance.
+    fn correct<F: VectorField<N>>(&mut self, field: &F) -> Result<f64, NotConverged> {
         let formula = self.formula();
         let l0 = formula.l[0];
-        let size = norm(&y0, weights);
+        let (y0, y1) = (*self.history.x(), *self.history.column(1));
+        let size = self.norm(&y0);
         self.predicted_size = size;
         let tolerance = formula.converged;
         let most = if self.held { 200 } else { MOST_ITERATIONS };
         let mut new_matrix = false;
-        let mut derivative = field.eval(&y0);
         'start: loop {
+            let mut x = y0;
+            let mut derivative = field.eval(&x);
             self.statistics.evaluations += 1;
             if self.family == Family::Bdf && self.renew_matrix {
-                self.make_matrix(field, &y0)?;
+                self.make_matrix(field, &x)?;
                 new_matrix = true;
             }
-            let mut correction = SVector::zeros();
+            self.correction = SVector::zeros();
             let (mut change_before, mut largest_rate) = (0.0, 0.0_f64);
             let mut iteration = 0;
             loop {
                 let change = match self.family {
                     Family::Adams => {
                         let e = derivative * self.h - y1;
-                        let change = norm(&(e - correction), weights);
-                        correction = e;
+                        let change = self.norm(&(e - self.correction));
+                        self.correction = e;
                         change
                     }
                     Family::Bdf => {
-                        let residual = derivative * self.h - (y1 + correction);
+                        let residual = derivative * self.h - (y1 + self.correction);
                         let Some(matrix) = &self.matrix else { return Err(NotConverged) };
                         let delta = matrix.solve(residual);
-                        correction += delta;
-                        norm(&delta, weights)
+                        self.correction += delta;
+                        self.norm(&delta)
                     }
                 };
-                let x = y0 + correction * l0;
+                x = y0 + self.correction * l0;
                 let mut converged = change <= 100.0 * size * EPSILON;
                 // Functional iteration may not stop on the first pass: a rate is known only from the second on.
                 if !converged && !self.held && (iteration > 0 || self.family == Family::Bdf) {
@@ -392,8 +387,8 @@ impl<const N: usize> Lsoda<N> {
                     }
                 }
                 if converged {
-                    let error = if iteration == 0 { change } else { norm(&correction, weights) };
-                    return Ok((correction, error / formula.same));
+                    let error = if iteration == 0 { change } else { self.norm(&self.correction) };
+                    return Ok(error / formula.same);
                 }
                 iteration += 1;
                 // Written so that a NaN counts as divergence.
@@ -403,7 +398,6 @@ impl<const N: usize> Lsoda<N> {
                         return Err(NotConverged);
                     }
                     self.renew_matrix = true;
-                    derivative = evaluated_again(field, &y0);
                     continue 'start;
                 }
                 change_before = change;
@@ -536,21 +530,7 @@ impl<const N: usize> Lsoda<N> {
         accurate.min(stable)
     }
 
-    /// Why the corrector does not converge from (t0, x0), however short the step.
-    #[cold]
-    #[inline(never)]
-    fn gives_up<F: VectorField<N>>(&self, field: &F, t0: f64, x0: &SVector<f64, N>) -> Failure {
-        let x = x0 + self.history.column(1);
-        if finite(&field.eval(&x)) {
-            Failure::NotConverged { t: t0, h: self.h, state: Failure::state(x0) }
-        } else {
-            Failure::NotFinite { t: t0, state: Failure::state(x0) }
-        }
-    }
-
     /// After repeated failures the history is not to be believed: keep x alone, at order 1 and a tenth of the step.
-    #[cold]
-    #[inline(never)]
     fn start_over<F: VectorField<N>>(&mut self, field: &F) {
         self.h *= SHRINK_RESET;
         let x = *self.history.x();
@@ -560,26 +540,6 @@ impl<const N: usize> Lsoda<N> {
         self.renew_matrix = true;
         self.until_selection = 5;
     }
-}
-
-/// In a function of its own, so that nothing of the equation at `x` is computed beforehand for a loop that is seldom gone through twice.
-#[cold]
-#[inline(never)]
-fn evaluated_again<F: VectorField<N>, const N: usize>(field: &F, x: &SVector<f64, N>) -> SVector<f64, N> {
-    field.eval(x)
-}
-
-/// max_i w_i |v_i|.
-#[inline(always)]
-fn norm<const N: usize>(v: &SVector<f64, N>, weights: &SVector<f64, N>) -> f64 {
-    let (mut largest, mut sum) = (0.0_f64, 0.0);
-    for (v, w) in v.iter().zip(weights) {
-        let size = v.abs() * w;
-        largest = larger(largest, size);
-        sum += size;
-    }
-    // A NaN is lost in a comparison, and kept in a sum.
-    if sum.is_nan() { not_a_number() } else { largest }
 }
 
 /// The larger of two numbers, the first if the second is none. `f64::max` minds a NaN in the first too, which takes four more instructions in a chain
@@ -632,16 +592,16 @@ impl<const N: usize> Stepper<N> for Lsoda<N> {
             self.carry_out_pending();
             self.stop_at_end();
         }
-        let weights = self.weigh();
+        self.weigh();
         let (t0, x0) = (self.t, *self.history.x());
         let underflow = |h: f64| Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) };
         // Tolerances below the rounding of x itself (or zero: a NaN here).
-        let rounding = norm(&x0, &weights) * EPSILON;
+        let rounding = self.norm(&x0) * EPSILON;
         if rounding > 1.0 || rounding.is_nan() {
             return Err(underflow(self.h));
         }
         let (mut not_converged, mut too_inaccurate) = (0, 0);
-        let (correction, error) = loop {
+        let error = loop {
             if self.family == Family::Bdf {
                 let drift = self.h * self.formula().l[0] / self.matrix_h - 1.0;
                 let age = self.statistics.steps - self.matrix_step;
@@ -649,10 +609,10 @@ impl<const N: usize> Stepper<N> for Lsoda<N> {
                     self.renew_matrix = true;
                 }
             }
-            let predicted = self.history.predict(self.order);
-            let corrected = self.correct(field, predicted, &weights);
+            self.history.predict(self.order);
+            let corrected = self.correct(field);
             match corrected {
-                Ok((correction, error)) if error <= 1.0 || self.held => break (correction, error),
+                Ok(error) if error <= 1.0 || self.held => break error,
                 _ => {}
             }
             self.history.retract(self.order);
@@ -663,12 +623,17 @@ impl<const N: usize> Stepper<N> for Lsoda<N> {
                     self.statistics.convergence_failures += 1;
                     not_converged += 1;
                     if not_converged == MOST_FAILURES {
-                        return Err(self.gives_up(field, t0, &x0));
+                        let x = x0 + *self.history.column(1);
+                        return Err(if finite(&field.eval(&x)) {
+                            Failure::NotConverged { t: t0, h: self.h, state: Failure::state(&x0) }
+                        } else {
+                            Failure::NotFinite { t: t0, state: Failure::state(&x0) }
+                        });
                     }
                     self.renew_matrix = true;
                     self.change_step(SHRINK_NOT_CONVERGED);
                 }
-                Ok((_, error)) => {
+                Ok(error) => {
                     self.statistics.rejected += 1;
                     too_inaccurate += 1;
                     if too_inaccurate == MOST_FAILURES {
@@ -687,8 +652,7 @@ impl<const N: usize> Stepper<N> for Lsoda<N> {
             }
         };
 
-        self.correction = correction;
-        let x1 = self.history.correct(self.order, self.formula(), correction);
+        self.history.correct(self.order, self.formula(), &self.correction);
         self.t = t0 + self.h;
         if (self.t - self.t_end).abs() <= 100.0 * EPSILON * (self.t.abs() + self.h) {
             self.t = self.t_end;
@@ -700,6 +664,7 @@ impl<const N: usize> Stepper<N> for Lsoda<N> {
 
         // A first step may be below the spacing of numbers at t and soon grows; a run of such steps will not.
         self.standing_still = if self.t > t0 { 0 } else { self.standing_still + 1 };
+        let x1 = *self.history.x();
         if !finite(&x1) {
             return Err(Failure::NotFinite { t: t0, state: Failure::state(&x0) });
         }

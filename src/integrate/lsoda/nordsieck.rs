@@ -34,71 +34,54 @@ impl<const N: usize> Nordsieck<N> {
         &self.y[0]
     }
 
-    /// Taylor's formula one step ahead: multiplication by Pascal's triangle, by additions alone. Returns the state and h times its derivative there.
-    #[inline(always)]
-    pub fn predict(&mut self, order: usize) -> [SVector<f64, N>; 2] {
+    /// Taylor's formula one step ahead: multiplication by Pascal's triangle, by additions alone.
+    pub fn predict(&mut self, order: usize) {
         match order {
-            1 => self.moved::<1, true>(),
-            2 => self.moved::<2, true>(),
-            3 => self.moved::<3, true>(),
-            4 => self.moved::<4, true>(),
-            5 => self.moved::<5, true>(),
-            6 => self.moved::<6, true>(),
-            7 => self.moved::<7, true>(),
-            8 => self.moved::<8, true>(),
-            9 => self.moved::<9, true>(),
-            10 => self.moved::<10, true>(),
-            11 => self.moved::<11, true>(),
-            _ => self.moved::<12, true>(),
+            1 => self.predict_of::<1>(),
+            2 => self.predict_of::<2>(),
+            3 => self.predict_of::<3>(),
+            4 => self.predict_of::<4>(),
+            5 => self.predict_of::<5>(),
+            6 => self.predict_of::<6>(),
+            7 => self.predict_of::<7>(),
+            8 => self.predict_of::<8>(),
+            9 => self.predict_of::<9>(),
+            10 => self.predict_of::<10>(),
+            11 => self.predict_of::<11>(),
+            _ => self.predict_of::<12>(),
         }
     }
 
-    /// Undoes [`Nordsieck::predict`] up to rounding.
-    #[inline(never)]
-    pub fn retract(&mut self, order: usize) {
-        match order {
-            1 => self.moved::<1, false>(),
-            2 => self.moved::<2, false>(),
-            3 => self.moved::<3, false>(),
-            4 => self.moved::<4, false>(),
-            5 => self.moved::<5, false>(),
-            6 => self.moved::<6, false>(),
-            7 => self.moved::<7, false>(),
-            8 => self.moved::<8, false>(),
-            9 => self.moved::<9, false>(),
-            10 => self.moved::<10, false>(),
-            11 => self.moved::<11, false>(),
-            _ => self.moved::<12, false>(),
-        };
-    }
-
-    /// For one order, so that the columns stay in registers from the first sum to the last: through memory each would wait for the one
+    /// For one order, so that the columns stay in registers from the first addition to the last: through memory each would wait for the one
     /// before to be written and read again.
-    #[inline(always)]
-    fn moved<const ORDER: usize, const AHEAD: bool>(&mut self) -> [SVector<f64, N>; 2] {
+    #[inline]
+    fn predict_of<const ORDER: usize>(&mut self) {
         let mut y = self.y;
         for start in (0..ORDER).rev() {
             for j in start..ORDER {
                 let next = y[j + 1];
-                if AHEAD {
-                    y[j] += next;
-                } else {
-                    y[j] -= next;
-                }
+                y[j] += next;
             }
         }
         self.y[..=ORDER].copy_from_slice(&y[..=ORDER]);
-        [y[0], y[1]]
     }
 
-    /// y <- y + l e. Returns the state.
-    #[inline(always)]
-    pub fn correct(&mut self, order: usize, formula: &Formula, e: SVector<f64, N>) -> SVector<f64, N> {
+    /// Undoes [`Nordsieck::predict`] up to rounding.
+    pub fn retract(&mut self, order: usize) {
+        for start in (0..order).rev() {
+            for j in start..order {
+                let next = self.y[j + 1];
+                self.y[j] -= next;
+            }
+        }
+    }
+
+    /// y <- y + l e.
+    pub fn correct(&mut self, order: usize, formula: &Formula, e: &SVector<f64, N>) {
         for (y, l) in self.y[..=order].iter_mut().zip(formula.l) {
             *y += e * l;
         }
         self.degree = order;
-        self.y[0]
     }
 
     /// Goes over to the step `ratio` times as long.
