@@ -41,12 +41,12 @@ pub trait Arithmetic:
         Self::from_f64(1.0)
     }
     /// The product with an `f64` constant.
-    #[inline(always)]
+    #[inline]
     fn scale(self, factor: f64) -> Self {
         self * Self::from_f64(factor)
     }
     /// The quotient by an `f64` constant.
-    #[inline(always)]
+    #[inline]
     fn over(self, divisor: f64) -> Self {
         self / Self::from_f64(divisor)
     }
