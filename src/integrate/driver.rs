@@ -174,9 +174,14 @@ where
             stepper.restart_again(field, t, x, segment.end, longest)?;
         }
         while t < segment.end {
-            let step = stepper.step(field)?;
-            (t, x) = (step.t1, step.x1);
-            let flow = observer.step(&step);
+            // Looked at where it was made: `?` would move it, in other pieces than it was written in, which waits until all are written.
+            let flow = match &stepper.step(field) {
+                Ok(step) => {
+                    (t, x) = (step.t1, step.x1);
+                    observer.step(step)
+                }
+                Err(failure) => return Err(failure.clone()),
+            };
             let steps = stepper.statistics().steps;
             if flow == Flow::Stop {
                 stop = StopReason::Observer;

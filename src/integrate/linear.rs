@@ -28,7 +28,13 @@ impl<T: ComplexField<RealField = f64> + Copy, const N: usize> Lu<T, N> {
                 }
             }
             exchanged[i] = pivot;
-            factors.swap_rows(i, pivot);
+            // By numbers that are known when this is compiled, so that the matrix stays in registers: a row that is looked up sends it through memory, where it
+            // is read before it is written.
+            for row in i + 1..N {
+                if row == pivot {
+                    factors.swap_rows(i, row);
+                }
+            }
             let diagonal = factors[(i, i)];
             // Written so that a NaN is refused as well.
             if !(diagonal.norm1() > 0.0 && diagonal.norm1().is_finite()) {
@@ -52,8 +58,12 @@ impl<T: ComplexField<RealField = f64> + Copy, const N: usize> Lu<T, N> {
     /// The solution of A x = b.
     #[inline(always)]
     pub fn solve(&self, mut b: SVector<T, N>) -> SVector<T, N> {
-        for (i, &with) in self.exchanged.iter().enumerate() {
-            b.swap_rows(i, with);
+        for i in 0..N {
+            for row in i + 1..N {
+                if row == self.exchanged[i] {
+                    b.swap_rows(i, row);
+                }
+            }
         }
         for i in 1..N {
             for j in 0..i {
