@@ -172,13 +172,9 @@ torture: ## kill the program at random moments and look for losses: make torture
 	@$(CARGO) build --release --locked --bin twofold
 	@scripts/torture.sh $(or $(KILLS),100)
 
-# Scratch trees and builds of its own under target/; a call goes on where the last one was stopped. As root, the tests run as nobody: a mutant of code
-# that writes files must not be let loose on the system's.
 .PHONY: mutants
-mutants: ## mutation testing, all mutants in one build (docs/mutants.md): make mutants ROOMS="record compare" SLOW=5 JOBS=1 KEEP="num record" UNITS=record (Linux, util-linux; hours)
-	@$(CARGO) build --locked --quiet --manifest-path scripts/mutants/Cargo.toml
-	@scripts/mutants/target/debug/mutants --rooms "$(or $(ROOMS),record compare)" --scratch target/mutants --slow $(or $(SLOW),5) --jobs $(or $(JOBS),1) \
-	$(if $(KEEP),--keep "$(KEEP)" --tests units) $(if $(UNITS),--units "$(UNITS)") $$(if [ $$(id -u) = 0 ]; then echo --user 65534; fi)
+mutants: ## mutation testing of .cargo/mutants.toml's files; not as root (needs cargo-mutants: cargo install --locked cargo-mutants; hours)
+	@$(CARGO) mutants --output target $(MUTANTS_FLAGS)
 
 .PHONY: fuzz
 fuzz: ## every reader of foreign bytes against inputs made by chance: make fuzz FUZZ_SECONDS=600 FUZZ="spec png"

@@ -1,5 +1,5 @@
 //! Bad input, bad places, bad moments: one clear message that says what to change, the exit code that the help names, nothing half
-//! written, existing files intact, no litter. No test here aims at a real device: a mutant of the code under test would replace it.
+//! written, existing files intact, no litter. No test aims at a real device: code that is wrong on purpose (make mutants) would replace it.
 
 use std::fs;
 use std::io::Write as _;
