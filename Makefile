@@ -124,19 +124,13 @@ report-test: ## the same with axe-core's and html-validate's rules (needs Node w
 	@cd $(REPORT_TEST) && npm ci --ignore-scripts --no-audit --no-fund --silent
 	@node scripts/browser_test.mjs --require --modules $(REPORT_TEST)/node_modules $(BROWSER_TEST)
 
-# Sweeps on clusters that these targets start themselves, on this machine (cluster/, docs/sweeps.md).
-.PHONY: sweep-hq sweep-slurm
+# A sweep on a cluster that this target starts itself, on this machine (cluster/, docs/sweeps.md).
+.PHONY: sweep-hq
 sweep-hq: ## a sweep on HyperQueue; tasks are killed at random, then the whole cluster: the same bytes as one process (needs Python 3.9 or newer and PyPI)
 	@$(PYTHON) -m venv target/hq/venv
 	@target/hq/venv/bin/python -m pip install --quiet --disable-pip-version-check -r cluster/requirements-hq.txt
 	@$(CARGO) build --release --locked --bin twofold
 	@target/hq/venv/bin/python cluster/test_hq.py target/release/twofold target/hq/test
-
-sweep-slurm: ## the same on Slurm by Snakemake's job arrays; a job killed, one cancelled, a node drained (needs slurm-wlm, munge, Python 3.11 or newer and PyPI)
-	@$(PYTHON) -m venv target/slurm/venv
-	@target/slurm/venv/bin/python -m pip install --quiet --disable-pip-version-check -r cluster/requirements-slurm.txt
-	@$(CARGO) build --release --locked --bin twofold
-	@target/slurm/venv/bin/python cluster/test_slurm.py target/release/twofold target/slurm/test
 
 .PHONY: python-test deny
 PYTHON  ?= python3
