@@ -34,7 +34,7 @@ test: ## all tests, in the debug profile
 	@$(CARGO) test --locked
 
 rigor-test: ## millions of interval operations against exact integer arithmetic (minutes)
-	@$(CARGO) test --release --locked --test rigor_interval -- --ignored
+	@$(CARGO) test --release --locked --test it rigor_interval:: -- --ignored
 
 # 2^24 points a function; make elementary SKIP= : tanh and exp at 2^30 points too (half an hour).
 SKIP := --skip 2_30
@@ -172,7 +172,7 @@ mutants: ## mutation testing of .cargo/mutants.toml's files; not as root (needs 
 
 .PHONY: fuzz
 fuzz: ## every reader of foreign bytes against inputs made by chance: make fuzz FUZZ_SECONDS=600 FUZZ="spec png"
-	@FUZZ_SECONDS=$(or $(FUZZ_SECONDS),60) FUZZ="$(FUZZ)" $(CARGO) test --locked --quiet --test fuzz -- --nocapture every_reader
+	@FUZZ_SECONDS=$(or $(FUZZ_SECONDS),60) FUZZ="$(FUZZ)" $(CARGO) test --locked --quiet --test it fuzz::every_reader -- --nocapture
 
 .PHONY: fuzz-coverage
 fuzz-coverage: ## the same readers against libFuzzer, which sees coverage: make fuzz-coverage FUZZ_SECONDS=600 FUZZ="spec png" (needs a C++ compiler)
@@ -183,7 +183,7 @@ fuzz-coverage: ## the same readers against libFuzzer, which sees coverage: make 
 symbols: ## no program and no module asks the platform for mathematics: all of them are built and their ELF files read (Linux)
 	@$(CARGO) build --release --locked --workspace
 	@found=$$(find target/release -maxdepth 1 -type f \( -executable -o -name 'lib_native.so' \) ! -name '.*'); \
-	TWOFOLD_PROGRAMS="$$found $(PROGRAMS)" $(CARGO) test --locked --quiet --test binary -- --ignored --nocapture
+	TWOFOLD_PROGRAMS="$$found $(PROGRAMS)" $(CARGO) test --locked --quiet --test it binary:: -- --ignored --nocapture
 
 .PHONY: check-arch check-levels reprotest
 check-arch: ## the same bytes on arm64, s390x, i686, riscv64 and wasm, emulated (and on windows, by wine, if named): make check-arch TARGETS="s390x" (Debian; scripts/check-arch.sh says what it needs)

@@ -1,5 +1,5 @@
 //! What is fuzzed: every reader of foreign bytes. A reader may refuse; it must not panic, hang, or take memory that its input does not pay for. Where something is read that can be written
-//! again, it must come back the same. Two drivers make the inputs: tests/fuzz.rs, which needs no tool, and libFuzzer (fuzz/Cargo.toml), which sees what an input runs through.
+//! again, it must come back the same. Two drivers make the inputs: tests/it/fuzz.rs, which needs no tool, and libFuzzer (fuzz/Cargo.toml), which sees what an input runs through.
 
 use twofold::job::spec::{FunnelSpec, Observation, RunSpec, SwitchSpec};
 use twofold::job::sweep::Rows;

@@ -25,7 +25,7 @@
 //!
 //! # Walls
 //!
-//! `tests/architecture.rs` holds them up: a room imports only rooms below it; only `paper` and what stands above it knows the paper; only `cli` knows
+//! `tests/it/architecture.rs` holds them up: a room imports only rooms below it; only `paper` and what stands above it knows the paper; only `cli` knows
 //! flags and terminals; only `record` touches files; only `num` names a math library; only `render` names plotters; nothing but a progress display
 //! reads a clock; parallelism is over independent jobs, collected in order.
 //!

@@ -1,7 +1,7 @@
 //! Error against work: ODEPACK's LSODA, as frozen in tests/data/odepack, and this crate's methods. Not a figure of the paper; it
 //! says how far the methods behind the other figures can be trusted where the answer is known.
 
-#[allow(dead_code)] // what the frozen file says beyond this picture is for tests/odepack.rs
+#[allow(dead_code)] // what the frozen file says beyond this picture is for tests/it/odepack.rs
 mod data;
 #[allow(dead_code)]
 mod problems;

@@ -1,4 +1,4 @@
-//! The test problems of the work-precision picture and of tests/odepack.rs: the same equations, starts and ends as in
+//! The test problems of the work-precision picture and of tests/it/odepack.rs: the same equations, starts and ends as in
 //! scripts/odepack_reference.py.
 
 use nalgebra::{SVector, vector};

@@ -3,7 +3,7 @@
 //!
 //! Each lane has its own time, step size, schedule and end, takes and refuses steps by itself, and is given the next run when its own has
 //! come to an end. So what comes of a run does not depend on its neighbours, on the number of lanes, or on the machine: it is bit for bit
-//! what [`drive`](super::drive) makes of it with [`Dopri5`], because every operation is the same one in the same order (tests/ensemble.rs).
+//! what [`drive`](super::drive) makes of it with [`Dopri5`], because every operation is the same one in the same order (tests/it/ensemble.rs).
 //!
 //! The instruction set is chosen when the program runs ([`InstructionSet`]). It decides how many lanes an instruction takes and nothing else:
 //! no operation is fused, none reordered.

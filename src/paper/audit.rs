@@ -222,7 +222,7 @@ pub fn candidate_table(candidates: &[Candidate]) -> Table {
 }
 
 /// Stands before README's text about the audit.
-pub const BEGIN: &str = "<!-- audit: what figures/audit says; tests/census.rs compares it; do not edit -->";
+pub const BEGIN: &str = "<!-- audit: what figures/audit says; tests/it/census.rs compares it; do not edit -->";
 /// Stands after it.
 pub const END: &str = "<!-- end of audit -->";
 

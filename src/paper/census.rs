@@ -542,7 +542,7 @@ impl Found {
 }
 
 /// Stands before README's text about the census.
-pub const BEGIN: &str = "<!-- census: what figures/census says; tests/census.rs compares it; do not edit -->";
+pub const BEGIN: &str = "<!-- census: what figures/census says; tests/it/census.rs compares it; do not edit -->";
 /// Stands after it.
 pub const END: &str = "<!-- end of census -->";
 
@@ -643,7 +643,7 @@ fn single_run(panel: &str, reading: Reading) -> Option<bool> {
 }
 
 /// Stands before the text about other limits in docs/sweeps.md.
-pub const LIMITS_BEGIN: &str = "<!-- limits: what figures/census says; tests/census.rs compares it; do not edit -->";
+pub const LIMITS_BEGIN: &str = "<!-- limits: what figures/census says; tests/it/census.rs compares it; do not edit -->";
 /// Stands after it.
 pub const LIMITS_END: &str = "<!-- end of limits -->";
 

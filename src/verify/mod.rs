@@ -7,7 +7,7 @@
 //! What a certificate cannot show by itself is that its enclosures hold the flow. Two things are done about that. Numbers that the prover derived from others are
 //! derived again and must be as tight as they can be, so that none can be altered alone; and closed orbits are followed by a plain integrator of this room's
 //! own, orbits from a start are compared with tables computed elsewhere. Then an altered number is noticed from about the sixth digit on, or by the
-//! numbers that rest on it; `tests/verify.rs` alters each in turn and lists what can pass.
+//! numbers that rest on it; `tests/it/verify.rs` alters each in turn and lists what can pass.
 //!
 //! ```
 //! use twofold::verify::{Refused, verify};

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// The limits between one verdict and the next, one set for every panel. They were chosen on systems with known answers
-/// (`tests/attractor.rs`, which also checks that none of those answers changes when a limit moves by a third), and two of them,
+/// (`tests/it/attractor.rs`, which also checks that none of those answers changes when a limit moves by a third), and two of them,
 /// `dot` and `thickness`, with the sizes seen in Dormand-Prince trial runs of the first system studied in view. Every
 /// [`Evidence`](super::Evidence) carries the ones it was made with.
 ///

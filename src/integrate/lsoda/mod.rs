@@ -19,7 +19,7 @@
 //! step just made. The end of the run is a wall (ODEPACK's ITASK 4 and 5): no evaluation is made beyond it, and the end
 //! also sets the scale of the first step, as TOUT does there.
 //!
-//! How near it comes to ODEPACK is tested in tests/odepack.rs. Of 62 runs of its LSODA on ten problems, 27 make the same
+//! How near it comes to ODEPACK is tested in tests/it/odepack.rs. Of 62 runs of its LSODA on ten problems, 27 make the same
 //! decisions from starts 1e-12 apart; there steps, evaluations, Jacobians, orders and switches are the same here, one by
 //! one. In the others rounding decides sooner or later, and the counts here differ from ODEPACK's as ODEPACK's differ from
 //! themselves: steps by at most 14.6 %, evaluations by at most 11.4 %.

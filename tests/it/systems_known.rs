@@ -80,7 +80,7 @@ fn zero(f: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
 fn every_file_has_its_test() {
     let here = include_str!("systems_known.rs");
     for name in twofold::system::library::names() {
-        let elsewhere = ["caricature-as-printed", "wheel"].contains(&name); // tests/misprint.rs, tests/wheel.rs
+        let elsewhere = ["caricature-as-printed", "wheel"].contains(&name); // tests/it/misprint.rs, tests/it/wheel.rs
         assert!(elsewhere || here.contains(&format!("system(\"{name}\")")), "{name}: no known result is tested");
     }
 }

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use twofold::num::random::RandomStream;
 
-#[path = "../fuzz/targets.rs"]
+#[path = "../../fuzz/targets.rs"]
 mod targets;
 
 /// No input is longer.

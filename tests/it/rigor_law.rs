@@ -53,7 +53,7 @@ impl Inner {
 }
 
 fn certificate() -> Value {
-    serde_json::from_str(include_str!("../proofs/certificates/inner-law.json")).unwrap()
+    serde_json::from_str(include_str!("../../proofs/certificates/inner-law.json")).unwrap()
 }
 
 fn bounds(v: &Value) -> (f64, f64) {

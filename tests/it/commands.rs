@@ -197,7 +197,7 @@ fn parameters_that_make_no_sense_are_refused() {
 #[test]
 fn every_command_of_the_manual_runs() {
     let folder = tempfile::tempdir().unwrap();
-    let text = include_str!("../docs/systems.md");
+    let text = include_str!("../../docs/systems.md");
     let mut inside = false;
     let mut count = 0;
     for line in text.lines() {
@@ -312,7 +312,7 @@ fn streamed_rows_are_those_of_the_whole_and_thin_out() {
 /// `make gallery` draws every system that ships.
 #[test]
 fn the_gallery_is_whole() {
-    let script = include_str!("../scripts/gallery.sh");
+    let script = include_str!("../../scripts/gallery.sh");
     let drawn: Vec<&str> = script.lines().filter_map(|l| l.trim().strip_prefix("plot ")?.split(' ').next()).collect();
     for name in twofold::system::library::names() {
         assert!(drawn.contains(&name), "{name}");

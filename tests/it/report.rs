@@ -1,6 +1,6 @@
 //! The report: a page, its twin for programs, and metadata for archives, made from real (short) runs.
 
-mod common;
+use crate::common;
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -1,16 +1,16 @@
 //! CONTRIBUTING's worked examples are built and run, and do what they say.
 
 #[allow(dead_code)]
-#[path = "../examples/own_figure.rs"]
+#[path = "../../examples/own_figure.rs"]
 mod own_figure;
 #[allow(dead_code)]
-#[path = "../examples/own_method.rs"]
+#[path = "../../examples/own_method.rs"]
 mod own_method;
 #[allow(dead_code)]
-#[path = "../examples/own_system.rs"]
+#[path = "../../examples/own_system.rs"]
 mod own_system;
 #[allow(dead_code)]
-#[path = "../examples/returns.rs"]
+#[path = "../../examples/returns.rs"]
 mod returns;
 
 use twofold::integrate::filippov::EventKind;

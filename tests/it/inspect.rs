@@ -1,6 +1,6 @@
 //! `twofold inspect` and `twofold check --against DIR`: what somebody who only has the files can find out.
 
-mod common;
+use crate::common;
 
 use std::fs;
 use std::path::{Path, PathBuf};

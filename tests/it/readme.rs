@@ -58,7 +58,7 @@ fn findings() -> String {
     let (before, rest) = findings.split_once(readme::BEGIN).unwrap();
     let (_, after) = rest.split_once(readme::END).unwrap();
     let findings = format!("{before}{after}");
-    // tests/census.rs compares what the census and the audit say.
+    // tests/it/census.rs compares what the census and the audit say.
     let (before, rest) = findings.split_once(census::BEGIN).unwrap();
     let (_, after) = rest.split_once(census::END).unwrap();
     let findings = format!("{before}{after}");

@@ -6,9 +6,9 @@
 //! them, we must do exactly what it does; elsewhere its own spread is the yardstick, and the 15 % of issue 3 hold.
 
 #[allow(dead_code)]
-#[path = "../figures/workprecision/data.rs"]
+#[path = "../../figures/workprecision/data.rs"]
 mod data;
-#[path = "../figures/workprecision/problems.rs"]
+#[path = "../../figures/workprecision/problems.rs"]
 mod problems;
 
 use data::{Reference, ReferenceProblem, ReferenceRun, reference};
@@ -217,7 +217,7 @@ fn work_precision_rows() {
     assert!(rows.iter().all(|r| r.error.is_finite() && r.evaluations > 0));
 }
 
-/// `cargo test --release --test odepack table -- --ignored --nocapture`
+/// `cargo test --release --test it odepack::table -- --ignored --nocapture`
 #[test]
 #[ignore = "prints the comparison, run by run, for a reader"]
 fn table() {

@@ -1,0 +1,46 @@
+//! All integration tests, one binary: it links once.
+
+mod common;
+
+mod architecture;
+mod arithmetic;
+mod attractor;
+mod audit;
+mod binary;
+mod book;
+mod browser;
+mod census;
+mod claims;
+mod commands;
+mod conformance;
+mod convergence;
+mod crossings;
+mod distribution;
+mod dopri5;
+mod ensemble;
+mod examples;
+mod faults;
+mod filippov;
+mod filippov_limit;
+mod flags;
+mod fuzz;
+mod golden;
+mod inspect;
+mod law;
+mod layered;
+mod misprint;
+mod odepack;
+mod properties;
+mod readme;
+mod records;
+mod report;
+mod rigor_interval;
+mod rigor_law;
+mod rigor_theorems;
+mod sections;
+mod sweep_lanes;
+mod systems;
+mod systems_known;
+mod taylor;
+mod verify;
+mod wheel;
