@@ -169,9 +169,9 @@ where
         let steps_before = stepper.statistics().steps;
         let longest = step_cap.for_segment(segment.end - t);
         if !std::mem::replace(&mut begun, true) {
-            stepper.restart(field, t, x, segment.end, longest)?;
+            stepper.restart(field, t, x, segment.end, longest).map_err(|f| f.diagnosed(&field.tape()))?;
         } else {
-            stepper.restart_again(field, t, x, segment.end, longest)?;
+            stepper.restart_again(field, t, x, segment.end, longest).map_err(|f| f.diagnosed(&field.tape()))?;
         }
         while t < segment.end {
             // Looked at where it was made: `?` would move it, in other pieces than it was written in, which waits until all are written.
@@ -180,7 +180,7 @@ where
                     (t, x) = (step.t1, step.x1);
                     observer.step(step)
                 }
-                Err(failure) => return Err(failure.clone()),
+                Err(failure) => return Err(failure.clone().diagnosed(&field.tape())),
             };
             let steps = stepper.statistics().steps;
             if flow == Flow::Stop {

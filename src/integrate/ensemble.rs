@@ -414,7 +414,8 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         if first.is_none() {
             return self.finish(l, Ok(StopReason::EndTime));
         }
-        self.restart(l, equations).and_then(|failure| self.finish(l, Err(failure)))
+        let failure = self.restart(l, equations)?.diagnosed(&equations.of(run).tape());
+        self.finish(l, Err(failure))
     }
 
     /// Begins the segment of lane `l`.
@@ -604,6 +605,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         for l in 0..Registers::<S, K>::WIDTH {
             let Some(run) = self.lanes[l].as_ref().map(|lane| lane.run) else { continue };
             if let Some(stop) = self.attend_one(l, equations, common, seen) {
+                let stop = stop.map_err(|failure| failure.diagnosed(&equations.of(run).tape()));
                 if let Some(end) = self.finish(l, stop) {
                     finished(run, end);
                 }

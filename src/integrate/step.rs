@@ -3,7 +3,9 @@
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
+use crate::num::Tape;
 use crate::system::VectorField;
+use crate::system::singular::{leaves_domain, undefined};
 
 /// Continuous extension of a method over one step (dense output).
 pub trait Interpolant<const N: usize> {
@@ -214,7 +216,7 @@ pub enum StopReason {
 pub enum Failure {
     /// The state or the right-hand side is infinite or not a number.
     #[error(
-        "the right-hand side or the state is no longer finite at t = {t}, state {state:?}: the orbit escapes; check the parameters and the start"
+        "the right-hand side or the state is no longer finite at t = {t}, state {state:?}: check the parameters and the start"
     )]
     NotFinite {
         /// Time of the last good state.
@@ -222,9 +224,41 @@ pub enum Failure {
         /// The last good state.
         state: Vec<f64>,
     },
+    /// The orbit came to a place where the equation has no value.
+    #[error(
+        "the orbit comes to the end of the field's domain at t = {t}, state {state:?}: {what}; change the expression, or end the run before (--t-end)"
+    )]
+    Undefined {
+        /// Time of the last good state.
+        t: f64,
+        /// The last good state.
+        state: Vec<f64>,
+        /// Which part of the equation has no value.
+        what: String,
+    },
+    /// The solution ends in finite time, or beyond the range of numbers.
+    #[error("the solution grows without bound near t = {t}, state {state:?}: end the run before (--t-end)")]
+    Unbounded {
+        /// When.
+        t: f64,
+        /// The last state.
+        state: Vec<f64>,
+    },
+    /// A method that needs smooth equations has come to a place where this one is not.
+    #[error(
+        "the equation is not smooth at t = {t}, state {state:?}: {what}; a series cannot go on there: use --method dopri5, lsoda or radau5, or make the argument the switching function h"
+    )]
+    NotSmooth {
+        /// When.
+        t: f64,
+        /// Where.
+        state: Vec<f64>,
+        /// Which part of the equation is not.
+        what: String,
+    },
     /// The step became too small to advance time.
     #[error(
-        "step size underflow ({h:e}) at t = {t}, state {state:?}: the tolerances ask for more than f64 can give here; loosen them or use a stiff method"
+        "step size underflow ({h:e}) at t = {t}, state {state:?}: the tolerances ask for more than f64 can give here; loosen them (--rtol, --atol) or compare with another --method"
     )]
     StepUnderflow {
         /// Time reached.
@@ -236,7 +270,7 @@ pub enum Failure {
     },
     /// The budget of steps is used up.
     #[error(
-        "{limit} steps were not enough: stopped at t = {t}, state {state:?}. If the last steps were tiny, the equation is stiff there: use an implicit method (lsoda, radau5); otherwise raise the step limit"
+        "{limit} steps were not enough: stopped at t = {t}, state {state:?}. If the last steps were tiny, the equation is stiff or not smooth there: compare with another --method; otherwise raise the limit of steps (--max-steps)"
     )]
     TooManySteps {
         /// Time reached.
@@ -256,7 +290,7 @@ pub enum Failure {
     },
     /// An implicit method's nonlinear equations could not be solved even with tiny steps.
     #[error(
-        "the implicit equations did not converge at t = {t}, step {h:e}, state {state:?}: the right-hand side is too rough for this method; try another"
+        "the implicit equations did not converge at t = {t}, step {h:e}, state {state:?}: the right-hand side is too rough for this method; compare with another --method"
     )]
     NotConverged {
         /// Time reached.
@@ -269,6 +303,46 @@ pub enum Failure {
 }
 
 impl Failure {
+    /// The failure with its cause, as far as the equation on `tape` shows it: a place where it has no value, or a solution that grows without bound.
+    pub fn diagnosed(self, tape: &Tape) -> Self {
+        let (t, state, far) = match &self {
+            Self::NotFinite { t, state } => (*t, state.clone(), 1.0),
+            // Steps were found too long for another reason, perhaps: only what is near is to blame.
+            Self::StepUnderflow { t, state, .. } | Self::NotConverged { t, state, .. } => (*t, state.clone(), 1e-3),
+            _ => return self,
+        };
+        if state.len() != tape.variables() || state.iter().any(|x| !x.is_finite()) {
+            return self;
+        }
+        if let Some(what) = undefined(tape, &state) {
+            return Self::Undefined { t, state, what };
+        }
+        let field = |x: &[f64]| -> Vec<f64> {
+            let values = tape.values(x);
+            tape.outputs().iter().map(|node| values[*node]).collect()
+        };
+        let derivative = field(&state);
+        let ahead = |time: f64| -> Vec<f64> { state.iter().zip(&derivative).map(|(x, f)| x + time * f).collect() };
+        // The component that grows fastest, in its own size.
+        let growth = |x: &[f64], f: &[f64]| x.iter().zip(f).map(|(x, f)| if *x == 0.0 { 0.0 } else { f / x }).fold(0.0, f64::max);
+        let rate = growth(&state, &derivative);
+        let size = state.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
+        let scale = 1.0 + t.abs();
+        let soon = ahead(0.5 / rate);
+        let faster = growth(&soon, &field(&soon));
+        if size > 1e100 || size > 1e3 && rate * scale > 1e3 && !(faster <= 1.2 * rate) {
+            return Self::Unbounded { t: t + 1.0 / rate, state };
+        }
+        let mut time = 1e-16 * scale;
+        while time < far * scale {
+            if let Some(what) = leaves_domain(tape, &ahead(time)) {
+                return Self::Undefined { t, state, what };
+            }
+            time *= 2.0;
+        }
+        self
+    }
+
     /// The state as the errors carry it.
     pub fn state<const N: usize>(x: &SVector<f64, N>) -> Vec<f64> {
         x.iter().copied().collect()

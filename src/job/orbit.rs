@@ -396,6 +396,9 @@ fn without_tangents(mut failure: Failure, states: usize) -> Failure {
     match &mut failure {
         Failure::NotFinite { state, .. }
         | Failure::StepUnderflow { state, .. }
+        | Failure::Undefined { state, .. }
+        | Failure::Unbounded { state, .. }
+        | Failure::NotSmooth { state, .. }
         | Failure::TooManySteps { state, .. }
         | Failure::NotConverged { state, .. } => state.truncate(states),
         Failure::NotApplicable { .. } => {}

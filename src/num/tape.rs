@@ -109,13 +109,26 @@ pub struct Parameter {
 }
 
 /// The operations of a function of some variables with some values. See the [module](self).
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct Tape {
     variables: usize,
+    /// The variables' names, for messages; none where nobody gave them.
+    names: Vec<String>,
     operations: Vec<Operation>,
     constants: Vec<Decimal>,
     parameters: Vec<Parameter>,
     outputs: Vec<Node>,
+}
+
+impl PartialEq for Tape {
+    /// The same operations; names of variables decide nothing.
+    fn eq(&self, other: &Self) -> bool {
+        self.variables == other.variables
+            && self.operations == other.operations
+            && self.constants == other.constants
+            && self.parameters == other.parameters
+            && self.outputs == other.outputs
+    }
 }
 
 impl Tape {
@@ -137,6 +150,16 @@ impl Tape {
     /// Number of variables.
     pub fn variables(&self) -> usize {
         self.variables
+    }
+
+    /// The same function with names for its variables, which messages use.
+    pub fn with_names(self, names: impl IntoIterator<Item = String>) -> Self {
+        Self { names: names.into_iter().collect(), ..self }
+    }
+
+    /// The name of variable `i`: x1, x2, ... where none was given.
+    pub fn name(&self, i: usize) -> String {
+        self.names.get(i).cloned().unwrap_or_else(|| format!("x{}", i + 1))
     }
 
     /// The operations in order; the variables come first.
@@ -170,7 +193,7 @@ impl Tape {
     }
 
     /// Which operations the outputs need.
-    pub(super) fn needed(&self) -> Vec<bool> {
+    pub fn needed(&self) -> Vec<bool> {
         let mut needed = vec![false; self.operations.len()];
         for output in &self.outputs {
             needed[*output] = true;
@@ -183,6 +206,23 @@ impl Tape {
             }
         }
         needed
+    }
+
+    /// The values of all operations at `x`, in double precision.
+    ///
+    /// # Panics
+    /// If `x` has not as many numbers as the function has variables.
+    pub fn values(&self, x: &[f64]) -> Vec<f64> {
+        assert_eq!(x.len(), self.variables, "one number a variable");
+        let mut values: Vec<f64> = Vec::with_capacity(self.operations.len());
+        for operation in &self.operations {
+            let value = match *operation {
+                Operation::Variable(i) => x[i],
+                other => self.apply(other, Decimal::value, |node| values[node]),
+            };
+            values.push(value);
+        }
+        values
     }
 
     /// The values of the operations that depend on no variable, `None` for the others. `number` reads constants and parameters.

@@ -367,6 +367,7 @@ impl Definition {
             let all = std::iter::once(&self.switching).chain(&self.plus).chain(&self.minus).chain(second);
             all.map(|e| record(e, &known)).collect()
         })
+        .with_names(self.states.iter().map(|s| s.name.clone()))
     }
 
     fn from_document(document: Document) -> Result<Self, Problem> {

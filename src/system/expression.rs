@@ -95,6 +95,43 @@ impl Function {
     }
 }
 
+const COMMA: &str = "a comma has no meaning here";
+
+/// Functions that other languages have, and how they are written here.
+const INSTEAD: [(&str, &str); 30] = [
+    ("max", "max(a, b) = (a + b + abs(a - b))/2"),
+    ("min", "min(a, b) = (a + b - abs(a - b))/2"),
+    ("mod", PHASE),
+    ("fmod", PHASE),
+    ("rem", PHASE),
+    ("floor", PHASE),
+    ("ceil", PHASE),
+    ("round", PHASE),
+    ("log", "ln(x) is the natural logarithm"),
+    ("log10", "log10(x) = ln(x)/ln(10)"),
+    ("log2", "log2(x) = ln(x)/ln(2)"),
+    ("sinh", "sinh(x) = (exp(x) - exp(-x))/2"),
+    ("cosh", "cosh(x) = (exp(x) + exp(-x))/2"),
+    ("arctan", "write atan(x)"),
+    ("atan2", "atan2(y, x) = 2*atan(y/(sqrt(x^2 + y^2) + x)), away from the negative x axis"),
+    ("asin", "asin(x) = atan(x/sqrt(1 - x^2))"),
+    ("arcsin", "asin(x) = atan(x/sqrt(1 - x^2))"),
+    ("acos", "acos(x) = pi/2 - atan(x/sqrt(1 - x^2))"),
+    ("arccos", "acos(x) = pi/2 - atan(x/sqrt(1 - x^2))"),
+    ("sgn", "write sign(x)"),
+    ("signum", "write sign(x)"),
+    ("fabs", "write abs(x)"),
+    ("pow", "powers are written x^2, or exp(p*ln(x)) where p is no whole number"),
+    ("cbrt", "cbrt(x) = sign(x)*exp(ln(abs(x))/3)"),
+    ("hypot", "hypot(a, b) = sqrt(a^2 + b^2)"),
+    ("heaviside", "heaviside(x) = (1 + sign(x))/2; better: make x the switching function h"),
+    ("step", "step(x) = (1 + sign(x))/2; better: make x the switching function h"),
+    ("if", "expressions do not branch: f+ and f- are given apart, h says which one holds"),
+    ("sat", "the saturation of x at -1 and 1 is (abs(x + 1) - abs(x - 1))/2"),
+    ("clip", "x between a and b: (a + b + abs(x - a) - abs(x - b))/2"),
+];
+const PHASE: &str = "carry a phase as two states, its cosine c and sine s (c' = -w*s, s' = w*c); the angle is 2*atan(s/(1 + c))";
+
 /// Whether `name` means something in every expression.
 pub fn is_reserved(name: &str) -> bool {
     name == "pi" || Function::named(name).is_some()
@@ -163,6 +200,7 @@ impl Expression {
         match parser.peek() {
             Token::End => Ok(expression),
             Token::Close => Err(parser.error("this parenthesis was never opened", None)),
+            Token::Comma => Err(parser.error(COMMA, Some("the decimal sign is a point: 1.5".into()))),
             _ => Err(parser.error("an operator is missing here", Some(parser.missing_operator()))),
         }
     }
@@ -252,6 +290,7 @@ enum Token {
     Hat,
     Open,
     Close,
+    Comma,
     End,
 }
 
@@ -283,6 +322,7 @@ fn tokens(text: &str) -> Result<Vec<(Token, Range<usize>)>, ExpressionError> {
             b'^' => (Token::Hat, at + 1),
             b'(' => (Token::Open, at + 1),
             b')' => (Token::Close, at + 1),
+            b',' => (Token::Comma, at + 1),
             b'0'..=b'9' | b'.' => {
                 let mut end = digits(at);
                 if bytes.get(end) == Some(&b'.') {
@@ -324,7 +364,6 @@ fn tokens(text: &str) -> Result<Vec<(Token, Range<usize>)>, ExpressionError> {
                     '<' | '>' | '=' | '?' => {
                         Some("expressions do not branch: f+ and f- are given apart, h says which one holds")
                     }
-                    ',' => Some("the decimal sign is a point, and every function has one argument"),
                     '·' | '×' => Some("products are written a*b"),
                     '−' => Some("this is a typographic minus; write -"),
                     'π' => Some("write pi"),
@@ -477,7 +516,9 @@ impl Parser<'_> {
             Token::End => {
                 Err(self.error("the expression ends where a number, a name or a parenthesis should follow", None))
             }
-            Token::Close => Err(self.error("a number, a name or a parenthesis is missing before this", None)),
+            Token::Close | Token::Comma => {
+                Err(self.error("a number, a name or a parenthesis is missing before this", None))
+            }
             _ => {
                 Err(self
                     .error("two operators in a row; a number, a name or a parenthesis is missing before this", None))
@@ -499,6 +540,7 @@ impl Parser<'_> {
                 span: open,
                 help: Some("add a `)`".into()),
             }),
+            Token::Comma => Err(self.error(COMMA, Some("the decimal sign is a point: 1.5".into()))),
             _ => Err(self.error("an operator or a `)` is missing here", Some(self.missing_operator()))),
         }
     }
@@ -518,6 +560,14 @@ impl Parser<'_> {
                     Some(format!("{name}(...)")),
                 );
             }
+            if let Some(count) = self.arguments().filter(|count| *count != 1) {
+                let given = if count == 0 { "none".into() } else { count.to_string() };
+                let are = if count > 1 { "are" } else { "is" };
+                return error(
+                    format!("`{name}` has one argument; {given} {are} given"),
+                    Some(format!("write {name}(a), with one expression for a")),
+                );
+            }
             return Ok(Expression::Call(function, Box::new(self.parenthesis()?)));
         }
         if self.names.contains(&name) {
@@ -525,13 +575,12 @@ impl Parser<'_> {
         }
         if self.peek() == &Token::Open {
             let functions = Function::ALL.map(|(n, _)| n);
-            let help = match (name, nearest(name, &functions)) {
-                ("log", _) => "write ln(x) for the natural logarithm".into(),
-                ("arctan", _) => "write atan(x)".into(),
-                ("sgn", _) => "write sign(x)".into(),
-                ("pow", _) => "powers are written x^2".into(),
-                (_, Some(near)) => format!("did you mean `{near}`?"),
-                _ => format!("functions are {}", functions.join(", ")),
+            let list = format!("supported functions are {}", functions.join(", "));
+            let lower = name.to_ascii_lowercase();
+            let help = match (INSTEAD.iter().find(|(n, _)| *n == lower), nearest(name, &functions)) {
+                (Some((_, instead)), _) => format!("{name} is not supported: {instead}; {list}"),
+                (None, Some(near)) => format!("did you mean `{near}`? {list}"),
+                (None, None) => list,
             };
             return error(format!("there is no function `{name}`"), Some(help));
         }
@@ -544,6 +593,22 @@ impl Parser<'_> {
             None => format!("known here: {}", self.names.join(", ")),
         };
         error(format!("unknown name `{name}`"), Some(help))
+    }
+
+    /// How many arguments stand in the parentheses that open here; `None` if they are not closed.
+    fn arguments(&self) -> Option<usize> {
+        let (mut depth, mut commas) = (0, 0);
+        for (i, (token, _)) in self.tokens[self.at..].iter().enumerate() {
+            match token {
+                Token::Open => depth += 1,
+                Token::Comma if depth == 1 => commas += 1,
+                Token::Close if depth == 1 => return Some(if i == 1 { 0 } else { commas + 1 }),
+                Token::Close => depth -= 1,
+                Token::End => return None,
+                _ => {}
+            }
+        }
+        None
     }
 
     /// Advice for a token that follows another without an operator.
@@ -613,7 +678,14 @@ mod tests {
     }
 
     /// (text, marked part, message, help)
-    const WRONG: [(&str, &str, &str, &str); 27] = [
+    const WRONG: [(&str, &str, &str, &str); 34] = [
+        ("max(x, 0)", "max", "no function `max`", "(a + b + abs(a - b))/2"),
+        ("1 + min(x, max(x, 1))", "min", "no function `min`", "(a + b - abs(a - b))/2"),
+        ("mod(x, 1)", "mod", "no function `mod`", "cosine c and sine s"),
+        ("Heaviside(x)", "Heaviside", "no function `Heaviside`", "(1 + sign(x))/2"),
+        ("sin(x, alpha)", "sin", "has one argument; 2 are given", "sin(a)"),
+        ("tanh()", "tanh", "has one argument; none is given", "tanh(a)"),
+        ("exp((x, 1))", ",", "no meaning", "point"),
         ("1 + aplha*x", "aplha", "unknown name `aplha`", "did you mean `alpha`?"),
         ("V_plus", "V_plus", "unknown name `V_plus`", "did you mean `v_plus`?"),
         ("sin(t)", "t", "unknown name `t`", "derivative 1"),

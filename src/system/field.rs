@@ -106,6 +106,7 @@ fn blended(minus: Vec<Recorded>, plus: Vec<Recorded>, phi: Recorded) -> Vec<Reco
 
 impl Field {
     fn made(names: Vec<String>, tape: Tape) -> Self {
+        let tape = tape.with_names(names.iter().cloned());
         Self { names, program: Arc::new(Program::new(&tape)), tape: Arc::new(tape), of_one_surface: false }
     }
 

@@ -25,6 +25,7 @@ pub mod hysteretic;
 pub mod instance;
 pub mod library;
 pub mod reversed;
+pub mod singular;
 pub mod smoothed;
 pub mod transition;
 pub mod wheel;

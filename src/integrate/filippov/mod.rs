@@ -327,7 +327,7 @@ pub enum FilippovError {
     },
     /// The budget of events is used up.
     #[error(
-        "{limit} events were not enough: stopped at t = {t}, state {state:?}; raise max_events if the run is meant to have so many"
+        "{limit} events were not enough: stopped at t = {t}, state {state:?}; end the run earlier (--t-end); where switches follow each other so closely, smooth them (--switch smoothed)"
     )]
     TooManyEvents {
         /// Time reached.
