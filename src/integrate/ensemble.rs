@@ -22,7 +22,7 @@ use super::step::{Failure, Flow, Statistics, Step, Stepper, StopReason, Toleranc
 use crate::num::elementary::kernels::{rough_exp2, rough_log2};
 use crate::num::elementary::sqrt;
 use crate::num::{Aligned, Arithmetic, Mask, Registers};
-use crate::system::Equations;
+use crate::system::{Equations, VectorField};
 
 /// A start and what is to happen from there.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -11,17 +11,26 @@
 //! terms are (Cauchy's estimate, below), and a step is as long as keeps that below the tolerance, or as changes the argument by
 //! [`LAYER_STRIDE`], half of eps, where the series shows all that there is.
 //!
+//! **Kinks, jumps, ends of the domain.** The equation tells its signs, roots, logarithms and quotients too. A step ends just behind the first zero of a sign's argument, found
+//! with certainty on its series, as at an event, and the next begins with the other branch. Before a singular operation's argument (a quotient's divisor) is
+//! zero, also in the complex plane, a step has ended: so the method gets as near to a real zero as numbers allow, and says that it cannot go on. A step goes on
+//! where an exponential is, as a bound over the step shows, nothing beside the tolerance, or where its argument changes by so much that its series shows it.
+//!
 //! **The bound.** Beyond w > 0, |tanh(w + c) - 1| = 2/|exp(2 w + 2 c) + 1| is at most M = 2/(exp(2 (w - r)) - 1) for complex |c| <= r < w. If the
 //! argument's terms allow it to move by r at most in a (complex) time R, the coefficient k of tanh's series is at most M/R^k, and what follows degree p at
 //! most M q^(p+1)/(1 - q) in a step q R (Cauchy's estimate; Ahlfors 1979, sec. 4.2.3). The edge is where tanh differs from 1 by the tolerance.
+
+use std::sync::Arc;
 
 use nalgebra::SVector;
 
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
 use crate::num::elementary::{exp, ln, rough_pow};
-use crate::num::series::{Constants, LayerKind, Solution};
+use crate::num::series::{Constants, LayerKind, MarkKind, Solution};
+use crate::num::tape::Node;
 use crate::num::{DoubleDouble, FromDecimal, MultiFloat, Scalar, Tape};
 use crate::system::VectorField;
+use crate::system::singular::{written, written_sign};
 
 /// How far a step inside a layer may always move the argument of its tanh.
 pub const LAYER_STRIDE: f64 = 0.5;
@@ -111,6 +120,10 @@ pub struct Taylor<const N: usize, S = f64> {
     /// exp([`SAFETY_EXPONENT`]/(p - 1)).
     safety: f64,
     layers: Layers,
+    /// The equation, for messages.
+    tape: Arc<Tape>,
+    /// Steps in a row that only passed a sign's zero.
+    landings: i32,
     /// A layer's argument, rounded.
     argument: Vec<f64>,
     /// The last step's series, rounded.
@@ -196,6 +209,8 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
             h: S::zero(),
             safety: exp(SAFETY_EXPONENT / (order - 1) as f64),
             layers: Layers::new::<S>(tolerance, order),
+            tape: Arc::default(),
+            landings: 0,
             argument: Vec::with_capacity(order),
             rounded: Polynomial { coefficients: vec![SVector::zeros()] },
         }
@@ -230,7 +245,8 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         t_end: f64,
         max_step: f64,
     ) -> Result<(), Failure> {
-        self.solution.set_tape(&field.tape(), self.constants);
+        self.tape = field.tape();
+        self.solution.set_tape(&self.tape, self.constants);
         self.begin(&|x| field.eval(x), t, x, t_end, max_step)
     }
 
@@ -249,6 +265,7 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         self.t_end = S::from_f64(t_end);
         self.max_step = max_step;
         self.h = S::zero();
+        self.landings = 0;
         self.statistics.restarts += 1;
         self.statistics.evaluations += 1;
         let rounded = self.x.map(S::to_f64);
@@ -345,6 +362,139 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
     }
 }
 
+impl<const N: usize, S: Precision> Taylor<N, S> {
+    /// The longest step up to `h` before any singular operation's argument can be zero and in which no exponential hides.
+    fn regular_step(&mut self, mut h: f64) -> f64 {
+        for (kind, _, w) in self.solution.marks() {
+            // The argument's own series may end sooner than the state's.
+            let fractions = self.layers.in_fractions(w, h, &mut self.argument);
+            let size = fractions.iter().fold(0.0_f64, |a, c| a.max(c.abs()));
+            let allowed = match kind {
+                MarkKind::Sign => exp(self.layers.log_tolerance) * size,
+                MarkKind::Singular => 0.01 * fractions[0].abs(),
+                MarkKind::Exp | MarkKind::Curved => 0.05,
+            };
+            h *= resolved(fractions, allowed);
+            let fractions = self.layers.in_fractions(w, h, &mut self.argument);
+            let part = match kind {
+                MarkKind::Sign | MarkKind::Curved => continue,
+                MarkKind::Singular => stride_time(fractions, DOMAIN_SHARE * fractions[0].abs(), 1.0),
+                MarkKind::Exp => self.layers.visible(fractions),
+            };
+            if part < 1.0 {
+                h *= part;
+            }
+        }
+        h
+    }
+
+    /// The first zero of a sign's argument in a step of length `h`, if there is one.
+    fn first_switch(&mut self, h: f64) -> Option<(S, Node)> {
+        let mut first: Option<(S, Node)> = None;
+        for (_, node, w) in self.solution.marks().filter(|(kind, _, _)| *kind == MarkKind::Sign) {
+            let Some(theta) = first_crossing(self.layers.in_fractions(w, h, &mut self.argument)) else { continue };
+            // To this precision, by Newton's method, unless it leaves the neighbourhood.
+            let (length, start) = (S::from_f64(h), S::from_f64(h * theta));
+            let mut s = start;
+            for _ in 0..6 {
+                let (mut value, mut slope) = (S::zero(), S::zero());
+                for c in w.iter().rev() {
+                    slope = slope * s + value;
+                    value = value * s + *c;
+                }
+                let next = s - value / slope;
+                if !((next - start).to_f64().abs() <= 1e-6 * h) {
+                    s = start;
+                    break;
+                }
+                s = next;
+            }
+            let s = if s > S::zero() { s } else { S::zero() };
+            if s < length && first.is_none_or(|(other, _)| s < other) {
+                first = Some((s, node));
+            }
+        }
+        first
+    }
+
+    /// The failure, or the singular operation that explains it, where the argument of one is next to zero.
+    fn stuck(&self, failure: Failure) -> Failure {
+        let (Failure::NotFinite { t, state } | Failure::StepUnderflow { t, state, .. }) = &failure else { return failure };
+        let until = |w: &[S]| w[0].to_f64().abs() / w.get(1).map_or(0.0, |c| c.to_f64().abs());
+        let near = |(kind, _, w): &(MarkKind, Node, &[S])| {
+            *kind == MarkKind::Singular && (w[0] == S::zero() || until(w) <= NEXT_TO * (1.0 + t.abs()))
+        };
+        let Some((_, node, w)) = self.solution.marks().find(near) else { return failure };
+        let text = written(&self.tape, node);
+        let argument = self.tape.operations()[node].arguments().last().unwrap_or(node);
+        let argument = written(&self.tape, argument);
+        let what = format!("{text} has no derivative, or no value, where {argument} is zero");
+        let later = if w[0] == S::zero() { 0.0 } else { until(w) };
+        Failure::NotSmooth { t: t + later, state: state.clone(), what }
+    }
+}
+
+/// A failure within this part of 1 + t of an argument's zero is that zero's.
+const NEXT_TO: f64 = 1e-6;
+
+/// A step's share of the way to a zero, in the complex plane, of a singular operation's argument.
+const DOMAIN_SHARE: f64 = 0.9;
+
+/// So many steps in a row that only pass zeros of signs: the motion does not leave them.
+const MOST_LANDINGS: i32 = 14;
+
+/// The part of the unit interval in which the last two terms of the series `c` are `allowed` at most.
+fn resolved(c: &[f64], allowed: f64) -> f64 {
+    let mut part = 1.0_f64;
+    for k in c.len().saturating_sub(2).max(1)..c.len() {
+        if c[k].abs() > allowed {
+            part = part.min(rough_pow(allowed / c[k].abs(), 1.0 / k as f64));
+        }
+    }
+    part
+}
+
+/// Where the polynomial `c` first changes its sign in [0, 1], zero counting as positive.
+fn first_crossing(c: &[f64]) -> Option<f64> {
+    let sign = if c[0] < 0.0 { -1.0 } else { 1.0 };
+    let at = |s: f64| sign * value(c, s);
+    let mut open = vec![(0.0, 1.0)];
+    let mut shifted = Vec::with_capacity(c.len());
+    while let Some((left, right)) = open.pop() {
+        let (middle, radius) = (0.5 * (left + right), 0.5 * (right - left));
+        // Taylor's formula around the middle, by repeated synthetic division.
+        shifted.clear();
+        shifted.extend_from_slice(c);
+        for start in 0..shifted.len() {
+            for j in (start..shifted.len() - 1).rev() {
+                shifted[j] += middle * shifted[j + 1];
+            }
+        }
+        if sign * shifted[0] > travel(&shifted, radius) {
+            continue;
+        }
+        let bend = speed(&shifted, radius) - shifted.get(1).map_or(0.0, |c| c.abs());
+        let monotone = shifted.len() > 1 && shifted[1].abs() > bend;
+        if monotone || radius < 1e-12 {
+            if at(right) < 0.0 {
+                let (mut a, mut b) = (left, right);
+                for _ in 0..200 {
+                    let m = 0.5 * (a + b);
+                    if m <= a || m >= b {
+                        break;
+                    }
+                    if at(m) < 0.0 { b = m } else { a = m }
+                }
+                return Some(b);
+            }
+            continue;
+        }
+        open.push((middle, right));
+        open.push((left, middle));
+    }
+    None
+}
+
 /// What a step may do near a layer.
 #[derive(Clone, Copy, Debug)]
 struct Layers {
@@ -363,6 +513,25 @@ impl Layers {
         let log_tolerance = ln(tolerance.rtol.min(tolerance.atol).clamp(S::EPSILON / 16.0, 1e-2));
         let edge = 0.5 * (std::f64::consts::LN_2 - log_tolerance);
         Self { saturation: S::TANH_SATURATION, log_tolerance, edge, terms: (order + 1) as f64 }
+    }
+
+    /// A series in fractions of `h`, rounded: its coefficients are of ordinary size.
+    fn in_fractions<'a, S: Precision>(&self, w: &[S], h: f64, room: &'a mut Vec<f64>) -> &'a [f64] {
+        let (step, mut power) = (S::from_f64(h), S::one());
+        room.clear();
+        for c in w {
+            room.push((*c * power).to_f64());
+            power = power * step;
+        }
+        room
+    }
+
+    /// The part of a step over which an exponential with the argument `w`, in fractions of the step, is nothing beside the tolerance, or changes
+    /// so little that its series shows it.
+    fn visible(&self, w: &[f64]) -> f64 {
+        let shown = stride_time(w, 0.25 * self.terms, 1.0);
+        let below = self.log_tolerance - EXP_MARGIN - w[0];
+        if shown < 1.0 && below > 0.0 { shown.max(stride_time(w, below, 1.0)) } else { shown }
     }
 
     /// The longest step up to `h` over which the series of the transition function with the argument `w` can be trusted.
@@ -395,6 +564,9 @@ impl Layers {
         q * stride_time(w, r, h / q)
     }
 }
+
+/// ln of the largest factor that an exponential is thought to stand with.
+const EXP_MARGIN: f64 = 20.0;
 
 /// ln(4/(1 - 1/e)).
 const BOUND: f64 = 1.844_969_5;
@@ -522,14 +694,31 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         let remaining = self.t_end - self.t;
         let accurate = self.accurate_step();
         if accurate.is_nan() {
-            return Err(Failure::NotFinite { t: t0, state: Failure::state(&x0) });
+            return Err(self.stuck(Failure::NotFinite { t: t0, state: Failure::state(&x0) }));
         }
-        let h = self.resolved_step(accurate.min(self.max_step).min(remaining.to_f64()));
-        let last = h * 1.000_000_1 >= remaining.to_f64();
-        if h <= t0.abs() * f64::EPSILON || h < f64::MIN_POSITIVE {
-            return Err(Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) });
+        let h = self.regular_step(accurate.min(self.max_step).min(remaining.to_f64()));
+        let h = self.resolved_step(h);
+        let switch = self.first_switch(h);
+        let mut last = switch.is_none() && h * 1.000_000_1 >= remaining.to_f64();
+        if switch.is_none() && (h <= t0.abs() * f64::EPSILON || h < f64::MIN_POSITIVE) {
+            return Err(self.stuck(Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) }));
         }
         self.h = if last { remaining } else { S::from_f64(h) };
+        if let Some((zero, node)) = switch {
+            // Just behind the zero: so far that the argument's rounding cannot undo it, the more the oftener it did.
+            let beyond = S::EPSILON * (t0.abs() + h) * (1_u64 << (2 * self.landings + 2)) as f64;
+            self.landings = if zero.to_f64() > 1e3 * beyond { 0 } else { self.landings + 1 };
+            if self.landings > MOST_LANDINGS {
+                let what = format!("the motion does not leave the jump of {}", written_sign(&self.tape, node));
+                return Err(Failure::NotSmooth { t: t0, state: Failure::state(&x0), what });
+            }
+            self.h = zero + S::from_f64(beyond);
+            if self.h >= remaining {
+                (self.h, last) = (remaining, true);
+            }
+        } else {
+            self.landings = 0;
+        }
         // Summed with what the sums before have lost (Moller 1965; Hairer, Lubich & Wanner 2006, sec. VIII.5): an error is then small beside the step's
         // increment, not beside the state.
         // All components at once: none waits for another.
@@ -549,7 +738,7 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         }
         let x1 = x.map(S::to_f64);
         if !finite(&x1) {
-            return Err(Failure::NotFinite { t: t0, state: Failure::state(&x0) });
+            return Err(self.stuck(Failure::NotFinite { t: t0, state: Failure::state(&x0) }));
         }
         (self.x, self.lost) = (x, lost);
         self.t = if last { self.t_end } else { self.t + self.h };

@@ -18,7 +18,7 @@ use std::any::{Any, TypeId};
 
 use super::Elementary;
 use super::decimal::{Decimal, FromDecimal};
-use super::tape::{Operation, Tape};
+use super::tape::{Node, Operation, Tape};
 use compiled::Opening;
 use plan::{Equation, Plan, advance, start};
 use table::{Columns, LONGEST, ROW, advance_rows, start_rows};
@@ -101,6 +101,27 @@ pub enum LayerKind {
     Erf,
 }
 
+/// How an operation fails to be analytic somewhere, or to show far away what it does near by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MarkKind {
+    /// A sign: jumps where its argument changes sign.
+    Sign,
+    /// A root, a logarithm or a quotient: singular where its argument, or divisor, is zero.
+    Singular,
+    /// An exponential: nothing where its argument is very negative.
+    Exp,
+    /// A transition function (of [`Solution::layer_arguments`]) whose argument is no linear function of the state.
+    Curved,
+}
+
+/// An operation on the tape that a Taylor method must watch: its kind and place, and the series of its argument (divisor).
+#[derive(Clone, Copy, Debug)]
+struct Mark {
+    kind: MarkKind,
+    node: Node,
+    argument: Series,
+}
+
 /// Power series in t, of the solution of x' = f(x) and of everything computed on the way.
 #[derive(Clone, Debug)]
 pub struct Solution<S> {
@@ -114,6 +135,7 @@ pub struct Solution<S> {
     /// The series of the components' derivatives.
     outputs: Vec<Series>,
     layer_arguments: Vec<(LayerKind, Series)>,
+    marks: Vec<Mark>,
     /// The first coefficients compiled, if that is so.
     opening: Option<Opening>,
     /// The plans that were needed so far.
@@ -134,6 +156,7 @@ impl<S: Elementary + FromDecimal> Solution<S> {
             recurrences: Vec::new(),
             outputs: Vec::new(),
             layer_arguments: Vec::new(),
+            marks: Vec::new(),
             opening: None,
             plans: Vec::new(),
         };
@@ -159,13 +182,38 @@ impl<S: Elementary + FromDecimal> Solution<S> {
         };
         compiler.recurrences.clear();
         self.layer_arguments.clear();
+        self.marks.clear();
         let needed = tape.needed();
+        let mut linear: Vec<bool> = Vec::with_capacity(tape.operations().len());
+        for (node, operation) in tape.operations().iter().enumerate() {
+            let fixed = |node: Node| compiler.fixed[node].is_some();
+            linear.push(match *operation {
+                Operation::Variable(_) => true,
+                _ if fixed(node) => true,
+                Operation::Add(a, b) | Operation::Sub(a, b) => linear[a] && linear[b],
+                Operation::Neg(a) => linear[a],
+                Operation::Mul(a, b) => linear[a] && fixed(b) || fixed(a) && linear[b],
+                Operation::Div(a, b) => linear[a] && fixed(b),
+                _ => false,
+            });
+        }
         for (node, operation) in tape.operations().iter().enumerate() {
             if let Operation::Variable(i) = operation {
                 compiler.series[node] = Some(*i);
             } else if needed[node] && compiler.fixed[node].is_none() {
                 let series = compiler.compile(*operation);
                 compiler.series[node] = Some(series);
+                let mark = match *operation {
+                    Operation::Sign(a) => Some((MarkKind::Sign, a)),
+                    Operation::Sqrt(a) | Operation::Ln(a) => Some((MarkKind::Singular, a)),
+                    Operation::Div(_, b) if compiler.fixed[b].is_none() => Some((MarkKind::Singular, b)),
+                    Operation::Exp(a) => Some((MarkKind::Exp, a)),
+                    Operation::Tanh(a) | Operation::Erf(a) if !linear[a] => Some((MarkKind::Curved, a)),
+                    _ => None,
+                };
+                if let Some((kind, argument)) = mark {
+                    self.marks.push(Mark { kind, node, argument: compiler.of(argument) });
+                }
                 match operation {
                     Operation::Tanh(a) => self.layer_arguments.push((LayerKind::Tanh, compiler.of(*a))),
                     Operation::Erf(a) => self.layer_arguments.push((LayerKind::Erf, compiler.of(*a))),
@@ -204,6 +252,12 @@ impl<S: Elementary + FromDecimal> Solution<S> {
     /// The series of the arguments of every tanh and every erf in the equation, up to degree `degree - 1`.
     pub fn layer_arguments(&self) -> impl Iterator<Item = (LayerKind, &[S])> {
         self.layer_arguments.iter().map(|(kind, series)| (*kind, &self.series(*series)[..self.degree]))
+    }
+
+    /// The operations that are not analytic everywhere or that hide: kind and place on the tape, and the series of the argument (of a quotient the
+    /// divisor's) up to degree `degree - 1`.
+    pub fn marks(&self) -> impl Iterator<Item = (MarkKind, Node, &[S])> {
+        self.marks.iter().map(|m| (m.kind, m.node, &self.series(m.argument)[..self.degree]))
     }
 
     /// Computes the series of the solution that passes through `x` at t = 0.
@@ -252,6 +306,7 @@ impl<S: Elementary + FromDecimal> Solution<S> {
             recurrences: &self.recurrences,
             outputs: &self.outputs,
             layer_arguments: &self.layer_arguments,
+            marks: &self.marks,
         }
     }
 
@@ -283,7 +338,8 @@ impl Solution<f64> {
         for k in 1..self.degree {
             advance_rows(&self.plans[plan], &mut rows, k);
         }
-        for series in (0..self.dimension).chain(self.layer_arguments.iter().map(|(_, series)| *series)) {
+        let layers = self.layer_arguments.iter().map(|(_, series)| *series);
+        for series in (0..self.dimension).chain(layers).chain(self.marks.iter().map(|m| m.argument)) {
             let column = &mut self.coefficients[series * width..(series + 1) * width];
             for (coefficient, row) in column.iter_mut().zip(rows.iter()) {
                 *coefficient = row[series % ROW];

@@ -12,6 +12,15 @@ pub fn written(tape: &Tape, node: Node) -> String {
     expression(tape, node, &mut LONGEST.clone()).to_string()
 }
 
+/// The same of a sign; where it makes an absolute value, that.
+pub fn written_sign(tape: &Tape, sign: Node) -> String {
+    let makes = |operation: &Operation| match *operation {
+        Operation::Mul(a, b) => b == sign && tape.operations()[sign] == Operation::Sign(a),
+        _ => false,
+    };
+    written(tape, tape.operations().iter().position(makes).unwrap_or(sign))
+}
+
 fn expression(tape: &Tape, node: Node, left: &mut usize) -> Expression {
     if *left == 0 {
         return Expression::Name("...".into());

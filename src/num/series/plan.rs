@@ -12,7 +12,7 @@ use std::any::Any;
 
 use super::compiled::Compiled;
 use super::table::Table;
-use super::{LayerKind, Recurrence, Series, Weights};
+use super::{LayerKind, Mark, Recurrence, Series, Weights};
 use crate::num::Elementary;
 
 /// What one instruction does at degree k >= 1. The number at hand is the result of the instruction before.
@@ -331,6 +331,7 @@ pub(super) struct Equation<'a, S> {
     pub outputs: &'a [Series],
     /// Series that others will read.
     pub layer_arguments: &'a [(LayerKind, Series)],
+    pub marks: &'a [Mark],
 }
 
 /// See the [module](self).
@@ -462,6 +463,9 @@ impl Tails {
         }
         for (_, series) in equation.layer_arguments {
             self.read(*series);
+        }
+        for mark in equation.marks {
+            self.read(mark.argument);
         }
         for (i, recurrence) in equation.recurrences.iter().enumerate().rev() {
             let this = equation.dimension + i;
