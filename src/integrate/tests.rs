@@ -777,9 +777,9 @@ const DOPRI5: &str = "
     decay: 479 steps, 2 passages, d95616e62545bcc8
     at rest: 7 steps, 0 passages, b46cae5b98fa2ed8
     nearly at rest: 18 steps, 1 passages, 7edcc3b9ffd5c404
-    explosion: 314 steps, 1 passages, 64cc78f78cefa4b9
+    explosion: 314 steps, 1 passages, 1ca39ea5f46eb793
     root: 200 steps, 1 passages, bb05c3b9fb94d31d
-    no number: 0 steps, 0 passages, 44e98c1ddd9d1f0d
+    no number: 0 steps, 0 passages, a37eb2303d3878b8
 ";
 const LSODA: &str = "
     plain: 674 steps, 8 passages, 859ecd95944cee6d
@@ -801,9 +801,9 @@ const LSODA: &str = "
     decay: 124 steps, 2 passages, 552d33bdfbafa9dd
     at rest: 3 steps, 0 passages, 96fdce7166643c56
     nearly at rest: 32 steps, 0 passages, 8ce29d39fdcd2147
-    explosion: 879 steps, 1 passages, 75a1f86b41e2a56b
-    root: 40 steps, 1 passages, 991499f15ca624d0
-    no number: 0 steps, 0 passages, 270f39f4304c8b8c
+    explosion: 879 steps, 1 passages, 01d69c62ca2d7aa7
+    root: 40 steps, 1 passages, 2d665179e8dfb285
+    no number: 0 steps, 0 passages, 9ac0f41601ec5091
     absolute: 218 steps, 4 passages, 0c59fab09c943e99
 ";
 const RADAU5: &str = "
@@ -826,9 +826,9 @@ const RADAU5: &str = "
     decay: 40 steps, 2 passages, 3387c313053e6f2b
     at rest: 8 steps, 0 passages, 6b22c6a2f8b060a5
     nearly at rest: 3 steps, 0 passages, 5234d246bf99091d
-    explosion: 1145 steps, 1 passages, c3a9a855956aae84
-    root: 22 steps, 1 passages, 8a04966e3bcbb005
-    no number: 0 steps, 0 passages, 44e98c1ddd9d1f0d
+    explosion: 1145 steps, 1 passages, 422e9dc179caab69
+    root: 22 steps, 1 passages, dc4151ab16ba0a3e
+    no number: 0 steps, 0 passages, a37eb2303d3878b8
 ";
 const TAYLOR: &str = "
     plain: 66 steps, 4 passages, 3ae94478e15cc9b6
@@ -850,9 +850,9 @@ const TAYLOR: &str = "
     decay: 289 steps, 2 passages, ffaa28a696201d5f
     at rest: 1 steps, 0 passages, e608df1a4ab157ce
     nearly at rest: 16 steps, 1 passages, b1cb38d502e9c639
-    explosion: 204 steps, 1 passages, b1e8c9f989be5686
-    root: 10 steps, 1 passages, ce0ce465dc2e8dbf
-    no number: 0 steps, 0 passages, 9386fb9c2b95cfe7
+    explosion: 204 steps, 1 passages, c6431c1c196a58e5
+    root: 37 steps, 1 passages, 5a732696b65a61fe
+    no number: 0 steps, 0 passages, 226594b2ba69b968
 ";
 const TAYLOR_EXTENDED: &str = "
     plain: 54 steps, 2 passages, 9d32d197d129b6b8
