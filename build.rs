@@ -1,20 +1,12 @@
-//! Digests the sources that numbers depend on, so that an answer kept by one version of the numerics is never taken for another's. And what
-//! `--version` says of a build: commit, compiler, target. Nothing here needs git or a clock; the same sources built by the same
+//! What `--version` says of a build: commit, compiler, target. Nothing here needs git or a clock; the same sources built by the same
 //! compiler get the same words.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use sha2::{Digest, Sha256};
-
-/// The rooms whose sources decide what a computation yields, and what they are built from.
-const NUMERICS: [&str; 7] =
-    ["src/num", "src/system", "src/integrate", "src/analyse", "src/job", "systems", "Cargo.lock"];
-
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
-    println!("cargo::rustc-env=TWOFOLD_NUMERICS={}", numerics());
     let variable = |name: &str| std::env::var(name).unwrap_or_else(|_| "unknown".into());
     let rustc = said(Command::new(variable("RUSTC")).arg("--version")).unwrap_or_else(|| "unknown".into());
     // Only releases carry their commit: a debug build would be made anew after every one.
@@ -26,34 +18,6 @@ fn main() {
         ("TWOFOLD_PROFILE", variable("PROFILE")),
     ] {
         println!("cargo::rustc-env={name}={value}");
-    }
-}
-
-/// The digest of the numerics' sources.
-fn numerics() -> String {
-    let mut files = Vec::new();
-    for place in NUMERICS {
-        println!("cargo::rerun-if-changed={place}");
-        collect(Path::new(place), &mut files);
-    }
-    files.sort();
-    let mut digest = Sha256::new();
-    for file in &files {
-        // Names with forward slashes and lines without carriage returns: the same on every system.
-        let name: Vec<String> = file.iter().map(|part| part.to_string_lossy().into_owned()).collect();
-        let text = fs::read(file).unwrap_or_default();
-        digest.update(name.join("/"));
-        digest.update(text.into_iter().filter(|b| *b != b'\r').collect::<Vec<u8>>());
-    }
-    digest.finalize().iter().take(16).map(|b| format!("{b:02x}")).collect()
-}
-
-fn collect(place: &Path, files: &mut Vec<PathBuf>) {
-    match fs::read_dir(place) {
-        Ok(entries) => entries.flatten().for_each(|e| collect(&e.path(), files)),
-        Err(_) if place.is_file() => files.push(place.to_path_buf()),
-        // A room that is not there yet.
-        Err(_) => {}
     }
 }
 
@@ -79,7 +43,7 @@ fn commit() -> String {
             println!("cargo::rerun-if-changed={}", file.display());
         }
     }
-    let watched = ["src", "figures", "Cargo.toml", "Cargo.lock"];
+    let watched = ["src", "crates", "figures", "systems", "Cargo.toml", "Cargo.lock"];
     for path in watched {
         println!("cargo::rerun-if-changed={path}");
     }

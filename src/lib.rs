@@ -59,30 +59,23 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
 
-// The figures' files, which stand in figures/, call the library by its name.
-#[cfg(feature = "figures")]
-extern crate self as twofold;
-
 /// The linear algebra in public signatures: states are `nalgebra::SVector`.
 pub use nalgebra;
 
-pub mod analyse;
+pub use twofold_analyse as analyse;
+pub use twofold_integrate as integrate;
+pub use twofold_job as job;
+pub use twofold_job::record;
+pub use twofold_num as num;
+#[cfg(feature = "figures")]
+pub use twofold_paper as paper;
+#[cfg(feature = "figures")]
+pub use twofold_paper::{compare, draw, report};
+#[cfg(feature = "figures")]
+pub use twofold_render as render;
+pub use twofold_rigor as rigor;
+pub use twofold_system as system;
+pub use twofold_verify as verify;
+
 #[cfg(feature = "cli")]
 pub mod cli;
-#[cfg(feature = "figures")]
-pub mod compare;
-#[cfg(feature = "figures")]
-pub mod draw;
-pub mod integrate;
-pub mod job;
-pub mod num;
-#[cfg(feature = "figures")]
-pub mod paper;
-pub mod record;
-#[cfg(feature = "figures")]
-pub mod render;
-#[cfg(feature = "figures")]
-pub mod report;
-pub mod rigor;
-pub mod system;
-pub mod verify;

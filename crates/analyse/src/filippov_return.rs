@@ -1,0 +1,345 @@
+//! Return maps of discontinuous systems: closed orbits that cross the switching surface, or slide on it.
+//!
+//! The map is as smooth as the fields as long as neighbouring orbits have the same events in the same order (crossings, landings, departures
+//! by tangency; di Bernardo, Budd, Champneys & Kowalczyk 2008, ch. 2.5 and 8): its derivative is then taken by central differences, and a
+//! sliding stretch shows as multipliers that are zero. Where neighbours have other events, as at a grazing orbit, there is no derivative, and
+//! where the orbit comes to a repelling stretch or a two-fold there is no map: both are told.
+
+use nalgebra::SVector;
+
+use super::floquet::{Plane, Returned, Settings};
+use twofold_integrate::filippov::{
+    self, EventKind, ExitRule, FilippovError, FilippovObserver, Mode, ModeEvent, Side, SlidingFlow,
+};
+use twofold_integrate::roots::Passages;
+use twofold_integrate::{Failure, Flow, Step};
+use twofold_system::filippov::sliding_field;
+use twofold_system::{PiecewiseSmooth, VectorField};
+
+/// Why there is no return, or no derivative of it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// The motion could not go on.
+    #[error(transparent)]
+    Filippov(#[from] FilippovError),
+    /// The orbit does not come back.
+    #[error(
+        "the orbit from {from:?} did not return to the plane within t = {within}: start nearer to the closed orbit, or choose another plane"
+    )]
+    NoReturn {
+        /// Start on the plane.
+        from: Vec<f64>,
+        /// Time given.
+        within: f64,
+    },
+    /// The future is a set.
+    #[error(
+        "the orbit comes to a place from which it has many futures (t = {t}, state {state:?}): there is no return map through it"
+    )]
+    SetValued {
+        /// When.
+        t: f64,
+        /// Where.
+        state: Vec<f64>,
+    },
+    /// The section lies where the orbit slides.
+    #[error(
+        "the orbit slides on the switching surface where it meets the plane: choose a plane that it meets in flight"
+    )]
+    SlidesThere,
+    /// The orbit touches the surface.
+    #[error(
+        "the orbit grazes the switching surface: orbits within {distance:e} of it have other events, and the return map has no derivative there"
+    )]
+    Grazing {
+        /// How near its neighbours were looked at.
+        distance: f64,
+    },
+}
+
+/// What happened on the way, without when and where.
+type Itinerary = Vec<(std::mem::Discriminant<EventKind>, Option<Mode>, Option<Mode>)>;
+
+/// Watches for passages and set-valued moments.
+struct Watch<const N: usize> {
+    plane: Plane,
+    returns: usize,
+    passages: Passages,
+    same: Vec<(f64, SVector<f64, N>, Mode)>,
+    opposite: Vec<Vec<f64>>,
+    itinerary: Itinerary,
+    set_valued: Option<(f64, Vec<f64>)>,
+}
+
+impl<const N: usize> FilippovObserver<N> for Watch<N> {
+    fn step(&mut self, mode: Mode, step: &Step<'_, N>) -> Flow {
+        for p in self.passages.through_plane(step, self.plane.axis, self.plane.value) {
+            let (t, x) = (step.time(p.theta), step.at(p.theta));
+            if p.upward != self.plane.upward {
+                self.opposite.push(Failure::state(&x));
+            } else if self.same.len() < self.returns {
+                self.same.push((t, x, mode));
+            }
+        }
+        if self.same.len() >= self.returns || self.set_valued.is_some() { Flow::Stop } else { Flow::Continue }
+    }
+
+    fn event(&mut self, event: &ModeEvent<N>) -> Flow {
+        let many = match event.kind {
+            EventKind::EnteredRepelling
+            | EventKind::TwoFoldReached { .. }
+            | EventKind::Exit { .. }
+            | EventKind::ExitAtBoundary { .. } => true,
+            EventKind::StartedOnSurface => event.to == Some(Mode::SlidingRepelling),
+            _ => false,
+        };
+        if many {
+            self.set_valued.get_or_insert((event.t, Failure::state(&event.state)));
+            return Flow::Stop;
+        }
+        self.itinerary.push((std::mem::discriminant(&event.kind), event.from, event.to));
+        Flow::Continue
+    }
+}
+
+/// A return without its derivative.
+struct Plain<const N: usize> {
+    point: SVector<f64, N>,
+    time: f64,
+    itinerary: Itinerary,
+    same: Vec<Vec<f64>>,
+    opposite: Vec<Vec<f64>>,
+}
+
+/// Differences are taken over this share of 1 + |u|, and over a tenth and a hundredth of it where neighbours have other events.
+const DIFFERENCE: f64 = 1e-5;
+
+/// The return from `u`, a point of `plane`, after `returns` passages in its direction, with the derivative of the return map if it is asked for.
+///
+/// # Errors
+/// [`enum@Error`].
+pub fn return_map<P, const N: usize, const M: usize>(
+    system: &P,
+    plane: Plane,
+    returns: usize,
+    u: &SVector<f64, N>,
+    settings: &Settings,
+    derivative: bool,
+) -> Result<Returned, Error>
+where
+    P: PiecewiseSmooth<N>,
+    for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
+{
+    let base = plain(system, plane, returns, u, settings)?;
+    let mut rows = Vec::new();
+    if derivative {
+        let grazes = base
+            .itinerary
+            .iter()
+            .any(|(kind, ..)| *kind == std::mem::discriminant(&EventKind::Grazing { side: Side::Plus }));
+        let size = DIFFERENCE * (1.0 + u.amax());
+        let columns = [1.0, 0.1, 0.01].iter().find_map(|share| {
+            let delta = share * size;
+            columns(system, plane, returns, u, settings, &base, delta).transpose()
+        });
+        rows = match columns {
+            Some(found) if !grazes => found?,
+            _ => return Err(Error::Grazing { distance: 0.01 * size }),
+        };
+    }
+    Ok(Returned {
+        point: Failure::state(&base.point),
+        time: base.time,
+        derivative: rows,
+        same: base.same,
+        opposite: base.opposite,
+    })
+}
+
+/// The derivative by differences over `delta`, row by row; nothing if neighbours have other events.
+fn columns<P, const N: usize, const M: usize>(
+    system: &P,
+    plane: Plane,
+    returns: usize,
+    u: &SVector<f64, N>,
+    settings: &Settings,
+    base: &Plain<N>,
+    delta: f64,
+) -> Result<Option<Vec<f64>>, Error>
+where
+    P: PiecewiseSmooth<N>,
+    for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
+{
+    let mut rows = vec![0.0; N * N];
+    for j in (0..N).filter(|j| *j != plane.axis) {
+        let mut ends = [base.point; 2];
+        for (end, sign) in ends.iter_mut().zip([1.0, -1.0]) {
+            let mut moved = *u;
+            moved[j] += sign * delta;
+            let there = plain(system, plane, returns, &moved, settings)?;
+            if there.itinerary != base.itinerary {
+                return Ok(None);
+            }
+            *end = there.point;
+        }
+        for i in (0..N).filter(|i| *i != plane.axis) {
+            rows[i * N + j] = (ends[0][i] - ends[1][i]) / (2.0 * delta);
+        }
+    }
+    Ok(Some(rows))
+}
+
+fn plain<P, const N: usize, const M: usize>(
+    system: &P,
+    plane: Plane,
+    returns: usize,
+    u: &SVector<f64, N>,
+    settings: &Settings,
+) -> Result<Plain<N>, Error>
+where
+    P: PiecewiseSmooth<N>,
+    for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
+{
+    // The rule is never used: a run stops where it would be.
+    let rule = ExitRule::AtOnce { side: Side::Plus };
+    let engine =
+        filippov::Settings { tolerance: settings.tolerance, max_step: settings.max_step, ..Default::default() };
+    let watch = || Watch {
+        plane,
+        returns,
+        passages: Passages::default(),
+        same: Vec::new(),
+        opposite: Vec::new(),
+        itinerary: Vec::new(),
+        set_valued: None,
+    };
+    let mut seen = watch();
+    let end = filippov::run(system, *u, settings.longest_return, &engine, rule, &mut seen)?.within_budget()?;
+    if let Some((t, state)) = seen.set_valued {
+        return Err(Error::SetValued { t, state });
+    }
+    let Some((at, _, mode)) = seen.same.get(returns.saturating_sub(1)).copied() else {
+        return Err(Error::NoReturn { from: Failure::state(u), within: end.t });
+    };
+    if mode.slides() {
+        return Err(Error::SlidesThere);
+    }
+    // Land there by a run that ends there: the dense output is less accurate than the method.
+    let landed = filippov::run(system, *u, at, &engine, rule, &mut watch())?.within_budget()?;
+    let f = match mode {
+        Mode::Plus => system.plus(&landed.x),
+        Mode::Minus => system.minus(&landed.x),
+        _ => sliding_field(system, &landed.x),
+    };
+    let dt = (plane.value - landed.x[plane.axis]) / f[plane.axis];
+    let mut point = landed.x + f * dt;
+    point[plane.axis] = plane.value;
+    Ok(Plain {
+        point,
+        time: landed.t + dt,
+        itinerary: seen.itinerary,
+        same: seen.same.iter().map(|(_, x, _)| Failure::state(x)).collect(),
+        opposite: seen.opposite,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use twofold_integrate::Tolerance;
+    use twofold_num::Elementary;
+
+    /// s' = 1, y' = q'(s) with q(s) = s (s^2 - 1)(s^2 - 4), on both sides of an edge at a value of s or y: a system that is discontinuous in name only. y - q(s) stays what
+    /// it is, so a return of a plane of y is a root of a polynomial.
+    struct Quintic {
+        edge: f64,
+        of: usize,
+    }
+    impl PiecewiseSmooth<2> for Quintic {
+        fn switching<S: Elementary>(&self, x: &SVector<S, 2>) -> S {
+            x[self.of] - S::from_f64(self.edge)
+        }
+        fn plus<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+            let s2 = x[0] * x[0];
+            SVector::from([S::one(), (s2 * s2).scale(5.0) - s2.scale(15.0) + S::one().scale(4.0)])
+        }
+        fn minus<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+            self.plus(x)
+        }
+    }
+
+    fn settings(tolerance: f64) -> Settings {
+        let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
+        Settings { tolerance, longest_return: 6.0, ..Settings::default() }
+    }
+
+    #[test]
+    fn returns_of_a_polynomial_are_its_roots() {
+        // Before the edge and after it the method is exact and its dense output, by which passages are found, is not: the passage is landed on. Where the edge
+        // is crossed, the dense output says.
+        for (edge, value, tolerance) in [(9.0, 0.0, 1e-5), (9.0, 0.7, 1e-5), (-9.0, -3.0, 1e-5), (-0.3, 0.7, 1e-12)] {
+            let plane = Plane { axis: 1, value, upward: true };
+            let start = SVector::from([-2.0, value]);
+            // Upwards at -2, 0, 2 with the slopes 24, 4, 24; the derivative is the slope at the start over that at the end.
+            for (returns, s, derivative) in [(1, 0.0, 6.0), (2, 2.0, 1.0)] {
+                let r =
+                    return_map(&Quintic { edge, of: 0 }, plane, returns, &start, &settings(tolerance), true).unwrap();
+                assert!((r.point[0] - s).abs() < 1e-9 && r.point[1] == value, "{r:?}");
+                assert!((r.time - (s + 2.0)).abs() < 1e-9, "{r:?}");
+                assert!((r.derivative[0] - derivative).abs() < 1e-5 && r.derivative[1..] == [0.0; 3], "{r:?}");
+                assert_eq!((r.same.len(), r.opposite.len()), (returns, returns));
+                assert!(r.opposite.iter().zip([-1.0, 1.0]).all(|(x, s)| (x[0] - s).abs() < 1e-3), "{r:?}");
+                let plain =
+                    return_map(&Quintic { edge, of: 0 }, plane, returns, &start, &settings(tolerance), false).unwrap();
+                assert!(plain.derivative.is_empty() && plain.point == r.point);
+            }
+            let none = return_map(&Quintic { edge, of: 0 }, plane, 3, &start, &settings(tolerance), false);
+            assert_eq!(none, Err(Error::NoReturn { from: vec![-2.0, value], within: 6.0 }));
+        }
+    }
+
+    #[test]
+    fn an_orbit_that_almost_touches_the_surface_has_no_derivative() {
+        // Between -1 and 0 the orbit from (-2, 0) is lowest where q' = 0, at s^2 = (15 - sqrt 145)/10.
+        let s2 = 0.1 * (15.0 - twofold_num::elementary::sqrt(145.0));
+        let lowest = -twofold_num::elementary::sqrt(s2) * (s2 - 1.0) * (s2 - 4.0);
+        let of = |below: f64, derivative| {
+            let plane = Plane { axis: 1, value: 0.0, upward: true };
+            let system = Quintic { edge: lowest - below, of: 1 };
+            return_map(&system, plane, 1, &SVector::from([-2.0, 0.0]), &settings(1e-12), derivative)
+        };
+        // Neighbours at 3e-5, 3e-6 and 3e-7 come 24 times as much lower, and all cross the surface; the map itself is there.
+        assert_eq!(of(1e-7, true), Err(Error::Grazing { distance: 0.01 * (1e-5 * 3.0) }));
+        assert!(of(1e-7, false).is_ok());
+        // The nearest two do not.
+        let r = of(2e-5, true).unwrap();
+        assert!((r.derivative[0] - 6.0).abs() < 1e-4, "{r:?}");
+    }
+
+    #[test]
+    fn a_plane_met_in_sliding_and_a_start_with_many_futures_are_refused() {
+        /// Along y = 0 with the velocity 1; towards it, or away from it.
+        struct Channel(f64);
+        impl PiecewiseSmooth<2> for Channel {
+            fn switching<S: Elementary>(&self, x: &SVector<S, 2>) -> S {
+                x[1]
+            }
+            fn plus<S: Elementary>(&self, _: &SVector<S, 2>) -> SVector<S, 2> {
+                SVector::from([S::one(), -S::from_f64(self.0)])
+            }
+            fn minus<S: Elementary>(&self, _: &SVector<S, 2>) -> SVector<S, 2> {
+                SVector::from([S::one(), S::from_f64(self.0)])
+            }
+        }
+        let of = |towards, y, value| {
+            let plane = Plane { axis: 0, value, upward: true };
+            return_map(&Channel(towards), plane, 1, &SVector::from([0.0, y]), &settings(1e-9), false)
+        };
+        // It lands at 1, and flies before.
+        assert_eq!(of(1.0, 1.0, 2.0), Err(Error::SlidesThere));
+        assert!((of(1.0, 1.0, 0.5).unwrap().point[1] - 0.5).abs() < 1e-12);
+        // On the surface from the start.
+        assert_eq!(of(1.0, 0.0, 2.0), Err(Error::SlidesThere));
+        assert_eq!(of(-1.0, 0.0, 2.0), Err(Error::SetValued { t: 0.0, state: vec![0.0, 0.0] }));
+    }
+}

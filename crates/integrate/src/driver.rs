@@ -1,0 +1,342 @@
+//! The one loop that runs a method over a schedule.
+
+use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
+
+use super::schedule::{Kicker, Schedule, StepCap};
+use super::step::{Failure, Flow, Statistics, Step, Stepper, StopReason};
+use twofold_system::VectorField;
+
+/// Receives a run as it happens.
+pub trait Observer<const N: usize> {
+    /// An accepted step.
+    fn step(&mut self, step: &Step<'_, N>) -> Flow;
+    /// The state jumped at time `t` (a kick).
+    fn kick(&mut self, _t: f64, _before: &SVector<f64, N>, _after: &SVector<f64, N>) {}
+    /// Of runs side by side that carry a vector along ([`Carried`](super::ensemble::Carried)): its length was `length`, and is 1 again.
+    fn rescaled(&mut self, _t: f64, _length: f64) {}
+    /// Of the same: one of their stops is reached, in the state `x`.
+    fn stopped(&mut self, _t: f64, _x: &SVector<f64, N>) {}
+}
+
+/// An observer that ignores everything.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Ignore;
+
+impl<const N: usize> Observer<N> for Ignore {
+    fn step(&mut self, _: &Step<'_, N>) -> Flow {
+        Flow::Continue
+    }
+}
+
+/// Receives how far a run has come, for progress displays. Called often; must be cheap.
+pub trait Watch: Sync {
+    /// The run has reached time `t`. `false` asks it to stop.
+    fn reached(&self, t: f64) -> bool;
+}
+
+impl Watch for () {
+    fn reached(&self, _: f64) -> bool {
+        true
+    }
+}
+
+/// How far a run goes and by what rules, whatever the equation and the method.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Course {
+    /// The end time; a run starts at 0.
+    pub t_end: f64,
+    /// Restarts and kicks.
+    pub schedule: Schedule,
+    /// The longest step.
+    pub step_cap: StepCap,
+    /// Most steps of the whole run; with them it ends as [`StopReason::StepBudget`].
+    pub max_steps: u64,
+    /// How many leading components of the state a kick perturbs: the states of the system, but not a hysteretic phi.
+    pub kicked_states: usize,
+}
+
+impl Course {
+    /// Straight to `t_end`: no restarts, no kicks, steps as long and as many as the method wants.
+    pub fn to(t_end: f64) -> Self {
+        Self { t_end, schedule: Schedule::default(), step_cap: StepCap::None, max_steps: u64::MAX, kicked_states: 3 }
+    }
+}
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq)]
+#[must_use = "a run may have been cut short: look at `stop`"]
+pub struct Summary<const N: usize> {
+    /// Final time.
+    pub t: f64,
+    /// Final state.
+    pub x: SVector<f64, N>,
+    /// Work done.
+    pub statistics: Statistics,
+    /// The largest number of steps in one segment between restarts or kicks.
+    pub most_steps_in_segment: u64,
+    /// Why it ended.
+    pub stop: StopReason,
+}
+
+impl<const N: usize> Summary<N> {
+    /// This summary, unless the budget of steps ended the run.
+    ///
+    /// # Errors
+    /// [`Failure::TooManySteps`], for callers to whom a run cut short by its budget is worth nothing.
+    pub fn within_budget(self) -> Result<Self, Failure> {
+        match self.stop {
+            StopReason::StepBudget => {
+                Err(Failure::TooManySteps { t: self.t, limit: self.statistics.steps, state: Failure::state(&self.x) })
+            }
+            _ => Ok(self),
+        }
+    }
+}
+
+/// A part of a run, in segments of its schedule: it begins where segment `from` does, counted from 0, and ends where segment `to` would begin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Segments before it.
+    pub from: u64,
+    /// Segments up to its end.
+    pub to: u64,
+}
+
+impl Part {
+    /// All of a run.
+    pub const WHOLE: Part = Part { from: 0, to: u64::MAX };
+}
+
+/// Runs `stepper` from (0, x0) over `course`.
+///
+/// # Errors
+/// What the method could not do. Running out of steps is no error but a [`StopReason`]: what was observed until then stands.
+pub fn drive<const N: usize, F, M, O>(
+    field: &F,
+    x0: SVector<f64, N>,
+    course: &Course,
+    stepper: &mut M,
+    observer: &mut O,
+    watch: &dyn Watch,
+) -> Result<Summary<N>, Failure>
+where
+    F: VectorField<N>,
+    M: Stepper<N>,
+    O: Observer<N>,
+{
+    drive_part(field, x0, course, Part::WHOLE, stepper, observer, watch)
+}
+
+/// Runs `stepper` over a part of `course`, from the state `x0` at that part's beginning (behind the kick, if one stands there).
+///
+/// At a restart or kick the state is the whole state of a run: the method forgets everything, and of a kicked run's generator it is known how
+/// often it was asked. So the parts of a run, each computed from the state in which the one before ended, are the run, bit for bit. Only
+/// `max_steps` is counted for each part anew.
+///
+/// # Errors
+/// As [`drive`].
+pub fn drive_part<const N: usize, F, M, O>(
+    field: &F,
+    x0: SVector<f64, N>,
+    course: &Course,
+    part: Part,
+    stepper: &mut M,
+    observer: &mut O,
+    watch: &dyn Watch,
+) -> Result<Summary<N>, Failure>
+where
+    F: VectorField<N>,
+    M: Stepper<N>,
+    O: Observer<N>,
+{
+    let Course { t_end, ref schedule, step_cap, max_steps, kicked_states } = *course;
+    let mut kicker = schedule.kick.map(|kick| Kicker::new(kick, kicked_states));
+    let (mut t, mut x) = (0.0, x0);
+    let mut begun = false;
+    let mut most_steps_in_segment = 0;
+    let mut stop = StopReason::EndTime;
+    let count = |segments: u64| usize::try_from(segments).unwrap_or(usize::MAX);
+    let mut segments = schedule.segments(0.0, t_end);
+    for before in segments.by_ref().take(count(part.from)) {
+        t = before.end;
+        if let (true, Some(kicker)) = (before.kick, kicker.as_mut()) {
+            kicker.draw();
+        }
+    }
+    'run: for segment in segments.take(count(part.to.saturating_sub(part.from))) {
+        let steps_before = stepper.statistics().steps;
+        let longest = step_cap.for_segment(segment.end - t);
+        if !std::mem::replace(&mut begun, true) {
+            stepper.restart(field, t, x, segment.end, longest).map_err(|f| f.diagnosed(&field.tape()))?;
+        } else {
+            stepper.restart_again(field, t, x, segment.end, longest).map_err(|f| f.diagnosed(&field.tape()))?;
+        }
+        while t < segment.end {
+            // Looked at where it was made: `?` would move it, in other pieces than it was written in, which waits until all are written.
+            let flow = match &stepper.step(field) {
+                Ok(step) => {
+                    (t, x) = (step.t1, step.x1);
+                    observer.step(step)
+                }
+                Err(failure) => return Err(failure.clone().diagnosed(&field.tape())),
+            };
+            let steps = stepper.statistics().steps;
+            if flow == Flow::Stop {
+                stop = StopReason::Observer;
+            } else if steps.is_multiple_of(4096) && !watch.reached(t) && t < t_end {
+                stop = StopReason::Watch;
+            } else if steps >= max_steps && t < t_end {
+                stop = StopReason::StepBudget;
+            }
+            if stop != StopReason::EndTime {
+                most_steps_in_segment = most_steps_in_segment.max(steps - steps_before);
+                break 'run;
+            }
+        }
+        most_steps_in_segment = most_steps_in_segment.max(stepper.statistics().steps - steps_before);
+        if let (true, Some(kicker)) = (segment.kick, kicker.as_mut()) {
+            let kicked = kicker.apply(x);
+            observer.kick(t, &x, &kicked);
+            x = kicked;
+        }
+    }
+    watch.reached(t);
+    Ok(Summary { t, x, statistics: stepper.statistics().clone(), most_steps_in_segment, stop })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    use nalgebra::vector;
+
+    use super::*;
+    use crate::{Dopri5, Kick, KickLaw, Tolerance};
+    use twofold_num::Elementary;
+
+    /// x'' = -x.
+    struct Turning;
+    impl VectorField<2> for Turning {
+        fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+            SVector::from([x[1], -x[0]])
+        }
+    }
+
+    /// Stops after so many steps.
+    struct After(u64);
+    impl Observer<2> for After {
+        fn step(&mut self, _: &Step<'_, 2>) -> Flow {
+            self.0 -= 1;
+            if self.0 == 0 { Flow::Stop } else { Flow::Continue }
+        }
+    }
+
+    struct Refuses(AtomicBool);
+    impl Watch for Refuses {
+        fn reached(&self, _: f64) -> bool {
+            self.0.store(true, Ordering::Relaxed);
+            false
+        }
+    }
+
+    fn run(course: Course, observer: &mut impl Observer<2>, watch: &dyn Watch) -> Summary<2> {
+        let mut stepper = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
+        drive(&Turning, vector![1.0, 0.0], &course, &mut stepper, observer, watch).unwrap()
+    }
+
+    #[test]
+    fn parts_are_the_whole() {
+        let schedule = Schedule {
+            restart_every: Some(0.7),
+            kick: Some(Kick { every: 0.3, size: 1e-2, law: KickLaw::Normal, seed: 3, stream: 1 }),
+        };
+        let course = Course { schedule, kicked_states: 2, ..Course::to(10.0) };
+        let whole = run(course, &mut Ignore, &());
+        let count = schedule.count(10.0);
+        assert_eq!(count, 33 + 14 - 4 + 1, "kicks, restarts without the shared moments, and the end");
+        for cuts in [vec![0, count], vec![0, 1, 2, 7, 8, count], (0..=count).collect()] {
+            let (mut x, mut t, mut steps) = (vector![1.0, 0.0], 0.0, 0);
+            for cut in cuts.windows(2) {
+                let mut stepper = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
+                let part = Part { from: cut[0], to: cut[1] };
+                let end = drive_part(&Turning, x, &course, part, &mut stepper, &mut Ignore, &()).unwrap();
+                assert!(end.t > t);
+                (x, t) = (end.x, end.t);
+                steps += end.statistics.steps;
+            }
+            assert_eq!((x.map(f64::to_bits), t), (whole.x.map(f64::to_bits), whole.t));
+            assert_eq!(steps, whole.statistics.steps);
+        }
+    }
+
+    #[test]
+    fn every_end_has_its_reason() {
+        let whole = run(Course::to(10.0), &mut Ignore, &());
+        assert_eq!((whole.stop, whole.t), (StopReason::EndTime, 10.0));
+        assert_eq!(whole.most_steps_in_segment, whole.statistics.steps);
+
+        let seen = run(Course::to(10.0), &mut After(7), &());
+        assert_eq!((seen.stop, seen.statistics.steps), (StopReason::Observer, 7));
+        assert!(seen.t < 10.0 && seen.most_steps_in_segment == 7);
+        // Three segments, the last of them hardly begun.
+        let often = Course { schedule: Schedule { restart_every: Some(1.0), kick: None }, ..Course::to(10.0) };
+        let first = run(Course { t_end: 1.0, ..often }, &mut Ignore, &()).statistics.steps;
+        let second = run(Course { t_end: 2.0, ..often }, &mut Ignore, &()).statistics.steps - first;
+        let third = run(often, &mut After(first + second + 1), &());
+        assert_eq!((third.stop, third.most_steps_in_segment), (StopReason::Observer, first.max(second)));
+
+        let poor = run(Course { max_steps: 5, ..Course::to(10.0) }, &mut Ignore, &());
+        assert_eq!((poor.stop, poor.statistics.steps), (StopReason::StepBudget, 5));
+        assert!(matches!(poor.within_budget(), Err(Failure::TooManySteps { limit: 5, .. })));
+
+        let refuses = Refuses(AtomicBool::new(false));
+        let cut = run(Course { step_cap: StepCap::Absolute(1e-3), ..Course::to(10.0) }, &mut Ignore, &refuses);
+        assert_eq!((cut.stop, cut.statistics.steps), (StopReason::Watch, 4096));
+        assert!(cut.clone().within_budget().is_ok(), "only the budget is an error");
+
+        // A budget that is just enough is enough, and a watch that refuses at the very end has cut nothing short.
+        let just = run(Course { max_steps: whole.statistics.steps, ..Course::to(10.0) }, &mut Ignore, &refuses);
+        assert_eq!(just.stop, StopReason::EndTime);
+        assert_eq!(just.x, whole.x);
+
+        // Neither has one that is asked when the last step is the 4096th.
+        let last = run(Course { step_cap: StepCap::Absolute(1e-3), ..Course::to(cut.t) }, &mut Ignore, &refuses);
+        assert_eq!((last.stop, last.statistics.steps, last.t), (StopReason::EndTime, 4096, cut.t));
+    }
+
+    /// Van der Pol's oscillator; counts how often it is asked.
+    struct Counted(std::sync::atomic::AtomicU64);
+    impl VectorField<2> for Counted {
+        fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+            self.0.fetch_add(1, Ordering::Relaxed);
+            SVector::from([x[1], ((S::one() - x[0] * x[0]) * x[1]).scale(20.0) - x[0]])
+        }
+    }
+
+    #[test]
+    fn what_is_counted_was_done() {
+        let field = Counted(Default::default());
+        let mut stepper = Dopri5::new(Tolerance { rtol: 1e-6, atol: 1e-6 });
+        let course = Course { schedule: Schedule { restart_every: Some(30.0), kick: None }, ..Course::to(100.0) };
+        let mut seen = Lengths::default();
+        let end = drive(&field, vector![2.0, 0.0], &course, &mut stepper, &mut seen, &()).unwrap();
+        let s = &end.statistics;
+        assert_eq!((s.restarts, s.highest_order), (4, 5));
+        assert!(s.rejected > 20, "the orbit has fast parts: {} rejected", s.rejected);
+        assert_eq!(s.steps, seen.0.len() as u64);
+        // A restart asks twice, a trial six times, whether it is accepted or not.
+        assert_eq!(s.evaluations, field.0.into_inner());
+        assert_eq!(s.evaluations, 2 * s.restarts + 6 * (s.steps + s.rejected));
+    }
+
+    #[derive(Default)]
+    struct Lengths(Vec<f64>);
+    impl Observer<2> for Lengths {
+        fn step(&mut self, step: &Step<'_, 2>) -> Flow {
+            self.0.push(step.t1 - step.t0);
+            Flow::Continue
+        }
+    }
+}

@@ -1,0 +1,898 @@
+//! The state machine: one mode after the other, decided at events.
+
+use nalgebra::SVector;
+
+use super::exit::{Chooser, Plan};
+use super::flow::{FreeFlow, InPhysicalTime, SlidingFlow, Straight, Truncated, project};
+use super::two_fold::{AlongCurve, SlidingAtTwoFold};
+use super::{EventKind, ExitRule, FilippovError, FilippovObserver, FilippovSummary, Mode, ModeEvent, Settings, Side};
+use crate::dopri5::Dopri5;
+use crate::driver::Watch;
+use crate::roots::{Start, Zero, brent, first_zero};
+use crate::step::{Failure, Flow, Interpolant, Statistics, Step, Stepper, StopReason, Tolerance, finite};
+use twofold_num::Dual;
+use twofold_system::filippov::{TwoFold, gradient, lie_derivatives, two_fold};
+use twofold_system::{PiecewiseSmooth, VectorField, variables};
+
+/// Runs the Filippov motion of `system` from (0, x0) to `t_end`. `M` is `N + 1` and is inferred.
+///
+/// # Errors
+/// See [`FilippovError`]; each names the time and the state.
+pub fn run<P, const N: usize, const M: usize>(
+    system: &P,
+    x0: SVector<f64, N>,
+    t_end: f64,
+    settings: &Settings,
+    rule: ExitRule,
+    observer: &mut dyn FilippovObserver<N>,
+) -> Result<FilippovSummary<N>, FilippovError>
+where
+    P: PiecewiseSmooth<N>,
+    for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
+{
+    run_watched(system, x0, t_end, settings, rule, observer, &())
+}
+
+/// [`run`], reporting to `watch` how far it has come; where `watch` refuses, the run ends as [`StopReason::Watch`].
+///
+/// # Errors
+/// See [`FilippovError`]; each names the time and the state.
+pub fn run_watched<P, const N: usize, const M: usize>(
+    system: &P,
+    x0: SVector<f64, N>,
+    t_end: f64,
+    settings: &Settings,
+    rule: ExitRule,
+    observer: &mut dyn FilippovObserver<N>,
+    watch: &dyn Watch,
+) -> Result<FilippovSummary<N>, FilippovError>
+where
+    P: PiecewiseSmooth<N>,
+    for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
+{
+    let origin = Origin { t: 0.0, x: x0, departure: Departure::Anywhere };
+    run_from(system, origin, t_end, settings, &mut Chooser::new(rule), observer, watch)
+}
+
+/// Where and when a run starts.
+#[derive(Clone, Debug)]
+pub(super) struct Origin<const N: usize> {
+    pub t: f64,
+    pub x: SVector<f64, N>,
+    pub departure: Departure<N>,
+}
+
+/// What is known of a run's start.
+#[derive(Clone, Debug)]
+pub(super) enum Departure<const N: usize> {
+    /// Wherever the state is.
+    Anywhere,
+    /// At a two-fold.
+    TwoFold(Option<Box<SlidingAtTwoFold<N>>>),
+    /// On the surface, in the repelling region.
+    Repelling,
+}
+
+/// [`run_watched`] from anywhere, with an exit rule that may have been at work before.
+pub(super) fn run_from<P, const N: usize, const M: usize>(
+    system: &P,
+    origin: Origin<N>,
+    t_end: f64,
+    settings: &Settings,
+    chooser: &mut Chooser,
+    observer: &mut dyn FilippovObserver<N>,
+    watch: &dyn Watch,
+) -> Result<FilippovSummary<N>, FilippovError>
+where
+    P: PiecewiseSmooth<N>,
+    for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
+{
+    let Origin { t: t0, x: x0, departure } = origin;
+    const { assert!(M == N + 1, "the sliding flow carries exactly one extra state") };
+    chooser.rule.validate().map_err(FilippovError::Invalid)?;
+    let tolerances = [settings.tolerance.rtol, settings.tolerance.atol, settings.max_step];
+    if !tolerances.iter().all(|v| *v > 0.0) {
+        return Err(FilippovError::Invalid("tolerances and the step cap must be above 0".into()));
+    }
+    if !(t_end > t0 && t_end.is_finite()) {
+        return Err(FilippovError::Invalid(format!("the end time must be finite and after the start, not {t_end}")));
+    }
+    if !finite(&x0) {
+        return Err(Failure::NotFinite { t: t0, state: Failure::state(&x0) }.into());
+    }
+    let mut engine = Engine {
+        system,
+        settings,
+        chooser,
+        observer,
+        watch,
+        t: t0,
+        x: x0,
+        t_end,
+        events: 0,
+        statistics: Statistics { highest_order: 5, ..Statistics::default() },
+        zeno: Zeno::default(),
+        stop: None,
+        steps_until_watch: STEPS_BETWEEN_WATCHES,
+    };
+    let mut state = match departure {
+        Departure::Anywhere => engine.start()?,
+        Departure::TwoFold(Some(local)) => State::TwoFold(local),
+        Departure::TwoFold(None) => return Err(engine.non_transversal("the two-fold is degenerate")),
+        Departure::Repelling => engine.enter_repelling(None)?,
+    };
+    loop {
+        if let Some(reason) = engine.stop {
+            return Ok(engine.summary(state.mode(), reason));
+        }
+        if engine.t >= engine.t_end {
+            return Ok(engine.summary(state.mode(), StopReason::EndTime));
+        }
+        if engine.events > settings.max_events {
+            return Err(FilippovError::TooManyEvents {
+                t: engine.t,
+                state: Failure::state(&engine.x),
+                limit: settings.max_events,
+            });
+        }
+        state = match state {
+            State::Free { side, start } => engine.fly(side, start)?,
+            State::Sliding(sliding) => engine.slide::<M>(sliding)?,
+            State::TwoFold(local) => engine.depart(&local)?,
+            State::SetValued(mode) => return Ok(engine.summary(mode, StopReason::SetValued)),
+        };
+    }
+}
+
+/// How a flight begins: what is known of the growth of |h|.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum FlightStart {
+    /// Off the surface.
+    Away,
+    /// On it, with this rate of growth of |h|.
+    Transversal(f64),
+    /// On it at a visible fold, with this second derivative of |h|.
+    Tangent(f64),
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Sliding {
+    repelling: bool,
+    /// The exit rule's plan, in repelling sliding.
+    plan: Option<Plan>,
+    /// Time and arc of this stretch of repelling sliding so far.
+    time: f64,
+    arc: f64,
+}
+
+impl Sliding {
+    const ATTRACTING: Self = Self { repelling: false, plan: None, time: 0.0, arc: 0.0 };
+
+    fn mode(&self) -> Mode {
+        if self.repelling { Mode::SlidingRepelling } else { Mode::SlidingAttracting }
+    }
+
+    /// The sign with which the desingularised flow runs forward in time.
+    fn direction(&self) -> f64 {
+        if self.repelling { -1.0 } else { 1.0 }
+    }
+
+    /// How far L+h and L-h are from zero; both are positive inside the region.
+    fn margins<P: PiecewiseSmooth<N>, const N: usize>(&self, system: &P, x: &SVector<f64, N>) -> [f64; 2] {
+        let (p, q) = lie_derivatives(system, x);
+        [-self.direction() * p, self.direction() * q]
+    }
+}
+
+/// A state of the sliding flow without its clock.
+fn without_clock<const N: usize, const M: usize>(z: &SVector<f64, M>) -> SVector<f64, N> {
+    SVector::from_fn(|i, _| z[i])
+}
+
+/// Lengths of the chords of the first part, up to the fraction `theta`, of a step of the sliding flow.
+fn chords<const N: usize, const M: usize>(step: &Step<'_, M>, theta: f64) -> [f64; CHORDS] {
+    let mut last = without_clock::<N, M>(&step.x0);
+    std::array::from_fn(|k| {
+        let point = without_clock(&step.at(theta * (k + 1) as f64 / CHORDS as f64));
+        let length = (point - last).norm();
+        last = point;
+        length
+    })
+}
+
+/// The two-fold that sliding may be running into.
+struct TwoFoldAhead<const N: usize> {
+    local: Option<SlidingAtTwoFold<N>>,
+    /// The margins when it was last looked for.
+    tried_at: f64,
+}
+
+impl<const N: usize> TwoFoldAhead<N> {
+    fn new() -> Self {
+        Self { local: None, tried_at: f64::INFINITY }
+    }
+
+    /// Looks for it from `x`, each time the Lie derivatives have halved.
+    fn look<P: PiecewiseSmooth<N>>(&mut self, system: &P, x: &SVector<f64, N>, margins: [f64; 2]) {
+        let size = margins.into_iter().fold(0.0, f64::max);
+        if size >= 0.5 * self.tried_at || size.is_nan() {
+            return;
+        }
+        self.tried_at = size;
+        // From far away Newton's method may have found another two-fold: trust only the latest answer.
+        if let Ok(TwoFold { point, .. }) = two_fold(system, x)
+            && self.local.as_ref().is_none_or(|l| (l.point - point).amax() > LIMITS.same_point * (1.0 + point.amax()))
+        {
+            self.local = SlidingAtTwoFold::at(system, point);
+        }
+    }
+}
+
+enum State<const N: usize> {
+    Free { side: Side, start: FlightStart },
+    Sliding(Sliding),
+    TwoFold(Box<SlidingAtTwoFold<N>>),
+    SetValued(Option<Mode>),
+}
+
+impl<const N: usize> State<N> {
+    fn mode(&self) -> Option<Mode> {
+        match self {
+            State::Free { side, .. } => Some((*side).into()),
+            State::Sliding(s) => Some(s.mode()),
+            State::TwoFold(_) => None,
+            State::SetValued(mode) => *mode,
+        }
+    }
+}
+
+/// Watches for accumulating crossings.
+#[derive(Clone, Copy, Debug, Default)]
+struct Zeno {
+    in_a_row: u64,
+    first: f64,
+    last: f64,
+}
+
+impl Zeno {
+    /// A flight took `duration`. Whether flights have been shrinking for so long and so far that they accumulate.
+    fn flight(&mut self, duration: f64, t: f64) -> bool {
+        if self.in_a_row > 0 && duration <= self.last {
+            self.in_a_row += 1;
+        } else {
+            (self.in_a_row, self.first) = (1, duration);
+        }
+        self.last = duration;
+        self.in_a_row >= LIMITS.zeno_flights
+            && (duration < LIMITS.zeno_ratio * self.first || duration <= LIMITS.zeno_resolution * t.abs())
+    }
+}
+
+/// A long stretch without events must not keep a watch waiting.
+const STEPS_BETWEEN_WATCHES: u32 = 4096;
+
+/// Chords of a step by which its length is measured.
+const CHORDS: usize = 16;
+
+/// The numbers by which the engine decides what rounding blurs. None is a tolerance of the motion; those are in [`Settings`].
+struct Limits {
+    /// A first Lie derivative below this share of |grad h| |f| is zero: some fifty roundings.
+    lie: f64,
+    /// A two-fold is looked for where both Lie derivatives are below so many of those ...
+    near_two_fold: f64,
+    /// ... and taken for the present state, or for one found before, within this share of its size.
+    same_point: f64,
+    /// Newton steps that sharpen a touch of the surface, which a root finder knows only to half of the digits ...
+    touch_steps: usize,
+    /// ... as long as they move it by less than this fraction of the step.
+    touch_range: f64,
+    /// Flights in a row, each shorter than the one before, that may be the beginning of an accumulation ...
+    zeno_flights: u64,
+    /// ... and are one when the last is below this share of the first ...
+    zeno_ratio: f64,
+    /// ... or below so many spacings of the numbers at the present time.
+    zeno_resolution: f64,
+    /// A sliding step that advances time by no more than this share of it is idle ...
+    idle: f64,
+    /// ... and so many of them are arrival at a degenerate point.
+    idle_steps: u32,
+    /// Closer to a two-fold than so many tolerances there is nothing to integrate.
+    blur: f64,
+    /// Sliding restarts on the surface when it has drifted off by this ...
+    drift: f64,
+    /// ... or by so many absolute tolerances, whichever is more.
+    drift_in_tolerances: f64,
+    /// Chords by which the path out of a two-fold is measured.
+    departure_chords: usize,
+    /// Departures shorter than this share of the shortest one are raised to it: closer to the two-fold the signs of the Lie
+    /// derivatives are rounding.
+    shortest_departure: f64,
+}
+
+const LIMITS: Limits = Limits {
+    lie: 1e-14,
+    near_two_fold: 1e5,
+    same_point: 1e-9,
+    touch_steps: 4,
+    touch_range: 1e-3,
+    zeno_flights: 8,
+    zeno_ratio: 1e-8,
+    zeno_resolution: 16.0 * f64::EPSILON,
+    idle: 4.0 * f64::EPSILON,
+    idle_steps: 32,
+    blur: 300.0,
+    drift: 1e-10,
+    drift_in_tolerances: 10.0,
+    departure_chords: 256,
+    shortest_departure: 1e-6,
+};
+
+const DEGENERATE_END: &str =
+    "sliding runs into a point where both Lie derivatives vanish and which is not a regular two-fold";
+
+/// What ended a stretch of sliding within a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum SlidingEnd {
+    /// L+h (`Plus`) or L-h (`Minus`) came to zero.
+    Fold(Side),
+    Planned,
+    Time,
+}
+
+/// First and second Lie derivatives with the sizes below which the first count as zero.
+struct Lie {
+    p: f64,
+    q: f64,
+    /// L+²h and L-²h.
+    pp: f64,
+    mm: f64,
+    /// L-L+h and L+L-h.
+    pm: f64,
+    mp: f64,
+    zero_p: f64,
+    zero_q: f64,
+}
+
+struct Engine<'a, P, const N: usize> {
+    system: &'a P,
+    settings: &'a Settings,
+    /// The exit rule at work. It goes on from run to run where one run is made of several.
+    chooser: &'a mut Chooser,
+    /// Any, so that the engine is compiled once for all of them.
+    observer: &'a mut dyn FilippovObserver<N>,
+    watch: &'a dyn Watch,
+    t: f64,
+    x: SVector<f64, N>,
+    t_end: f64,
+    events: u64,
+    statistics: Statistics,
+    zeno: Zeno,
+    stop: Option<StopReason>,
+    steps_until_watch: u32,
+}
+
+impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
+    fn summary(self, mode: Option<Mode>, stop: StopReason) -> FilippovSummary<N> {
+        FilippovSummary { t: self.t, x: self.x, mode, stop, events: self.events, statistics: self.statistics }
+    }
+
+    fn event(&mut self, kind: EventKind, from: Option<Mode>, to: Option<Mode>) {
+        self.events += 1;
+        let event = ModeEvent { t: self.t, state: self.x, kind, from, to };
+        if self.observer.event(&event) == Flow::Stop {
+            self.stop.get_or_insert(StopReason::Observer);
+        }
+        self.ask_watch();
+    }
+
+    fn ask_watch(&mut self) {
+        self.steps_until_watch = STEPS_BETWEEN_WATCHES;
+        if !self.watch.reached(self.t) {
+            self.stop.get_or_insert(StopReason::Watch);
+        }
+    }
+
+    fn non_transversal(&self, what: &'static str) -> FilippovError {
+        FilippovError::NonTransversal { t: self.t, state: Failure::state(&self.x), what }
+    }
+
+    fn no_exit(&self, why: &'static str) -> FilippovError {
+        FilippovError::NoSuchExit { t: self.t, state: Failure::state(&self.x), why }
+    }
+
+    fn lie(&self, x: &SVector<f64, N>) -> Lie {
+        let (plus, minus) = (self.system.plus(x), self.system.minus(x));
+        let (p, q) = lie_derivatives::<P, Dual<f64, N>, N>(self.system, &variables(x));
+        let along = |d: &Dual<f64, N>, f: &SVector<f64, N>| (0..N).map(|i| d.partials[i] * f[i]).sum::<f64>();
+        let slope = gradient(self.system, x).norm();
+        Lie {
+            p: p.value,
+            q: q.value,
+            pp: along(&p, &plus),
+            mm: along(&q, &minus),
+            pm: along(&p, &minus),
+            mp: along(&q, &plus),
+            zero_p: LIMITS.lie * slope * plus.norm(),
+            zero_q: LIMITS.lie * slope * minus.norm(),
+        }
+    }
+
+    /// Counts a finished piece's work.
+    fn count(&mut self, work: &Statistics) {
+        self.statistics += work;
+        if self.statistics.steps > self.settings.max_steps {
+            self.stop.get_or_insert(StopReason::StepBudget);
+        }
+    }
+
+    /// Hands a step to the observer and moves to its end.
+    fn take(&mut self, mode: Mode, t1: f64, x1: SVector<f64, N>, interpolant: &dyn Interpolant<N>) {
+        if t1 > self.t {
+            let step = Step { t0: self.t, t1, x0: self.x, x1, interpolant };
+            if self.observer.step(mode, &step) == Flow::Stop {
+                self.stop.get_or_insert(StopReason::Observer);
+            }
+        }
+        (self.t, self.x) = (t1, x1);
+        self.steps_until_watch -= 1;
+        if self.steps_until_watch == 0 {
+            self.ask_watch();
+        }
+    }
+
+    /// The mode at the start of a run.
+    fn start(&mut self) -> Result<State<N>, FilippovError> {
+        let h = self.system.switching(&self.x);
+        if h.abs() > self.settings.surface {
+            let side = if h > 0.0 { Side::Plus } else { Side::Minus };
+            return Ok(State::Free { side, start: FlightStart::Away });
+        }
+        self.x = project(self.system, &self.x);
+        let l = self.lie(&self.x);
+        if let Some(local) = self.two_fold_here(&l) {
+            self.x = local.point;
+            self.event(EventKind::TwoFoldReached { leg: 0.0, error: 0.0 }, None, None);
+            return Ok(State::TwoFold(Box::new(local)));
+        }
+        // Growth of |h| along each field on its own side; a fold counts by its second derivative.
+        let growth = |first: f64, zero: f64, second: f64| {
+            if first.abs() > zero {
+                (first > 0.0).then_some(FlightStart::Transversal(first))
+            } else {
+                (second > 0.0).then_some(FlightStart::Tangent(second))
+            }
+        };
+        let state = match (growth(l.p, l.zero_p, l.pp), growth(-l.q, l.zero_q, -l.mm)) {
+            (Some(start), None) => State::Free { side: Side::Plus, start },
+            (None, Some(start)) => State::Free { side: Side::Minus, start },
+            (None, None) => State::Sliding(Sliding::ATTRACTING),
+            (Some(_), Some(_)) => return self.enter_repelling(None),
+        };
+        self.event(EventKind::StartedOnSurface, None, state.mode());
+        Ok(state)
+    }
+
+    /// A two-fold at the present state, if both Lie derivatives are almost zero there.
+    fn two_fold_here(&self, l: &Lie) -> Option<SlidingAtTwoFold<N>> {
+        let near = LIMITS.near_two_fold * l.zero_p.max(l.zero_q);
+        if l.p.abs() > near || l.q.abs() > near {
+            return None;
+        }
+        let local = SlidingAtTwoFold::near(self.system, &self.x)?;
+        ((local.point - self.x).norm() <= LIMITS.same_point * local.radius.min(1.0)).then_some(local)
+    }
+
+    /// The state is in the repelling region: ask the rule.
+    fn enter_repelling(&mut self, from: Option<Mode>) -> Result<State<N>, FilippovError> {
+        self.event(EventKind::EnteredRepelling, from, Some(Mode::SlidingRepelling));
+        let Some(plan) = self.chooser.plan() else {
+            return Ok(State::SetValued(Some(Mode::SlidingRepelling)));
+        };
+        if plan.time <= 0.0 || plan.arc <= 0.0 {
+            return Ok(self.exit(plan.side, 0.0, 0.0, from));
+        }
+        Ok(State::Sliding(Sliding { repelling: true, plan: Some(plan), time: 0.0, arc: 0.0 }))
+    }
+
+    /// Leaves repelling sliding by the rule.
+    fn exit(&mut self, to: Side, time: f64, arc: f64, from: Option<Mode>) -> State<N> {
+        let rule = self.chooser.rule;
+        self.event(EventKind::Exit { to, time, arc, rule }, from, Some(to.into()));
+        self.launch(to)
+    }
+
+    /// A flight from a point of the surface where the field of `side` points to it.
+    fn launch(&self, side: Side) -> State<N> {
+        let l = self.lie(&self.x);
+        let (first, zero, second) = match side {
+            Side::Plus => (l.p, l.zero_p, l.pp),
+            Side::Minus => (-l.q, l.zero_q, -l.mm),
+        };
+        let start = if first.abs() > zero { FlightStart::Transversal(first) } else { FlightStart::Tangent(second) };
+        State::Free { side, start }
+    }
+
+    /// Free flight until the surface or the end.
+    fn fly(&mut self, side: Side, start: FlightStart) -> Result<State<N>, FilippovError> {
+        let flow = FreeFlow { system: self.system, side };
+        let mut method = Dopri5::<N>::new(self.settings.tolerance);
+        let (t_start, mut start) = (self.t, start);
+        method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step)?;
+        let landed = loop {
+            let step = method.step(&flow)?;
+            let height = |theta: f64| side.sign() * self.system.switching(&step.at(theta));
+            let length = step.length();
+            let at_start = match start {
+                FlightStart::Away => Start::Away,
+                FlightStart::Transversal(rate) => Start::Simple(rate * length),
+                FlightStart::Tangent(second) => Start::Double(0.5 * second * length * length),
+            };
+            start = FlightStart::Away;
+            match first_zero(height, at_start) {
+                None => {
+                    let (t1, x1) = (step.t1, step.x1);
+                    self.take(side.into(), t1, x1, step.interpolant);
+                    if self.stop.is_some() || self.t >= self.t_end {
+                        break None;
+                    }
+                }
+                Some(zero) => {
+                    let mut theta = zero.theta();
+                    if matches!(zero, Zero::Touch(_)) {
+                        // A touch is known only to the root of the rounding; the tangency itself is a simple zero.
+                        for _ in 0..LIMITS.touch_steps {
+                            let l = self.lie(&step.at(theta));
+                            let (rate, second) = match side {
+                                Side::Plus => (l.p, l.pp),
+                                Side::Minus => (l.q, l.mm),
+                            };
+                            let moved = theta - rate / (second * length);
+                            if !((moved - theta).abs() < LIMITS.touch_range && (0.0..=1.0).contains(&moved)) {
+                                break;
+                            }
+                            theta = moved;
+                        }
+                    }
+                    let (t1, x1) = (step.time(theta), project(self.system, &step.at(theta)));
+                    self.take(side.into(), t1, x1, &Truncated { inner: step.interpolant, end: theta });
+                    break Some(zero);
+                }
+            }
+            if method.statistics().steps > self.settings.max_steps {
+                break None;
+            }
+        };
+        self.count(method.statistics());
+        match landed {
+            _ if self.stop.is_some() => Ok(State::Free { side, start: FlightStart::Away }),
+            None => Ok(State::Free { side, start: FlightStart::Away }),
+            Some(zero) => {
+                let duration = self.t - t_start;
+                if self.zeno.flight(duration, self.t) {
+                    let Zeno { in_a_row, first, last } = self.zeno;
+                    // A geometric series with the mean ratio of these flights.
+                    let ratio = twofold_num::elementary::pow(
+                        (last / first).max(f64::MIN_POSITIVE),
+                        1.0 / (in_a_row - 1) as f64,
+                    );
+                    return Err(FilippovError::Zeno {
+                        t: self.t,
+                        state: Failure::state(&self.x),
+                        crossings: in_a_row,
+                        last,
+                        accumulates: self.t + last * ratio / (1.0 - ratio).max(f64::EPSILON),
+                    });
+                }
+                self.land(side, matches!(zero, Zero::Touch(_)))
+            }
+        }
+    }
+
+    /// The mode after an arrival on the surface from `side`.
+    fn land(&mut self, side: Side, touch: bool) -> Result<State<N>, FilippovError> {
+        let l = self.lie(&self.x);
+        let from = Some(side.into());
+        if let Some(local) = self.two_fold_here(&l) {
+            let error = (local.point - self.x).norm() / self.system.plus(&self.x).norm();
+            self.x = local.point;
+            self.event(EventKind::TwoFoldReached { leg: 0.0, error }, from, None);
+            return Ok(State::TwoFold(Box::new(local)));
+        }
+        // Growth of |h| on this side along its own field, and on the other side along the other field.
+        let (own, own_zero, own_second, across, across_zero, across_second) = match side {
+            Side::Plus => (l.p, l.zero_p, l.pp, -l.q, l.zero_q, -l.mm),
+            Side::Minus => (-l.q, l.zero_q, -l.mm, l.p, l.zero_p, l.pp),
+        };
+        if own >= -own_zero || (touch && own_second > 0.0) {
+            if own_second <= 0.0 {
+                return Err(self.non_transversal("a tangency from an invisible or degenerate side (a cusp)"));
+            }
+            self.event(EventKind::Grazing { side }, from, from);
+            let start = if own > own_zero { FlightStart::Transversal(own) } else { FlightStart::Tangent(own_second) };
+            return Ok(State::Free { side, start });
+        }
+        let other = side.other();
+        let start = if across > across_zero {
+            Some(FlightStart::Transversal(across))
+        } else if across < -across_zero {
+            None
+        } else if across_second == 0.0 {
+            return Err(self.non_transversal("landing on a fold with zero second Lie derivative (a cusp)"));
+        } else {
+            (across_second > 0.0).then_some(FlightStart::Tangent(across_second))
+        };
+        if let Some(start) = start {
+            self.event(EventKind::Crossing { to: other }, from, Some(other.into()));
+            return Ok(State::Free { side: other, start });
+        }
+        self.zeno = Zeno::default();
+        self.event(EventKind::Landing { from: side }, from, Some(Mode::SlidingAttracting));
+        Ok(State::Sliding(Sliding::ATTRACTING))
+    }
+
+    /// Sliding until a fold, a two-fold, the planned exit or the end.
+    fn slide<const M: usize>(&mut self, mut sliding: Sliding) -> Result<State<N>, FilippovError>
+    where
+        for<'b> SlidingFlow<'b, P, N>: VectorField<M>,
+    {
+        let system = self.system;
+        let mode = sliding.mode();
+        let flow = SlidingFlow { system, direction: sliding.direction() };
+        let mut method = Dopri5::<M>::new(self.settings.tolerance);
+        let lift = |x: &SVector<f64, N>| SVector::<f64, M>::from_fn(|i, _| if i < N { x[i] } else { 0.0 });
+        // The clock of the flow starts at zero with each restart, so that short times keep their digits.
+        let mut t_base = self.t;
+        let mut fresh = true;
+        let mut idle = 0;
+        let mut ahead = TwoFoldAhead::new();
+        method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY)?;
+        let next = loop {
+            let step = method.step(&flow)?;
+            let end = self.sliding_end(&step, &sliding, t_base, fresh);
+            fresh = false;
+            let theta = end.map_or(1.0, |(theta, _)| theta);
+            let z1 = step.at(theta);
+            let x1 = project(system, &without_clock(&z1));
+            let t1 = match end {
+                Some((_, SlidingEnd::Time)) => self.t_end,
+                _ => (t_base + z1[N]).min(self.t_end),
+            };
+            sliding.time += t1 - self.t;
+            if sliding.plan.is_some() {
+                sliding.arc += chords::<N, M>(&step, theta).iter().sum::<f64>();
+            }
+            let clock = (step.x0[N], z1[N]);
+            let interpolant = InPhysicalTime { system, inner: step.interpolant, end: theta, clock };
+            let drift = system.switching(&without_clock(&z1)).abs();
+            idle = if t1 - self.t <= LIMITS.idle * t1.abs() { idle + 1 } else { 0 };
+            self.take(mode, t1, x1, &interpolant);
+            if let Some((_, end)) = end {
+                break Some(end);
+            }
+            if idle >= LIMITS.idle_steps {
+                return Err(self.non_transversal(DEGENERATE_END));
+            }
+            if self.stop.is_some() || method.statistics().steps > self.settings.max_steps {
+                break Some(SlidingEnd::Time);
+            }
+            ahead.look(system, &self.x, sliding.margins(system, &self.x));
+            if let Some(fold) = &ahead.local {
+                let distance = (fold.point - self.x).norm();
+                // Nearer than the tolerances resolve there is nothing to integrate.
+                let Tolerance { rtol, atol } = self.settings.tolerance;
+                let blur = LIMITS.blur * (atol + rtol * self.x.amax());
+                if distance <= (self.settings.leg * fold.radius).max(blur)
+                    && let Some((leg, error)) = fold.time_to_arrive(system, &self.x, sliding.repelling)
+                {
+                    break self.arrive(fold.point, leg, error, mode);
+                }
+            }
+            if drift > LIMITS.drift.max(LIMITS.drift_in_tolerances * self.settings.tolerance.atol) {
+                t_base = self.t;
+                method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY)?;
+            }
+        };
+        self.count(method.statistics());
+        let from = Some(mode);
+        match next {
+            None => match ahead.local {
+                Some(fold) if self.t < self.t_end && self.stop.is_none() => Ok(State::TwoFold(Box::new(fold))),
+                Some(fold) if self.x == fold.point => Ok(State::TwoFold(Box::new(fold))),
+                _ => Ok(State::Sliding(sliding)),
+            },
+            Some(SlidingEnd::Time) => Ok(State::Sliding(sliding)),
+            Some(SlidingEnd::Planned) => {
+                let side = sliding.plan.map_or(Side::Plus, |plan| plan.side);
+                Ok(self.exit(side, sliding.time, sliding.arc, from))
+            }
+            Some(SlidingEnd::Fold(side)) => self.leave_at_fold(side, &sliding),
+        }
+    }
+
+    /// The first end of sliding within a step of the sliding flow, and the fraction of the step at which it comes.
+    fn sliding_end<const M: usize>(
+        &self,
+        step: &Step<'_, M>,
+        sliding: &Sliding,
+        t_base: f64,
+        fresh: bool,
+    ) -> Option<(f64, SlidingEnd)> {
+        let (system, direction) = (self.system, sliding.direction());
+        let mut first: Option<(f64, SlidingEnd)> = None;
+        let mut propose = |theta: f64, end: SlidingEnd| {
+            if first.is_none_or(|(best, _)| theta < best) {
+                first = Some((theta, end));
+            }
+        };
+        for (i, side) in [Side::Plus, Side::Minus].into_iter().enumerate() {
+            let mut start = Start::Away;
+            if fresh {
+                let l = self.lie(&self.x);
+                let (value, zero, rate) = match side {
+                    Side::Plus => (-direction * l.p, l.zero_p, -(l.q * l.pp - l.p * l.pm)),
+                    Side::Minus => (direction * l.q, l.zero_q, l.q * l.mp - l.p * l.mm),
+                };
+                // Sliding that begins on a fold: the margin's own zero there is not an exit.
+                if value <= zero {
+                    if rate <= 0.0 {
+                        propose(0.0, SlidingEnd::Fold(side));
+                        continue;
+                    }
+                    start = Start::Simple(rate * step.length());
+                }
+            }
+            let margin = |s| sliding.margins(system, &without_clock(&step.at(s)))[i];
+            if let Some(zero) = first_zero(margin, start) {
+                propose(zero.theta(), SlidingEnd::Fold(side));
+            }
+        }
+        let (before, after) = (step.x0[N], step.x1[N]);
+        let mut stop_at = |moment: f64, end: SlidingEnd| {
+            if after >= moment {
+                let theta = if after == moment {
+                    1.0
+                } else {
+                    brent(|s| step.at(s)[N] - moment, 0.0, 1.0, before - moment, after - moment)
+                };
+                propose(theta, end);
+            }
+        };
+        stop_at(self.t_end - t_base, SlidingEnd::Time);
+        if let Some(plan) = sliding.plan {
+            stop_at(self.t - t_base + (plan.time - sliding.time), SlidingEnd::Planned);
+            let mut arc = 0.0;
+            for (k, length) in chords::<N, M>(step, 1.0).into_iter().enumerate() {
+                if sliding.arc + arc + length >= plan.arc {
+                    let part = (plan.arc - sliding.arc - arc) / length;
+                    propose((k as f64 + part) / CHORDS as f64, SlidingEnd::Planned);
+                    break;
+                }
+                arc += length;
+            }
+        }
+        first
+    }
+
+    /// The last leg into a two-fold. `None`, as the loop's result, says that no other end was met.
+    fn arrive(&mut self, point: SVector<f64, N>, leg: f64, error: f64, mode: Mode) -> Option<SlidingEnd> {
+        let straight = Straight { system: self.system, from: self.x, to: point };
+        let t1 = self.t + leg;
+        if t1 > self.t_end {
+            let end = (self.t_end - self.t) / leg;
+            let x1 = straight.at(end);
+            self.take(mode, self.t_end, x1, &Truncated { inner: &straight, end });
+            return Some(SlidingEnd::Time);
+        }
+        self.take(mode, t1, point, &straight);
+        if self.stop.is_none() {
+            self.event(EventKind::TwoFoldReached { leg, error }, Some(mode), None);
+        }
+        None
+    }
+
+    /// Sliding has come to a fold of the field of `side`.
+    fn leave_at_fold(&mut self, side: Side, sliding: &Sliding) -> Result<State<N>, FilippovError> {
+        let l = self.lie(&self.x);
+        let from = Some(sliding.mode());
+        if l.p.abs() <= l.zero_p && l.q.abs() <= l.zero_q {
+            return Err(self.non_transversal(DEGENERATE_END));
+        }
+        if sliding.repelling {
+            // The edge of the repelling region is an invisible fold: only the other side is left to go to.
+            let to = side.other();
+            let (time, arc, rule) = (sliding.time, sliding.arc, self.chooser.rule);
+            let first = match to {
+                Side::Plus => l.p,
+                Side::Minus => -l.q,
+            };
+            if first <= 0.0 {
+                return Err(self.non_transversal("repelling sliding ends where both Lie derivatives vanish"));
+            }
+            self.event(EventKind::ExitAtBoundary { to, time, arc, rule }, from, Some(to.into()));
+            return Ok(State::Free { side: to, start: FlightStart::Transversal(first) });
+        }
+        let second = match side {
+            Side::Plus => l.pp,
+            Side::Minus => -l.mm,
+        };
+        if second <= 0.0 {
+            return Err(self.non_transversal("sliding ends at a fold that is not visible (a cusp or a two-fold)"));
+        }
+        self.event(EventKind::LeftByTangency { to: side }, from, Some(side.into()));
+        Ok(State::Free { side, start: FlightStart::Tangent(second) })
+    }
+
+    /// The future at a two-fold.
+    fn depart(&mut self, local: &SlidingAtTwoFold<N>) -> Result<State<N>, FilippovError> {
+        self.zeno = Zeno::default();
+        let [pp, _, _, mm] = local.second;
+        let growth = |side: Side| match side {
+            Side::Plus => pp,
+            Side::Minus => -mm,
+        };
+        let Some(plan) = self.chooser.plan() else {
+            return Ok(State::SetValued(None));
+        };
+        let (side, rule) = (plan.side, self.chooser.rule);
+        let curve = local.through.as_ref().or(local.back.as_ref());
+        let tangent = growth(side) > 0.0;
+        if tangent && (plan.at_once || curve.is_none()) {
+            self.event(EventKind::Exit { to: side, time: 0.0, arc: 0.0, rule }, None, Some(side.into()));
+            return Ok(State::Free { side, start: FlightStart::Tangent(growth(side)) });
+        }
+        let Some(curve) = curve else {
+            return Err(self.no_exit(
+                "no sliding motion leaves this two-fold and the fold of the side asked for is invisible; ask for the other side",
+            ));
+        };
+        let Some(limit) = local.departure_limit(self.system, curve) else {
+            return Err(self.non_transversal("the sliding direction at the two-fold is degenerate"));
+        };
+        let repelling = curve.rate < 0.0;
+        let mode = if repelling { Mode::SlidingRepelling } else { Mode::SlidingAttracting };
+        self.event(if repelling { EventKind::EnteredRepelling } else { EventKind::StartedOnSurface }, None, Some(mode));
+        let sign = curve.rate.signum();
+        let longest = curve.time(sign * limit);
+        let shortest = curve.time(sign * self.settings.departure * limit.min(local.radius));
+        // Arc along the curve up to a time, by chords.
+        let arc_until = |t: f64| {
+            let (end, mut last, mut arc) = (curve.sigma(t, limit), local.point, 0.0);
+            for k in 1..=LIMITS.departure_chords {
+                let point = curve.at(end * k as f64 / LIMITS.departure_chords as f64);
+                arc += (point - last).norm();
+                last = point;
+            }
+            arc
+        };
+        let mut planned = plan.time;
+        if plan.arc.is_finite() {
+            let excess = |t: f64| arc_until(t) - plan.arc;
+            let last = excess(longest);
+            planned = if last < 0.0 { f64::INFINITY } else { brent(excess, 0.0, longest, -plan.arc.max(1e-300), last) };
+        }
+        let planned = match (repelling, planned > 0.0) {
+            (false, _) => f64::INFINITY,
+            (true, false) => shortest,
+            (true, true) => planned.max(LIMITS.shortest_departure * shortest),
+        };
+        let duration = planned.min(longest);
+        let whole = AlongCurve { curve, from: 0.0, to: duration, limit };
+        if self.t + duration > self.t_end {
+            let end = (self.t_end - self.t) / duration;
+            let x1 = project(self.system, &whole.at(end));
+            self.take(mode, self.t_end, x1, &Truncated { inner: &whole, end });
+            return Ok(State::Sliding(Sliding { repelling, plan: repelling.then_some(plan), time: 0.0, arc: 0.0 }));
+        }
+        let x1 = project(self.system, &whole.at(1.0));
+        self.take(mode, self.t + duration, x1, &whole);
+        let arc = arc_until(duration);
+        if repelling && planned <= longest {
+            return Ok(self.exit(side, duration, arc, Some(mode)));
+        }
+        Ok(State::Sliding(if repelling {
+            Sliding { repelling, plan: Some(plan), time: duration, arc }
+        } else {
+            Sliding::ATTRACTING
+        }))
+    }
+}

@@ -1,0 +1,149 @@
+//! The vector fields that are integrated between events, and projection onto the surface.
+
+use nalgebra::SVector;
+
+use super::exit::Side;
+use crate::roots::brent;
+use crate::step::Interpolant;
+use twofold_num::Elementary;
+use twofold_system::filippov::{gradient, lie_derivatives};
+use twofold_system::{PiecewiseSmooth, VectorField};
+
+/// f+ or f-, continued smoothly across the surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FreeFlow<'a, P> {
+    pub system: &'a P,
+    pub side: Side,
+}
+
+impl<P: PiecewiseSmooth<N>, const N: usize> VectorField<N> for FreeFlow<'_, P> {
+    fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
+        match self.side {
+            Side::Plus => self.system.plus(x),
+            Side::Minus => self.system.minus(x),
+        }
+    }
+}
+
+/// The desingularised sliding field F = L-h f+ - L+h f-: the sliding field multiplied by L-h - L+h.
+///
+/// It is smooth everywhere, vanishes at a two-fold, and leaves h unchanged exactly: L_F h = L-h L+h - L+h L-h = 0.
+pub(super) fn desingularised<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(
+    system: &P,
+    x: &SVector<S, N>,
+) -> (SVector<S, N>, S) {
+    let (p, q) = lie_derivatives(system, x);
+    let (plus, minus) = (system.plus(x), system.minus(x));
+    (SVector::from_fn(|i, _| q * plus[i] - p * minus[i]), q - p)
+}
+
+/// The desingularised sliding flow with physical time as an extra state: (x, t)' = +-(F(x), L-h - L+h). `M` is `N + 1`. The
+/// sign is + in the attracting region and - in the repelling one, so that time always runs forward.
+#[derive(Clone, Copy, Debug)]
+pub struct SlidingFlow<'a, P, const N: usize> {
+    pub(super) system: &'a P,
+    pub(super) direction: f64,
+}
+
+/// Implemented for each dimension, because `N + 1` cannot yet be written in stable Rust's const generics.
+macro_rules! sliding_in_dimension {
+    ($n:literal, $m:literal) => {
+        impl<P: PiecewiseSmooth<$n>> VectorField<$m> for SlidingFlow<'_, P, $n> {
+            fn eval<S: Elementary>(&self, state: &SVector<S, $m>) -> SVector<S, $m> {
+                let x = SVector::<S, $n>::from_fn(|i, _| state[i]);
+                let (field, rate) = desingularised(self.system, &x);
+                SVector::from_fn(|i, _| if i < $n { field[i] } else { rate }.scale(self.direction))
+            }
+        }
+    };
+}
+
+sliding_in_dimension!(1, 2);
+sliding_in_dimension!(2, 3);
+sliding_in_dimension!(3, 4);
+sliding_in_dimension!(4, 5);
+sliding_in_dimension!(5, 6);
+sliding_in_dimension!(6, 7);
+sliding_in_dimension!(7, 8);
+sliding_in_dimension!(8, 9);
+
+/// The point of h = 0 that Newton's method along grad h finds from `x`. For h linear in one coordinate it is exact.
+pub(super) fn project<P: PiecewiseSmooth<N>, const N: usize>(system: &P, x: &SVector<f64, N>) -> SVector<f64, N> {
+    let mut y = *x;
+    let mut h = system.switching(&y);
+    for _ in 0..8 {
+        if h == 0.0 {
+            break;
+        }
+        let g = gradient(system, &y);
+        let next = y - g * (h / g.norm_squared());
+        let there = system.switching(&next);
+        if there.is_nan() || there.abs() >= h.abs() {
+            break;
+        }
+        (y, h) = (next, there);
+    }
+    y
+}
+
+/// The first part, up to the fraction `end`, of a step.
+pub(super) struct Truncated<'a, const N: usize> {
+    pub inner: &'a dyn Interpolant<N>,
+    pub end: f64,
+}
+
+impl<const N: usize> Interpolant<N> for Truncated<'_, N> {
+    fn at(&self, theta: f64) -> SVector<f64, N> {
+        self.inner.at(theta * self.end)
+    }
+    fn degree(&self) -> usize {
+        self.inner.degree()
+    }
+}
+
+/// A step of the sliding flow seen in physical time: finds the rescaled time for a physical one, and projects.
+pub(super) struct InPhysicalTime<'a, P, const N: usize, const M: usize> {
+    pub system: &'a P,
+    pub inner: &'a dyn Interpolant<M>,
+    pub end: f64,
+    /// Physical time at the start and at `end`, on the flow's own clock.
+    pub clock: (f64, f64),
+}
+
+impl<P: PiecewiseSmooth<N>, const N: usize, const M: usize> Interpolant<N> for InPhysicalTime<'_, P, N, M> {
+    fn at(&self, theta: f64) -> SVector<f64, N> {
+        let (from, to) = self.clock;
+        let wanted = from + theta * (to - from);
+        let clock = |s: f64| self.inner.at(s)[N] - wanted;
+        let (a, b) = (from - wanted, to - wanted);
+        let s = if a >= 0.0 {
+            0.0
+        } else if b <= 0.0 {
+            self.end
+        } else {
+            brent(clock, 0.0, self.end, a, b)
+        };
+        let state = self.inner.at(s);
+        project(self.system, &SVector::from_fn(|i, _| state[i]))
+    }
+    fn degree(&self) -> usize {
+        // Not a polynomial in time; a step of the method is smooth enough for twice the degree to resolve it.
+        2 * self.inner.degree()
+    }
+}
+
+/// A straight stretch at constant speed, projected: the last leg into a two-fold.
+pub(super) struct Straight<'a, P, const N: usize> {
+    pub system: &'a P,
+    pub from: SVector<f64, N>,
+    pub to: SVector<f64, N>,
+}
+
+impl<P: PiecewiseSmooth<N>, const N: usize> Interpolant<N> for Straight<'_, P, N> {
+    fn at(&self, theta: f64) -> SVector<f64, N> {
+        project(self.system, &(self.from + (self.to - self.from) * theta))
+    }
+    fn degree(&self) -> usize {
+        1
+    }
+}

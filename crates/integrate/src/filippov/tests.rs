@@ -1,0 +1,496 @@
+//! What holds for any piecewise-smooth system: two sides that mirror each other, the local analysis against differences of the field itself, and a
+//! two-fold that is not at the origin.
+
+use nalgebra::{SVector, vector};
+
+use super::flow::desingularised;
+use super::two_fold::{AlongCurve, SlidingAtTwoFold};
+use super::*;
+use crate::Watch;
+use crate::step::Interpolant;
+use twofold_num::Elementary;
+use twofold_num::random::RandomStream;
+use twofold_system::{Bound, PiecewiseSmooth, System};
+
+/// h becomes -h, f+ and f- change places: the same motion by other names.
+#[derive(Clone)]
+struct Mirrored<P>(P);
+
+impl<P: PiecewiseSmooth<N>, const N: usize> PiecewiseSmooth<N> for Mirrored<P> {
+    fn switching<S: Elementary>(&self, x: &SVector<S, N>) -> S {
+        -self.0.switching(x)
+    }
+    fn plus<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
+        self.0.minus(x)
+    }
+    fn minus<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
+        self.0.plus(x)
+    }
+}
+
+/// Everything of a run but its sides: times, states, kinds of events and modes.
+fn story(
+    run: &(Result<FilippovSummary<3>, FilippovError>, Trajectory<3>),
+    mirror: bool,
+) -> Vec<(f64, SVector<f64, 3>, String)> {
+    let side = |side: Side| if mirror { side.other() } else { side };
+    let mode = |mode: Option<Mode>| {
+        mode.map(|mode| match mode {
+            Mode::Plus => side(Side::Plus).into(),
+            Mode::Minus => side(Side::Minus).into(),
+            sliding => sliding,
+        })
+    };
+    let kind = |kind: EventKind| match kind {
+        EventKind::Crossing { to } => format!("crossing to {:?}", side(to)),
+        EventKind::Landing { from } => format!("landing from {:?}", side(from)),
+        EventKind::Grazing { side: on } => format!("grazing on {:?}", side(on)),
+        EventKind::LeftByTangency { to } => format!("tangency to {:?}", side(to)),
+        EventKind::Exit { to, .. } => format!("exit to {:?}", side(to)),
+        EventKind::ExitAtBoundary { to, .. } => format!("boundary to {:?}", side(to)),
+        EventKind::TwoFoldReached { .. } => "two-fold".into(),
+        other => format!("{other:?}"),
+    };
+    let (end, seen) = run;
+    let mut all: Vec<_> = seen
+        .events
+        .iter()
+        .map(|e| (e.t, e.state, format!("{} {:?} {:?}", kind(e.kind), mode(e.from), mode(e.to))))
+        .collect();
+    match end {
+        Ok(end) => all.push((end.t, end.x, format!("{:?} {:?} {}", end.stop, mode(end.mode), end.events))),
+        Err(error) => {
+            let word = format!("{error:?}").split([' ', '(']).next().unwrap_or_default().to_owned();
+            all.push((0.0, SVector::zeros(), word));
+        }
+    }
+    all
+}
+
+fn fold(plus: f64, minus: f64, v: f64, w: f64) -> Bound<3> {
+    let values = [("plus_fold", plus), ("minus_fold", minus), ("v", v), ("w", w)];
+    System::builtin("two-fold")
+        .unwrap()
+        .with_all(values.map(|(name, value)| (name, value.into())))
+        .unwrap()
+        .bind()
+        .unwrap()
+}
+
+#[test]
+fn the_two_sides_mirror_each_other() {
+    let settings = Settings { tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 }, max_events: 40, ..Settings::default() };
+    let mut kinds = std::collections::BTreeSet::new();
+    for (plus, minus) in [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] {
+        for (v, w) in [(0.0, 0.0), (-1.2, -1.4), (0.5, -0.7)] {
+            let system = fold(plus, minus, v, w);
+            for start in [
+                [0.0, 0.3, 0.8],
+                [0.0, -1.0, -2.0],
+                [0.0, -1.0, 1.0],
+                [0.0, 1.0, -1.0],
+                [0.0, -0.6, -0.25],
+                [0.0, 0.0, -0.5],
+                [0.0, -0.5, 0.0],
+                [0.0, 0.0, 0.0],
+                // Touches where the field turns round: from above, from below, and almost.
+                [0.5, -1.0, -1.0],
+                [-0.5, -1.0, -1.0],
+                [-0.5, 1.0, -1.0],
+                [0.5 - 1e-9, -1.0, -1.0],
+                [-0.5 + 1e-9, -1.0, -1.0],
+                [0.3, 0.4, -0.7],
+            ] {
+                for side in [Side::Plus, Side::Minus] {
+                    for at_once in [false, true] {
+                        let rule = |side| {
+                            if at_once { ExitRule::AtOnce { side } } else { ExitRule::AfterTime { time: 0.3, side } }
+                        };
+                        let mut seen = [Trajectory::new(1), Trajectory::new(1)];
+                        let [straight, turned] = &mut seen;
+                        let x0 = SVector::from(start);
+                        let ends = [
+                            run(&system, x0, 3.0, &settings, rule(side), straight),
+                            run(&Mirrored(system.clone()), x0, 3.0, &settings, rule(side.other()), turned),
+                        ];
+                        let [a, b] = ends;
+                        let [straight, turned] = seen;
+                        let (a, b) = (story(&(a, straight), false), story(&(b, turned), true));
+                        assert_eq!(a.len(), b.len(), "{start:?}: {a:?} {b:?}");
+                        for (a, b) in a.iter().zip(&b) {
+                            assert_eq!(a.2, b.2, "{start:?}");
+                            let gap = (a.0 - b.0).abs().max((a.1 - b.1).amax());
+                            assert!(gap < 1e-9, "{start:?}: {a:?} {b:?}");
+                            kinds.insert(a.2.split(' ').next().unwrap_or_default().to_owned());
+                        }
+                    }
+                }
+            }
+        }
+    }
+    for kind in ["crossing", "landing", "grazing", "tangency", "exit", "boundary", "two-fold", "StartedOnSurface"] {
+        assert!(kinds.contains(kind), "no {kind} among {kinds:?}");
+    }
+}
+
+/// A curved surface and fields with squares; the two-fold is at `centre`.
+#[derive(Clone, Debug)]
+struct Curved {
+    centre: [f64; 3],
+    bend: f64,
+    /// Of each field: the first component's slopes and squares, the other components' values and slopes.
+    fields: [[f64; 8]; 2],
+}
+
+impl Curved {
+    fn by_chance(stream: &mut RandomStream) -> Self {
+        let mut number = || stream.uniform_in(-1.5, 1.5);
+        Self {
+            centre: [(); 3].map(|()| number()),
+            bend: 0.3 * number(),
+            fields: [(); 2].map(|()| {
+                let mut field = [(); 8].map(|()| number());
+                [2, 3, 6, 7].into_iter().for_each(|i| field[i] *= 0.2);
+                field
+            }),
+        }
+    }
+    fn field<S: Elementary>(&self, x: &SVector<S, 3>, which: usize) -> SVector<S, 3> {
+        let [_, y, z] = [0, 1, 2].map(|i| x[i] - S::from_f64(self.centre[i]));
+        let c = self.fields[which].map(S::from_f64);
+        vector![c[0] * y + c[1] * z + c[2] * y * y + c[3] * z * z, c[4] + c[6] * z, c[5] + c[7] * y]
+    }
+}
+
+impl PiecewiseSmooth<3> for Curved {
+    fn switching<S: Elementary>(&self, x: &SVector<S, 3>) -> S {
+        let [x, y, z] = [0, 1, 2].map(|i| x[i] - S::from_f64(self.centre[i]));
+        x + (y * z).scale(self.bend)
+    }
+    fn plus<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+        self.field(x, 0)
+    }
+    fn minus<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+        self.field(x, 1)
+    }
+}
+
+fn near(a: f64, b: f64, tolerance: f64, what: &str) {
+    assert!((a - b).abs() <= tolerance * (1.0 + b.abs()), "{what}: {a} is not {b}");
+}
+
+#[test]
+fn the_local_analysis_is_that_of_the_field_itself() {
+    let mut stream = RandomStream::new(8, 0);
+    let (mut sliding, mut spirals, mut backwards) = (0, 0, 0);
+    for _ in 0..60 {
+        let s = Curved::by_chance(&mut stream);
+        let centre = SVector::from(s.centre);
+        let Some(local) = SlidingAtTwoFold::near(&s, &(centre + vector![0.01, -0.02, 0.015])) else { continue };
+        assert!((local.point - centre).amax() < 1e-12, "{s:?}: {:?}", local.point);
+        let field = |x: &SVector<f64, 3>| desingularised(&s, x).0;
+        // L+h and L-h near the centre, and their slopes along both fields there.
+        let slopes = [0, 1].map(|i| {
+            let f = s.fields[i];
+            [f[0] + s.bend * f[5], f[1] + s.bend * f[4]]
+        });
+        let along = |slope: [f64; 2], field: usize| slope[0] * s.fields[field][4] + slope[1] * s.fields[field][5];
+        let [pp, pm, mp, mm] = [along(slopes[0], 0), along(slopes[0], 1), along(slopes[1], 0), along(slopes[1], 1)];
+        for (found, want) in local.second.iter().zip([pp, pm, mp, mm]) {
+            near(*found, want, 1e-11, "second Lie derivative");
+        }
+        let (trace, determinant) = (mp - pm, mm * pp - pm * mp);
+        assert_eq!(local.directions.is_some(), 0.25 * trace * trace > determinant);
+        let Some([weak, strong]) = &local.directions else {
+            spirals += 1;
+            assert!(local.through.is_none() && local.back.is_none() && local.radius == 1e-3);
+            continue;
+        };
+        assert!(weak.rate.abs() <= strong.rate.abs());
+        near(weak.rate * strong.rate, determinant, 1e-10, "product of the rates");
+        near(weak.rate + strong.rate, trace, 1e-10, "sum of the rates");
+        for d in [weak, strong] {
+            near(d.vector.norm(), 1.0, 1e-12, "length");
+            near(d.vector[0], 0.0, 1e-12, "tangent to the surface");
+            assert!(d.lie[0] < 0.0 || (d.lie[0] == 0.0 && d.lie[1] >= 0.0), "{d:?}");
+            for (lie, slope) in d.lie.iter().zip(slopes) {
+                near(*lie, slope[0] * d.vector[1] + slope[1] * d.vector[2], 1e-9, "Lie derivative along it");
+            }
+            let e = 1e-5;
+            let slope = (field(&(centre + d.vector * e)) - field(&(centre - d.vector * e))) / (2.0 * e);
+            assert!((slope - d.vector * d.rate).amax() < 1e-8 * (1.0 + d.rate.abs()), "{slope} {d:?}");
+            assert_eq!(d.slides(), d.lie[0] < 0.0 && d.lie[1] > 0.0);
+        }
+        let [a, b] = local.coordinates(&s, &(centre + (weak.vector * 3.0 - strong.vector * 2.0) * 1e-6)).unwrap();
+        if (weak.rate - strong.rate).abs() > 0.1 {
+            near(a * 1e6, 3.0, 1e-3, "along the weak direction");
+            near(b * 1e6, -2.0, 1e-3, "along the strong direction");
+        }
+        let of_sign = |sign: f64| [weak, strong].iter().position(|d| d.slides() && d.rate * sign > 0.0);
+        assert_eq!(local.through.as_ref().map(|c| c.index), of_sign(-1.0));
+        assert_eq!(local.back.as_ref().map(|c| c.index), of_sign(1.0));
+        let curves = [&local.through, &local.back].map(|c| c.as_ref());
+        let smallest = curves.iter().flatten().map(|c| c.radius).fold(f64::INFINITY, f64::min);
+        assert_eq!(local.radius, if smallest.is_finite() { smallest.min(1.0) } else { 1e-3 });
+        for curve in curves.into_iter().flatten() {
+            sliding += 1;
+            backwards += usize::from(curve.rate > 0.0);
+            let direction = [weak, strong][curve.index];
+            assert_eq!(curve.rate, direction.rate);
+            assert_eq!(curve.at(0.0), local.point);
+            assert!(curve.radius > 1e-3 && curve.radius < 1e3, "{}", curve.radius);
+            for part in [-1.0, -0.6, 0.3, 1.0] {
+                let (sigma, e) = (part * curve.radius, 1e-4 * curve.radius);
+                let slope = (curve.at(sigma + e) - curve.at(sigma - e)) / (2.0 * e);
+                let (f, clock) = desingularised(&s, &curve.at(sigma));
+                assert!((f - slope * (sigma * curve.rate)).amax() < 1e-5 * f.amax(), "{part}: {f} {slope}");
+                let speed = (curve.time(sigma + e) - curve.time(sigma - e)) / (2.0 * e);
+                near(speed, clock / (curve.rate * sigma), 1e-5, "time along the curve");
+                near(s.switching(&curve.at(sigma)), 0.0, 1e-9, "on the surface");
+                let back = curve.sigma(curve.time(sigma), curve.radius);
+                near(back / curve.radius, part, 1e-6, "there and back");
+            }
+            let e = 1e-3 * curve.radius;
+            let slope = (curve.at(e) - curve.at(-e)) / (2.0 * e);
+            assert!((slope - direction.vector).amax() < 1e-3, "{slope} {direction:?}");
+            assert_eq!(curve.sigma(0.0, curve.radius), 0.0);
+            for sign in [-1.0, 1.0] {
+                let limit = 0.25 * curve.radius;
+                assert_eq!(
+                    curve.sigma(3.0 * curve.time(sign * limit), limit),
+                    sign * limit,
+                    "no farther than the limit"
+                );
+            }
+            // As a step its ends are those of its times, whichever side of the two-fold they are on.
+            let [from, to] = [curve.time(-0.5 * curve.radius), curve.time(0.25 * curve.radius)];
+            let step = AlongCurve { curve, from, to, limit: curve.radius };
+            for (theta, part) in [(0.0, -0.5), (-from / (to - from), 0.0), (1.0, 0.25)] {
+                assert!((step.at(theta) - curve.at(part * curve.radius)).amax() < 1e-9, "{theta}");
+            }
+            // Where the curve may be used it is in the sliding regions.
+            let limit = local.departure_limit(&s, curve).unwrap();
+            assert!(limit <= curve.radius);
+            // Arrival along it takes the series' time; an orbit beside it, the linear flow's besides, if that contracts.
+            let (on, across) = (1e-5, 3e-9);
+            let repelling = curve.rate > 0.0;
+            let (time, error) = local.time_to_arrive(&s, &curve.at(on), repelling).unwrap();
+            near(time / curve.time(on), -1.0, 1e-3, "time to arrive");
+            near(error / (time.abs() * on / local.radius), 1.0, 1e-2, "its error");
+            let other = [weak, strong][1 - curve.index];
+            let beside = curve.at(on) + other.vector * across;
+            if other.rate * curve.rate > 0.0 {
+                let (later, _) = local.time_to_arrive(&s, &beside, repelling).unwrap();
+                let linear = across * (other.lie[1] - other.lie[0]) / -other.rate;
+                assert!((later - time - linear).abs() < 0.02 * linear.abs() + 1e-12, "{later} {time} {linear}");
+            } else {
+                assert!(local.time_to_arrive(&s, &beside, repelling).is_some(), "almost on the curve");
+                let far = curve.at(on) + other.vector * (0.1 * on);
+                assert_eq!(local.time_to_arrive(&s, &far, repelling), None);
+            }
+        }
+    }
+    assert!(sliding > 10 && spirals > 3 && backwards > 2, "{sliding} {spirals} {backwards}");
+}
+
+/// Its invariant curve is the line y = z in the surface, along which F = -y (0, 1, 1); L+h = -y (1 + 2 y) is zero there at the two-fold and, after it, at y = -1/2.
+#[derive(Clone)]
+struct Straight;
+
+impl PiecewiseSmooth<3> for Straight {
+    fn switching<S: Elementary>(&self, x: &SVector<S, 3>) -> S {
+        x[0]
+    }
+    fn plus<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+        // f+ = -(1, 1) - (1 + 2 y) f-, so that q f+ - p f- = -y (1, 1) on the line, where p = -y (1 + 2 y) and q = y.
+        let rest = S::one() + x[1].scale(2.0);
+        let along = S::from_f64(-1.0);
+        vector![-(x[1] * rest), along - rest.scale(0.5), along - rest.scale(-0.25)]
+    }
+    fn minus<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+        vector![x[2], S::from_f64(0.5), S::from_f64(-0.25)]
+    }
+}
+
+#[test]
+fn a_curve_is_used_only_where_it_slides() {
+    let local = SlidingAtTwoFold::near(&Straight, &vector![0.0, 0.01, 0.02]).unwrap();
+    let curve = local.through.as_ref().unwrap();
+    let zero = std::f64::consts::FRAC_1_SQRT_2;
+    assert!(curve.radius > zero, "the series itself knows of no fold: {}", curve.radius);
+    let limit = local.departure_limit(&Straight, curve).unwrap();
+    assert!(limit < zero && limit > 0.4 * zero, "{limit}");
+}
+
+/// A two-fold with rates -0.3, along the sliding direction, and -0.6: from order 2 on the curve has no series.
+#[test]
+fn a_resonance_ends_the_series() {
+    let square = [0.0, 0.0, 0.1, 0.0];
+    let field = |slopes: [f64; 2], values: [f64; 2]| {
+        [slopes[0], slopes[1], square[2], square[3], values[0], values[1], 0.0, 0.0]
+    };
+    let system = Curved {
+        centre: [0.0; 3],
+        bend: 0.0,
+        fields: [field([1.0, 0.0], [-0.15, -0.45]), field([0.0, 1.0], [0.45, 0.15])],
+    };
+    let local = SlidingAtTwoFold::near(&system, &vector![0.0, 0.01, 0.02]).unwrap();
+    let [weak, strong] = local.directions.unwrap();
+    near(weak.rate, -0.3, 1e-14, "weak");
+    near(strong.rate, -0.6, 1e-14, "strong");
+    let curve = local.through.unwrap();
+    assert_eq!(curve.index, 0);
+    // The invariance equation is kept to 1e-12 as far as the square of the distance allows, and no term of a small divisor spoils that.
+    assert!(curve.radius > 1e-9 && curve.radius < 1e-4, "{}", curve.radius);
+}
+
+/// A two-fold moved to `centre`.
+#[derive(Clone)]
+struct Moved {
+    fold: Bound<3>,
+    centre: [f64; 3],
+}
+
+impl Moved {
+    fn back<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+        SVector::from_fn(|i, _| x[i] - S::from_f64(self.centre[i]))
+    }
+}
+
+impl PiecewiseSmooth<3> for Moved {
+    fn switching<S: Elementary>(&self, x: &SVector<S, 3>) -> S {
+        self.fold.switching(&self.back(x))
+    }
+    fn plus<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+        self.fold.plus(&self.back(x))
+    }
+    fn minus<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+        self.fold.minus(&self.back(x))
+    }
+}
+
+#[test]
+fn futures_and_pasts_meet_at_a_two_fold_anywhere() {
+    // Time to and from the two-fold: -(1, 1) A^-1 (y, z) with A = [[w, 1], [1, v]].
+    let (v, w) = (-1.2, -1.4);
+    let time = |y: f64, z: f64| ((v * y - z) + (w * z - y)) / (1.0 - v * w);
+    let system = Moved { fold: fold(1.0, 1.0, v, w), centre: [2.0, -3.0, 5.0] };
+    let place = |y: f64, z: f64| SVector::from(system.centre) + vector![0.0, y, z];
+    let settings = Settings::default();
+    let path = connect(&system, place(0.3, 0.8), place(-0.4, -0.5), 100.0, &settings, 2).unwrap();
+    let points: Vec<_> = path.points().collect();
+    let (first, last) = (points[0], points[points.len() - 1]);
+    assert!((first.1 - place(0.3, 0.8)).amax() < 1e-12 && (last.1 - place(-0.4, -0.5)).amax() < 1e-9);
+    near(last.0 - first.0, time(0.3, 0.8) + time(0.4, 0.5), 1e-9, "there and on");
+    assert!(points.windows(2).all(|p| p[1].0 >= p[0].0 - 1e-12), "time runs forward");
+    let past = history(&system, place(-0.4, -0.5), 100.0, &settings, 2).unwrap();
+    near(past.points().last().unwrap().0, time(0.4, 0.5), 1e-9, "its past");
+    let grid = FunnelGrid { shortest: 0.1, longest: 0.4, times: 3, horizon: 2.0, until_two_fold: true, per_step: 1 };
+    let family = funnel(&system, place(0.3, 0.8), 100.0, &settings, &grid).unwrap();
+    assert!(family.at_two_fold && (family.point - place(0.0, 0.0)).amax() < 1e-12);
+    let times: Vec<_> = family.members.iter().map(|m| m.exit_time).collect();
+    for (found, want) in times.iter().zip([0.1, 0.1, 0.2, 0.2, 0.4, 0.4]) {
+        near(*found, want, 1e-12, "equal ratios");
+    }
+    for member in &family.members {
+        let exit = member.trajectory.events.iter().find(|e| matches!(e.kind, EventKind::Exit { .. })).unwrap();
+        near(exit.t - family.t, member.exit_time, 1e-12, "exit");
+        assert_eq!(exit.to, Some(member.side.into()));
+    }
+    let only = family.members_on(&system, &settings, &FunnelGrid { times: 1, ..grid }, Some(Side::Plus)).unwrap();
+    assert!(only.len() == 1 && only[0].exit_time == 0.4 && only[0].side == Side::Plus);
+}
+
+#[test]
+fn a_start_on_a_visible_fold_flies_off_along_it() {
+    // f+ = (y, 1, 0) and f- = (-z, 0, 1): from a fold of one side, where the other points to the same side.
+    let system = fold(-1.0, -1.0, 0.0, 0.0);
+    for (start, side, end) in
+        [([0.0, 0.0, -0.5], Side::Plus, [0.5, 1.0, -0.5]), ([0.0, -0.5, 0.0], Side::Minus, [-0.5, -0.5, 1.0])]
+    {
+        let mut seen = Trajectory::new(1);
+        let rule = ExitRule::AtOnce { side: Side::Plus };
+        let summary = run(&system, start.into(), 1.0, &Settings::default(), rule, &mut seen).unwrap();
+        assert_eq!(seen.events.len(), 1, "{:?}", seen.events);
+        assert_eq!((seen.events[0].kind, seen.events[0].to), (EventKind::StartedOnSurface, Some(side.into())));
+        assert!((summary.x - SVector::from(end)).amax() < 1e-11, "{}", summary.x);
+    }
+}
+
+#[test]
+fn a_budget_is_an_error_where_it_is_asked_to_be() {
+    let summary = |stop| FilippovSummary {
+        t: 1.5,
+        x: vector![1.0, 2.0],
+        mode: None,
+        stop,
+        events: 0,
+        statistics: Statistics { steps: 7, ..Statistics::default() },
+    };
+    let failure = Failure::TooManySteps { t: 1.5, limit: 7, state: vec![1.0, 2.0] };
+    assert_eq!(summary(StopReason::StepBudget).within_budget(), Err(FilippovError::Stepping(failure)));
+    for stop in [StopReason::EndTime, StopReason::Observer, StopReason::Watch, StopReason::SetValued] {
+        assert_eq!(summary(stop).within_budget(), Ok(summary(stop)));
+    }
+}
+
+/// A watch is asked at every event and now and then between steps; when it refuses, the run ends there.
+#[test]
+fn a_watch_ends_a_run() {
+    struct Until(f64);
+    impl Watch for Until {
+        fn reached(&self, t: f64) -> bool {
+            t < self.0
+        }
+    }
+    let system = fold(1.0, -1.0, 0.5, -0.7);
+    let settings = Settings { max_step: 1e-4, ..Settings::default() };
+    let rule = ExitRule::AtOnce { side: Side::Plus };
+    let ends = |until: f64| {
+        let mut seen = Trajectory::new(1);
+        let end = run_watched(&system, vector![0.0, 0.3, 0.8], 3.0, &settings, rule, &mut seen, &Until(until)).unwrap();
+        (end.stop, end.t, seen.events)
+    };
+    let (stop, t, events) = ends(f64::INFINITY);
+    assert!(stop == StopReason::EndTime && t == 3.0 && !events.is_empty(), "{stop:?} {t}");
+    // At an event, and in the thousands of steps between two.
+    let (stop, t, _) = ends(events[0].t);
+    assert!(stop == StopReason::Watch && t == events[0].t, "{stop:?} {t}");
+    let last = events[events.len() - 1].t;
+    assert!(last < 1.0, "{last}");
+    let (stop, t, _) = ends(last + 0.5);
+    assert!(stop == StopReason::Watch && t > last + 0.5 && t < 3.0, "{stop:?} {t}");
+}
+
+#[test]
+fn exit_rules_have_numbers_that_make_sense_and_words() {
+    let random = |law, plus_probability| ExitRule::Random { law, plus_probability, seed: 1, stream: 2 };
+    let uniform = |longest| SlidingLaw::Uniform { longest };
+    let exponential = |mean| SlidingLaw::Exponential { mean };
+    let side = Side::Minus;
+    for good in [
+        ExitRule::All,
+        ExitRule::AtOnce { side },
+        ExitRule::AfterTime { time: 0.0, side },
+        ExitRule::AfterArc { arc: 1.5, side },
+        random(uniform(0.0), 0.0),
+        random(exponential(2.0), 1.0),
+    ] {
+        assert_eq!(good.validate(), Ok(()), "{good}");
+    }
+    for (bad, what) in [
+        (ExitRule::AfterTime { time: -0.1, side }, "time"),
+        (ExitRule::AfterTime { time: f64::INFINITY, side }, "time"),
+        (ExitRule::AfterArc { arc: f64::NAN, side }, "arc"),
+        (random(uniform(-1.0), 0.5), "longest time"),
+        (random(exponential(f64::INFINITY), 0.5), "mean time"),
+        (random(uniform(1.0), 1.1), "probability"),
+        (random(exponential(1.0), -0.1), "probability"),
+        (random(exponential(1.0), f64::NAN), "probability"),
+    ] {
+        let said = bad.validate().unwrap_err();
+        assert!(said.contains(what), "{bad}: {said}");
+    }
+    assert_eq!(ExitRule::AtOnce { side }.to_string(), "at-once:minus");
+    assert_eq!(ExitRule::AfterTime { time: 0.3, side: Side::Plus }.to_string(), "after-time:0.3:plus");
+}

@@ -1,0 +1,55 @@
+//! Time stepping: from an equation and a start to a sequence of accepted steps.
+//!
+//! A method is a [`Stepper`]: it makes one accepted [`Step`] at a time, and every step carries its interpolant (dense
+//! output). The one driver loop, [`drive`], runs a stepper over a [`Course`] (an end time, a [`Schedule`] of restarts and kicks, bounds on steps) and hands each
+//! step to an [`Observer`]. What is made of the steps (a path, a section) is not decided here.
+//!
+//! ```
+//! use nalgebra::{SVector, vector};
+//! use twofold_integrate::{Course, Dopri5, Ignore, StopReason, Tolerance, drive};
+//! use twofold_num::Elementary;
+//! use twofold_system::VectorField;
+//!
+//! /// x'' = -x.
+//! struct Oscillator;
+//! impl VectorField<2> for Oscillator {
+//!     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+//!         vector![x[1], -x[0]]
+//!     }
+//! }
+//!
+//! let mut method = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
+//! let end = drive(&Oscillator, vector![1.0, 0.0], &Course::to(1.0), &mut method, &mut Ignore, &())?;
+//! assert_eq!(end.stop, StopReason::EndTime);
+//! assert!((end.x[0] - 0.540_302_305_868).abs() < 1e-8); // cos 1
+//! # Ok::<(), twofold_integrate::Failure>(())
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
+
+pub mod dopri5;
+pub mod driver;
+pub mod ensemble;
+pub mod filippov;
+pub mod layered;
+mod linear;
+pub mod lsoda;
+pub mod method;
+pub mod radau5;
+pub mod roots;
+pub mod schedule;
+mod starting_step;
+pub mod step;
+pub mod taylor;
+#[cfg(test)]
+mod tests;
+
+pub use dopri5::Dopri5;
+pub use driver::{Course, Ignore, Observer, Part, Summary, Watch, drive, drive_part};
+pub use layered::Layered;
+pub use lsoda::Lsoda;
+pub use method::{Method, PRECISIONS, WithStepper, with_extended};
+pub use radau5::Radau5;
+pub use schedule::{Kick, KickLaw, Kicker, Schedule, StepCap};
+pub use step::{Failure, Flow, Interpolant, Statistics, Step, Stepper, StopReason, Tolerance};
+pub use taylor::Taylor;

@@ -1,0 +1,142 @@
+//! The Nordsieck array: x and its scaled derivatives h^j x^(j)/j!.
+
+use nalgebra::SVector;
+
+use super::coefficients::{COLUMNS, Formula};
+use crate::step::Interpolant;
+
+/// Scaled derivatives y_j = h^j x^(j)/j! at one time, j = 0..=q used.
+#[derive(Clone, Debug)]
+pub(super) struct Nordsieck<const N: usize> {
+    y: [SVector<f64, N>; COLUMNS],
+    /// The order of the step that led here: the degree of the polynomial that is its dense output.
+    degree: usize,
+}
+
+impl<const N: usize> Nordsieck<N> {
+    pub fn new(x: SVector<f64, N>, h_derivative: SVector<f64, N>) -> Self {
+        let mut y = [SVector::zeros(); COLUMNS];
+        y[0] = x;
+        y[1] = h_derivative;
+        Self { y, degree: 1 }
+    }
+
+    pub fn column(&self, j: usize) -> &SVector<f64, N> {
+        &self.y[j]
+    }
+
+    pub fn set_column(&mut self, j: usize, value: SVector<f64, N>) {
+        self.y[j] = value;
+    }
+
+    /// The state.
+    pub fn x(&self) -> &SVector<f64, N> {
+        &self.y[0]
+    }
+
+    /// Taylor's formula one step ahead: multiplication by Pascal's triangle, by additions alone.
+    pub fn predict(&mut self, order: usize) {
+        match order {
+            1 => self.predict_of::<1>(),
+            2 => self.predict_of::<2>(),
+            3 => self.predict_of::<3>(),
+            4 => self.predict_of::<4>(),
+            5 => self.predict_of::<5>(),
+            6 => self.predict_of::<6>(),
+            7 => self.predict_of::<7>(),
+            8 => self.predict_of::<8>(),
+            9 => self.predict_of::<9>(),
+            10 => self.predict_of::<10>(),
+            11 => self.predict_of::<11>(),
+            _ => self.predict_of::<12>(),
+        }
+    }
+
+    /// For one order, so that the columns stay in registers from the first addition to the last: through memory each would wait for the one
+    /// before to be written and read again.
+    #[inline]
+    fn predict_of<const ORDER: usize>(&mut self) {
+        let mut y = self.y;
+        for start in (0..ORDER).rev() {
+            for j in start..ORDER {
+                let next = y[j + 1];
+                y[j] += next;
+            }
+        }
+        self.y[..=ORDER].copy_from_slice(&y[..=ORDER]);
+    }
+
+    /// Undoes [`Nordsieck::predict`] up to rounding.
+    pub fn retract(&mut self, order: usize) {
+        for start in (0..order).rev() {
+            for j in start..order {
+                let next = self.y[j + 1];
+                self.y[j] -= next;
+            }
+        }
+    }
+
+    /// y <- y + l e.
+    pub fn correct(&mut self, order: usize, formula: &Formula, e: &SVector<f64, N>) {
+        for (y, l) in self.y[..=order].iter_mut().zip(formula.l) {
+            *y += e * l;
+        }
+        self.degree = order;
+    }
+
+    /// Goes over to the step `ratio` times as long.
+    pub fn rescale(&mut self, order: usize, ratio: f64) {
+        let mut power = 1.0;
+        for y in &mut self.y[1..=order] {
+            power *= ratio;
+            *y *= power;
+        }
+    }
+}
+
+/// The Nordsieck polynomial, over the step that was corrected last and has not been rescaled since. It misses that
+/// step's start by about the local error, as the dense output of a multistep method does: it is the new polynomial, not
+/// the one before.
+impl<const N: usize> Interpolant<N> for Nordsieck<N> {
+    fn at(&self, theta: f64) -> SVector<f64, N> {
+        let s = theta - 1.0;
+        let mut x = self.y[self.degree];
+        for y in self.y[..self.degree].iter().rev() {
+            x = x * s + y;
+        }
+        x
+    }
+    fn coordinate(&self, theta: f64, i: usize) -> f64 {
+        let s = theta - 1.0;
+        self.y[..self.degree].iter().rev().fold(self.y[self.degree][i], |x, y| x * s + y[i])
+    }
+    fn degree(&self) -> usize {
+        self.degree
+    }
+    /// The polynomial's distance from its end, term by term.
+    fn reach(&self, coordinate: usize) -> f64 {
+        self.y[1..=self.degree].iter().map(|y| y[coordinate].abs()).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// x = t^3 at t = 1 with h = 0.5: exact at 1.5 after one prediction, and back.
+    #[test]
+    fn prediction_is_taylors_formula() {
+        let mut y = Nordsieck::new(SVector::from([1.0]), SVector::from([1.5]));
+        y.set_column(2, SVector::from([0.75]));
+        y.set_column(3, SVector::from([0.125]));
+        y.degree = 3;
+        assert_eq!(y.at(2.0)[0], 3.375);
+        y.predict(3);
+        assert_eq!([0, 1, 2, 3].map(|j| y.column(j)[0]), [3.375, 3.375, 1.125, 0.125]);
+        assert_eq!(y.at(0.0)[0], 1.0);
+        y.retract(3);
+        assert_eq!([0, 1, 2, 3].map(|j| y.column(j)[0]), [1.0, 1.5, 0.75, 0.125]);
+        y.rescale(3, 2.0);
+        assert_eq!(y.at(2.0)[0], 8.0);
+    }
+}

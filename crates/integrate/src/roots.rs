@@ -1,0 +1,581 @@
+//! Event location: zeros of a function of the state along one step, on its dense output.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::step::Step;
+use twofold_num::elementary::cos;
+
+/// The zero of `f` in [a, b], f(a) and f(b) of opposite sign or one of them zero, to the last bits of the bracket.
+///
+/// Brent (1973), ch. 4: inverse quadratic interpolation and secant steps, kept inside the bracket by bisection.
+pub fn brent(mut f: impl FnMut(f64) -> f64, a: f64, b: f64, fa: f64, fb: f64) -> f64 {
+    brent_of(&mut f, a, b, fa, fb)
+}
+
+/// For any function, so that it is compiled once for all of them; so are those below.
+fn brent_of(f: &mut dyn FnMut(f64) -> f64, a: f64, b: f64, fa: f64, fb: f64) -> f64 {
+    let (mut a, mut b, mut fa, mut fb) = (a, b, fa, fb);
+    let (mut c, mut fc) = (a, fa);
+    let mut d = b - a;
+    let mut e = d;
+    for _ in 0..200 {
+        if (fb > 0.0) == (fc > 0.0) {
+            (c, fc) = (a, fa);
+            d = b - a;
+            e = d;
+        }
+        if fc.abs() < fb.abs() {
+            (a, b, c) = (b, c, b);
+            (fa, fb, fc) = (fb, fc, fb);
+        }
+        let tol = 2.0 * f64::EPSILON * b.abs() + 0.5 * f64::EPSILON;
+        let m = 0.5 * (c - b);
+        if m.abs() <= tol || fb == 0.0 {
+            return b;
+        }
+        if e.abs() < tol || fa.abs() <= fb.abs() {
+            d = m;
+            e = m;
+        } else {
+            let s = fb / fa;
+            let (mut p, mut q) = if a == c {
+                (2.0 * m * s, 1.0 - s)
+            } else {
+                let (q, r) = (fa / fc, fb / fc);
+                (s * (2.0 * m * q * (q - r) - (b - a) * (r - 1.0)), (q - 1.0) * (r - 1.0) * (s - 1.0))
+            };
+            if p > 0.0 {
+                q = -q;
+            } else {
+                p = -p;
+            }
+            if 2.0 * p < (3.0 * m * q - (tol * q).abs()).min((e * q).abs()) {
+                e = d;
+                d = p / q;
+            } else {
+                d = m;
+                e = m;
+            }
+        }
+        (a, fa) = (b, fb);
+        b += if d.abs() > tol { d } else { tol.copysign(m) };
+        fb = f(b);
+    }
+    b
+}
+
+/// A passage from one side of a surface to the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Passage {
+    /// The fraction of the step at which the surface is met.
+    pub theta: f64,
+    /// Whether the orbit comes from the negative side.
+    pub upward: bool,
+}
+
+/// Finds an orbit's passages through a surface g = 0, step by step. The one rule of this program for what a passage and
+/// its sense are:
+///
+/// - A passage is where g, having last been of one sign, is of the other. Its sense is that of the signs.
+/// - So a zero is no side: an orbit that starts on the surface has not passed it, and one that touches it and turns back
+///   neither. A zero exactly at a step's end is decided by what follows, and if it is a passage it is reported once, at fraction 0 of
+///   the next step.
+/// - A jump between two steps (a kick) to the other side is no passage; the new side counts from there.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Passages {
+    /// The sign last seen, or zero before any.
+    side: f64,
+}
+
+impl Passages {
+    /// The passages in `step`, in order. Nothing is allocated unless there is one.
+    ///
+    /// `g` is sampled at two points more than the interpolant's degree; between samples that keep their sign, a smallest |g| in the
+    /// middle is followed to its minimum, so that two zeros between neighbouring samples are found as well.
+    pub fn in_step<const N: usize>(&mut self, step: &Step<'_, N>, g: impl Fn(&SVector<f64, N>) -> f64) -> Vec<Passage> {
+        self.of(step.interpolant.degree(), &|theta| g(&step.at(theta)))
+    }
+
+    /// [`Passages::in_step`] for a function of the fraction of the step, on an interpolant of this degree.
+    fn of(&mut self, degree: usize, value: &dyn Fn(f64) -> f64) -> Vec<Passage> {
+        let n = degree + 2;
+        let sample = |i: usize| {
+            let s = i as f64 / n as f64;
+            (s, value(s))
+        };
+        let mut found = Vec::new();
+        let mut before = sample(0);
+        if before.1 != 0.0 {
+            self.side = before.1.signum();
+        }
+        let mut last = before;
+        let mut next = |point: (f64, f64)| {
+            if point.1 != 0.0 {
+                let side = point.1.signum();
+                if side != self.side && self.side != 0.0 {
+                    let theta = if last.1 == 0.0 { last.0 } else { brent(value, last.0, point.0, last.1, point.1) };
+                    found.push(Passage { theta, upward: side > 0.0 });
+                }
+                self.side = side;
+            }
+            last = point;
+        };
+        let mut here = sample(1);
+        for i in 1..=n {
+            if i == n {
+                next(here);
+                break;
+            }
+            let after = sample(i + 1);
+            let ((s0, g0), (s1, g1), (s2, g2)) = (before, here, after);
+            let same = (g0 > 0.0) == (g1 > 0.0) && (g1 > 0.0) == (g2 > 0.0);
+            let mut between = None;
+            if same && g1.abs() <= g0.abs() && g1.abs() <= g2.abs() {
+                let (s, v) = smallest(value, s0, s2, g1.signum());
+                between = ((v > 0.0) != (g1 > 0.0)).then_some((s, v));
+            }
+            match between {
+                Some(point) if point.0 < s1 => {
+                    next(point);
+                    next(here);
+                }
+                Some(point) => {
+                    next(here);
+                    next(point);
+                }
+                None => next(here),
+            }
+            (before, here) = (here, after);
+        }
+        found
+    }
+
+    /// The passages through the plane x\[coordinate\] = value, as [`Passages::in_step`] finds them, after one cheap test: most steps
+    /// stay so far from the plane that [`Interpolant::reach`](super::Interpolant::reach) proves that they do not meet it.
+    pub fn through_plane<const N: usize>(&mut self, step: &Step<'_, N>, coordinate: usize, value: f64) -> Vec<Passage> {
+        let (h0, h1) = (step.x0[coordinate] - value, step.x1[coordinate] - value);
+        // Nothing can be proved of a zero or a NaN: both comparisons are false then.
+        if h0 > 0.0 && h1 > 0.0 || h0 < 0.0 && h1 < 0.0 {
+            let reach = step.interpolant.reach(coordinate);
+            // The margin is for the rounding of the interpolant and of the bound.
+            let margin = 1e-12 * (h0.abs() + h1.abs() + value.abs() + reach);
+            if h0.abs().min(h1.abs()) > reach + margin {
+                self.side = h0.signum();
+                return Vec::new();
+            }
+        } else if (h0 > 0.0 && h1 < 0.0 || h0 < 0.0 && h1 > 0.0) && step.interpolant.is_monotone(coordinate) {
+            self.side = h1.signum();
+            let theta = brent(|theta| step.coordinate(theta, coordinate) - value, 0.0, 1.0, h0, h1);
+            return vec![Passage { theta, upward: h1 > 0.0 }];
+        }
+        self.of(step.interpolant.degree(), &|theta| step.coordinate(theta, coordinate) - value)
+    }
+}
+
+/// Golden-section search for the smallest `sign * f` on [a, b]; stops early once it is negative.
+fn smallest(f: &dyn Fn(f64) -> f64, mut a: f64, mut b: f64, sign: f64) -> (f64, f64) {
+    const INVERSE_GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let (mut c, mut d) = (b - INVERSE_GOLDEN * (b - a), a + INVERSE_GOLDEN * (b - a));
+    let (mut fc, mut fd) = (sign * f(c), sign * f(d));
+    for _ in 0..60 {
+        if fc < 0.0 || fd < 0.0 {
+            break;
+        }
+        if fc < fd {
+            (b, d, fd) = (d, c, fc);
+            c = b - INVERSE_GOLDEN * (b - a);
+            fc = sign * f(c);
+        } else {
+            (a, c, fc) = (c, d, fd);
+            d = a + INVERSE_GOLDEN * (b - a);
+            fd = sign * f(d);
+        }
+    }
+    if fc < fd { (c, sign * fc) } else { (d, sign * fd) }
+}
+
+/// How a function begins at the left end of an interval, for [`first_zero`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start {
+    /// Not zero there.
+    Away,
+    /// Zero there with the given derivative with respect to the fraction of the step: this zero is not the one looked for.
+    Simple(f64),
+    /// Zero there with zero derivative and the given half second derivative.
+    Double(f64),
+}
+
+/// The first zero found by [`first_zero`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Zero {
+    /// The function changes sign at this fraction.
+    Crossing(f64),
+    /// The function comes closer to zero than rounding can tell, at this fraction, and no change of sign is resolved.
+    Touch(f64),
+}
+
+impl Zero {
+    /// The fraction of the step.
+    pub fn theta(&self) -> f64 {
+        match *self {
+            Zero::Crossing(theta) | Zero::Touch(theta) => theta,
+        }
+    }
+}
+
+/// Degree of the polynomials that [`first_zero`] reasons about: twice that of Dormand-Prince's interpolant, so that a
+/// switching function quadratic in the state is represented exactly.
+const DEGREE: usize = 8;
+type Coefficients = [f64; DEGREE + 1];
+
+/// The first zero of `f` on (0, 1].
+///
+/// With the zero at the start divided out, `f` is represented by the polynomial of degree 8 through its values at
+/// Chebyshev-Lobatto points, in Bernstein form. By the variation-diminishing property (Lane & Riesenfeld 1981; Mourrain,
+/// Rouillier & Roy 2005) coefficients of one sign prove that there is no zero, and one change of sign proves that there
+/// is exactly one; otherwise the interval is halved (de Casteljau), left half first. So for `f` a polynomial of degree
+/// 8 or less along the step - h linear or quadratic in the state on a dense output of degree 4 - no zero is missed, up
+/// to rounding, however close two of them are. For other `f` the polynomial is compared with `f` between its nodes, and
+/// the interval is halved until they agree to 1e-6 of the polynomial's size; then a pair of zeros may be missed only where
+/// |f| stays below that.
+pub fn first_zero(f: impl Fn(f64) -> f64, start: Start) -> Option<Zero> {
+    let reduced = |s: f64| match start {
+        Start::Away => f(s),
+        Start::Simple(slope) => {
+            if s <= 0.0 {
+                slope
+            } else {
+                f(s) / s
+            }
+        }
+        Start::Double(curvature) => {
+            if s <= 0.0 {
+                curvature
+            } else {
+                f(s) / (s * s)
+            }
+        }
+    };
+    first_in(&reduced, 0.0, 1.0, 0)
+}
+
+fn first_in(q: &dyn Fn(f64) -> f64, a: f64, b: f64, depth: usize) -> Option<Zero> {
+    let basis = bernstein_basis();
+    let at = |u: f64| q(if u >= 1.0 { b } else { a + (b - a) * u });
+    let values: Coefficients = std::array::from_fn(|j| at(basis.nodes[j]));
+    let mut coefficients: Coefficients =
+        std::array::from_fn(|i| (0..=DEGREE).map(|j| basis.from_values[i][j] * values[j]).sum());
+    coefficients[0] = values[0];
+    coefficients[DEGREE] = values[DEGREE];
+    let size = coefficients.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
+    let sound = [1, 3, 4, 6].iter().all(|&j| {
+        let u = 0.5 * (basis.nodes[j] + basis.nodes[j + 1]);
+        (at(u) - bernstein(&coefficients, u)).abs() <= 1e-6 * size
+    });
+    if !sound && depth < 10 {
+        let middle = 0.5 * (a + b);
+        return first_in(q, a, middle, depth + 1).or_else(|| first_in(q, middle, b, depth + 1));
+    }
+    isolate(q, &coefficients, a, b, 0, size)
+}
+
+fn isolate(q: &dyn Fn(f64) -> f64, c: &Coefficients, a: f64, b: f64, depth: usize, size: f64) -> Option<Zero> {
+    let signs = c.iter().filter(|v| **v != 0.0).map(|v| *v > 0.0);
+    let changes = signs.clone().zip(signs.skip(1)).filter(|(x, y)| x != y).count();
+    let rounding = 64.0 * f64::EPSILON * size;
+    if changes == 0 {
+        // At the right end a zero is found here; one at the left end belongs to the interval before.
+        let end = c[DEGREE];
+        return if c.iter().all(|v| *v == 0.0) || end.abs() > rounding {
+            None
+        } else if end == 0.0 {
+            Some(Zero::Crossing(b))
+        } else {
+            Some(Zero::Touch(b))
+        };
+    }
+    if changes == 1 {
+        let (fa, fb) = (q(a), q(b));
+        if fa != 0.0 && (fb == 0.0 || (fa > 0.0) != (fb > 0.0)) {
+            return Some(Zero::Crossing(brent(q, a, b, fa, fb)));
+        }
+    }
+    if depth >= 45 || (changes > 1 && c.iter().all(|v| v.abs() <= rounding)) {
+        return Some(Zero::Touch(0.5 * (a + b)));
+    }
+    let (left, right) = halves(c);
+    let middle = 0.5 * (a + b);
+    isolate(q, &left, a, middle, depth + 1, size).or_else(|| isolate(q, &right, middle, b, depth + 1, size))
+}
+
+/// De Casteljau's subdivision at 1/2.
+fn halves(c: &Coefficients) -> (Coefficients, Coefficients) {
+    let (mut work, mut left, mut right) = (*c, [0.0; DEGREE + 1], [0.0; DEGREE + 1]);
+    for k in 0..=DEGREE {
+        left[k] = work[0];
+        right[DEGREE - k] = work[DEGREE - k];
+        for i in 0..DEGREE - k {
+            work[i] = 0.5 * (work[i] + work[i + 1]);
+        }
+    }
+    (left, right)
+}
+
+/// The polynomial with Bernstein coefficients `c` at `u`, by de Casteljau.
+fn bernstein(c: &Coefficients, u: f64) -> f64 {
+    let mut work = *c;
+    for k in 1..=DEGREE {
+        for i in 0..=DEGREE - k {
+            work[i] += u * (work[i + 1] - work[i]);
+        }
+    }
+    work[0]
+}
+
+/// Nodes on [0, 1] and the matrix from values at them to Bernstein coefficients.
+struct Basis {
+    nodes: Coefficients,
+    from_values: [Coefficients; DEGREE + 1],
+}
+
+fn bernstein_basis() -> &'static Basis {
+    static BASIS: std::sync::OnceLock<Basis> = std::sync::OnceLock::new();
+    BASIS.get_or_init(|| {
+        let n = DEGREE;
+        let nodes: Coefficients = std::array::from_fn(|j| match j {
+            0 => 0.0,
+            _ if j == n => 1.0,
+            _ => 0.5 * (1.0 - cos(std::f64::consts::PI * j as f64 / n as f64)),
+        });
+        let mut matrix = SMatrix::<f64, { DEGREE + 1 }, { DEGREE + 1 }>::zeros();
+        for (i, &u) in nodes.iter().enumerate() {
+            for j in 0..=n {
+                let mut unit = [0.0; DEGREE + 1];
+                unit[j] = 1.0;
+                matrix[(i, j)] = bernstein(&unit, u);
+            }
+        }
+        let inverse = matrix.try_inverse().expect("interpolation at distinct nodes is unisolvent");
+        Basis { nodes, from_values: std::array::from_fn(|i| std::array::from_fn(|j| inverse[(i, j)])) }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::step::Interpolant;
+    use super::*;
+
+    struct Cubic([f64; 4]);
+    impl Interpolant<1> for Cubic {
+        fn at(&self, s: f64) -> SVector<f64, 1> {
+            let [a, b, c, d] = self.0;
+            SVector::from([a + s * (b + s * (c + s * d))])
+        }
+        fn degree(&self) -> usize {
+            3
+        }
+    }
+
+    /// The same with all that can be proved of it.
+    struct Proving(Cubic);
+    impl Interpolant<1> for Proving {
+        fn at(&self, s: f64) -> SVector<f64, 1> {
+            self.0.at(s)
+        }
+        fn degree(&self) -> usize {
+            3
+        }
+        fn reach(&self, _: usize) -> f64 {
+            let [_, _, c, d] = self.0.0;
+            0.25 * c.abs() + 0.4 * d.abs()
+        }
+        fn is_monotone(&self, _: usize) -> bool {
+            let [_, b, c, d] = self.0.0;
+            b.abs() > 2.0 * c.abs() + 3.0 * d.abs()
+        }
+    }
+
+    fn passages(c: [f64; 4]) -> Vec<Passage> {
+        let p = Cubic(c);
+        let step = Step { t0: 0.0, t1: 1.0, x0: p.at(0.0), x1: p.at(1.0), interpolant: &p };
+        Passages::default().in_step(&step, |x| x[0])
+    }
+
+    fn zeros(c: [f64; 4]) -> Vec<f64> {
+        passages(c).iter().map(|p| p.theta).collect()
+    }
+
+    /// The senses of the passages through the plane x = `value` in steps given by their cubics, one after the other.
+    fn senses(value: f64, steps: &[[f64; 4]]) -> Vec<(usize, f64, bool)> {
+        let [mut by_plane, mut by_surface, mut by_proof] = [Passages::default(); 3];
+        let mut found = Vec::new();
+        for (i, c) in steps.iter().enumerate() {
+            let p = Cubic(*c);
+            let step = Step { t0: 0.0, t1: 1.0, x0: p.at(0.0), x1: p.at(1.0), interpolant: &p };
+            let passages = by_plane.through_plane(&step, 0, value);
+            assert_eq!(passages, by_surface.in_step(&step, |x| x[0] - value));
+            // Proofs spare work and change nothing.
+            let proved = by_proof.through_plane(&Step { interpolant: &Proving(Cubic(*c)), ..step }, 0, value);
+            assert!(proved.len() == passages.len(), "{proved:?} {passages:?}");
+            assert_eq!(by_proof.side, by_surface.side);
+            for (a, b) in proved.iter().zip(&passages) {
+                assert!(a.upward == b.upward && (a.theta - b.theta).abs() < 1e-14, "{a:?} {b:?}");
+            }
+            found.extend(passages.iter().map(|p| (i, p.theta, p.upward)));
+        }
+        found
+    }
+
+    #[test]
+    fn the_sense_is_that_of_the_signs() {
+        // Two passages in one step, down and up, through a plane that is not 0: (s - 1/4)(s - 3/4) + 7.
+        let found = senses(7.0, &[[7.1875, -1.0, 1.0, 0.0]]);
+        assert_eq!(found.iter().map(|f| f.2).collect::<Vec<_>>(), [false, true], "{found:?}");
+        assert!((found[0].1 - 0.25).abs() < 1e-14 && (found[1].1 - 0.75).abs() < 1e-14, "{found:?}");
+        // The plane 0 is not met.
+        assert_eq!(senses(0.0, &[[7.1875, -1.0, 1.0, 0.0]]), []);
+        // Upwards and downwards through a plane below zero.
+        assert_eq!(senses(-2.0, &[[-2.5, 1.0, 0.0, 0.0], [-1.5, -1.0, 0.0, 0.0]]), [(0, 0.5, true), (1, 0.5, false)]);
+    }
+
+    #[test]
+    fn a_start_on_the_surface_is_no_passage_and_the_return_has_its_sense() {
+        // From 0 down and up again through the plane: s (s - 1/2). The return is upwards.
+        let found = senses(0.0, &[[0.0, -0.5, 1.0, 0.0]]);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].2 && (found[0].1 - 0.5).abs() < 1e-14, "{found:?}");
+        let found = senses(3.0, &[[3.0, 0.5, -1.0, 0.0]]);
+        assert!(found.len() == 1 && !found[0].2, "{found:?}");
+        assert_eq!(senses(0.0, &[[0.0, 1.0, 0.0, 0.0]]), []);
+    }
+
+    #[test]
+    fn an_end_on_the_surface_is_decided_by_what_follows() {
+        // Through: reported once, at the start of the step that leaves to the other side.
+        assert_eq!(senses(0.0, &[[-1.0, 1.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]]), [(1, 0.0, true)]);
+        assert_eq!(senses(0.5, &[[1.5, -1.0, 0.0, 0.0], [0.5, -1.0, 0.0, 0.0]]), [(1, 0.0, false)]);
+        // Back to where it came from: a touch; the next passage still alternates.
+        let touch = [[1.0, -1.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [1.0, -2.0, 0.0, 0.0]];
+        assert_eq!(senses(0.0, &touch), [(2, 0.5, false)]);
+        // A touch at a sample inside a step: |s - 2/5|, sampled at fifths.
+        let p = Cubic([-0.4, 1.0, 0.0, 0.0]);
+        let step = Step { t0: 0.0, t1: 1.0, x0: p.at(0.0), x1: p.at(1.0), interpolant: &p };
+        assert_eq!(step.at(0.4)[0], 0.0);
+        assert_eq!(Passages::default().in_step(&step, |x| x[0].abs()), []);
+        assert_eq!(Passages::default().in_step(&step, |x| x[0]), [Passage { theta: 0.4, upward: true }]);
+    }
+
+    #[test]
+    fn a_jump_to_the_other_side_is_no_passage() {
+        assert_eq!(
+            senses(0.0, &[[1.0, 0.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [-1.0, 2.0, 0.0, 0.0]]),
+            [(2, 0.5, true)]
+        );
+    }
+
+    #[test]
+    fn finds_each_of_three() {
+        // (s - 0.1)(s - 0.5)(s - 0.85)
+        let found = zeros([-0.0425, 0.56, -1.45, 1.0]);
+        let expected: [f64; 3] = [0.1, 0.5, 0.85];
+        assert_eq!(found.len(), 3, "{found:?}");
+        for (f, e) in found.iter().zip(expected) {
+            assert!((f - e).abs() < 1e-14, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn finds_two_between_samples() {
+        // (s - 0.3)(s - 0.302) = s^2 - 0.602 s + 0.0906: both zeros lie between neighbouring samples.
+        let found = zeros([0.0906, -0.602, 1.0, 0.0]);
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!((found[0] - 0.3).abs() < 1e-12 && (found[1] - 0.302).abs() < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn brent_reaches_the_last_bits() {
+        let r = brent(|x| x * x - 2.0, 1.0, 2.0, -1.0, 2.0);
+        assert!((r - std::f64::consts::SQRT_2).abs() <= 4.5e-16);
+    }
+
+    /// How often the function is asked, as it was when this was written: what no zero shows. No bracket begins at 0, and some go backwards.
+    #[test]
+    fn brent_asks_no_more_than_it_did() {
+        type Case = (fn(f64) -> f64, f64, f64, f64, u32);
+        let cases: [Case; 8] = [
+            (|x| x * x * x - 2.0 * x - 5.0, 2.0, 3.0, 2.094_551_481_542_327, 6),
+            (|x| (x - 1.0) * (x - 1.0) * (x - 1.0), 0.3, 1.9, 1.0, 148),
+            (|x| (x * x * x) * (x * x * x) * (x * x * x), -1.0, 1.1, 0.0, 145),
+            (|x| 2.0 - x * x, 3.0, 0.5, std::f64::consts::SQRT_2, 8),
+            (|x| 1.0 / x - 3.0, 0.01, 10.0, 1.0 / 3.0, 13),
+            (|x| x * x * x * x * x - 1e-3, -0.5, 4.0, 0.251_188_643_150_958, 17),
+            (|x| if x < 0.7 { -1.0 } else { 2.0 }, 0.1, 1.0, 0.7, 51),
+            (|x| (x - 1e-9) * (x + 3.0), -1.0, 0.75, 1e-9, 8),
+        ];
+        for (f, a, b, zero, asked) in cases {
+            let mut count = 0;
+            let mut counted = |x: f64| {
+                count += 1;
+                f(x)
+            };
+            let found = brent(&mut counted, a, b, f(a), f(b));
+            assert!((found - zero).abs() <= 1e-15, "{zero}: {found}");
+            assert_eq!(count, asked, "{zero}");
+        }
+    }
+
+    #[test]
+    fn smallest_is_the_smallest_and_below_zero_is_enough() {
+        for (at, sign) in [(0.3, 1.0), (0.3, -1.0), (0.62, 1.0), (0.62, -1.0), (0.9, 1.0)] {
+            let parabola = |least: f64| move |s: f64| sign * ((s - at) * (s - at) + least);
+            // Of a parabola nothing is known of where it is smallest beyond the square root of a rounding.
+            let (s, v) = smallest(&parabola(0.25), 0.1, 1.0, sign);
+            assert!((s - at).abs() < 1e-6 && (v - sign * 0.25).abs() < 1e-12, "{at} {sign}: {s} {v}");
+            // Below zero near the place only: that is found, and nothing smaller looked for.
+            let (s, v) = smallest(&parabola(-1e-4), 0.1, 1.0, sign);
+            assert!(v * sign < 0.0 && v == parabola(-1e-4)(s), "{at} {sign}: {s} {v}");
+        }
+    }
+
+    /// The ends are asked themselves, and not what rounding makes of them.
+    #[test]
+    fn first_zero_asks_at_both_ends() {
+        let asked = std::cell::RefCell::new(Vec::new());
+        let none = first_zero(
+            |s| {
+                asked.borrow_mut().push(s);
+                1.0 + s
+            },
+            Start::Away,
+        );
+        assert_eq!(none, None);
+        let asked = asked.into_inner();
+        assert!(asked.contains(&0.0) && asked.contains(&1.0), "{asked:?}");
+    }
+
+    #[test]
+    fn first_zero_of_a_pair_however_close() {
+        for gap in [1e-2, 1e-4, 1e-6] {
+            let f = |s: f64| (s - 0.437) * (s - 0.437 - gap) * (s * s + 1.0);
+            let z = first_zero(f, Start::Away).expect("two zeros");
+            assert!(matches!(z, Zero::Crossing(t) if (t - 0.437).abs() < 1e-9), "{gap} {z:?}");
+            assert_eq!(first_zero(|s| f(s) + gap * gap, Start::Away), None);
+        }
+    }
+
+    #[test]
+    fn first_zero_skips_the_one_at_the_start() {
+        // s (s - 1e-9): a return after a billionth of the step.
+        let z = first_zero(|s| s * (s - 1e-9), Start::Simple(-1e-9)).unwrap();
+        assert!((z.theta() - 1e-9).abs() < 1e-15, "{z:?}");
+        assert_eq!(first_zero(|s| s * (s + 0.1), Start::Simple(0.1)), None);
+        let z = first_zero(|s| s * s * (0.25 - s), Start::Double(0.25)).unwrap();
+        assert!((z.theta() - 0.25).abs() < 1e-14, "{z:?}");
+        // A double zero inside is a touch, not a crossing.
+        let z = first_zero(|s| (s - 0.25) * (s - 0.25), Start::Away).unwrap();
+        assert!((z.theta() - 0.25).abs() < 1e-6, "{z:?}");
+        // Not a polynomial.
+        let z = first_zero(|s| twofold_num::elementary::sin(20.0 * s + 1.0), Start::Away).unwrap();
+        assert!((z.theta() - (std::f64::consts::PI - 1.0) / 20.0).abs() < 1e-13, "{z:?}");
+    }
+}

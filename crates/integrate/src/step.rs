@@ -1,0 +1,429 @@
+//! The nouns every method shares: an accepted step with its interpolant, tolerances, statistics, failures.
+
+use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
+
+use twofold_num::Tape;
+use twofold_system::VectorField;
+use twofold_system::singular::{leaves_domain, undefined};
+
+/// Continuous extension of a method over one step (dense output).
+pub trait Interpolant<const N: usize> {
+    /// The state at the fraction `theta` of the step, in [0, 1].
+    fn at(&self, theta: f64) -> SVector<f64, N>;
+    /// One coordinate of that state, to the same bits.
+    fn coordinate(&self, theta: f64, coordinate: usize) -> f64 {
+        self.at(theta)[coordinate]
+    }
+    /// The degree of the interpolant as a polynomial in `theta`.
+    fn degree(&self) -> usize;
+    /// A bound, up to rounding, on how far the coordinate leaves the range between its values at the step's two ends. Infinite where
+    /// no cheap one is known.
+    fn reach(&self, _coordinate: usize) -> f64 {
+        f64::INFINITY
+    }
+    /// Whether the coordinate is known to grow all along the step, or to fall all along it.
+    fn is_monotone(&self, _coordinate: usize) -> bool {
+        false
+    }
+}
+
+/// One accepted step from (t0, x0) to (t1, x1).
+#[derive(Clone, Copy)]
+pub struct Step<'a, const N: usize> {
+    /// Time at the start.
+    pub t0: f64,
+    /// Time at the end.
+    pub t1: f64,
+    /// State at the start.
+    pub x0: SVector<f64, N>,
+    /// State at the end.
+    pub x1: SVector<f64, N>,
+    /// The continuous extension between them.
+    pub interpolant: &'a dyn Interpolant<N>,
+}
+
+impl<const N: usize> Step<'_, N> {
+    /// The state at the fraction `theta` of the step; exactly `x0` at 0 and `x1` at 1.
+    pub fn at(&self, theta: f64) -> SVector<f64, N> {
+        if theta <= 0.0 {
+            self.x0
+        } else if theta >= 1.0 {
+            self.x1
+        } else {
+            self.interpolant.at(theta)
+        }
+    }
+
+    /// One coordinate of the state at the fraction `theta`: [`Step::at`]'s, to the same bits.
+    pub fn coordinate(&self, theta: f64, coordinate: usize) -> f64 {
+        if theta <= 0.0 {
+            self.x0[coordinate]
+        } else if theta >= 1.0 {
+            self.x1[coordinate]
+        } else {
+            self.interpolant.coordinate(theta, coordinate)
+        }
+    }
+
+    /// The time at the fraction `theta` of the step.
+    pub fn time(&self, theta: f64) -> f64 {
+        if theta >= 1.0 { self.t1 } else { self.t0 + theta * (self.t1 - self.t0) }
+    }
+
+    /// The length of the step in time.
+    pub fn length(&self) -> f64 {
+        self.t1 - self.t0
+    }
+}
+
+/// Local error control: a component's error is measured against `atol + rtol |x|`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tolerance {
+    /// Relative tolerance.
+    pub rtol: f64,
+    /// Absolute tolerance.
+    pub atol: f64,
+}
+
+/// A one-step-at-a-time method.
+pub trait Stepper<const N: usize> {
+    /// Starts afresh at (t, x) towards `t_end` with steps no longer than `max_step`. Everything learnt before (step size,
+    /// order, saved derivatives, factorised Jacobians) is forgotten; only [`Statistics`] go on counting.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure`]: the field is not finite at `x`, or no first step can be found.
+    fn restart<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure>;
+
+    /// [`Stepper::restart`] with the field of the last restart: what a method has found out about the equation itself still holds.
+    ///
+    /// # Errors
+    ///
+    /// As of [`Stepper::restart`].
+    fn restart_again<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
+        self.restart(field, t, x, t_end, max_step)
+    }
+
+    /// Makes one accepted step. Never passes `t_end`; the step that reaches it has `t1 == t_end` exactly. Must not be
+    /// called again after that without [`Stepper::restart`].
+    ///
+    /// # Errors
+    ///
+    /// [`Failure`]: the step shrank below rounding, an iteration did not converge, or the state is no longer finite. The stepper must be restarted before it is used again.
+    fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure>;
+
+    /// What the method has done since it was made.
+    fn statistics(&self) -> &Statistics;
+}
+
+/// Work done by a method. Counts that a method does not have stay zero.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Statistics {
+    /// Accepted steps.
+    pub steps: u64,
+    /// Steps rejected by the error test.
+    pub rejected: u64,
+    /// Evaluations of the right-hand side, without those made for Jacobians.
+    pub evaluations: u64,
+    /// Jacobian evaluations.
+    pub jacobians: u64,
+    /// LU factorisations.
+    pub factorisations: u64,
+    /// Corrector iterations that failed to converge.
+    pub convergence_failures: u64,
+    /// Changes between the non-stiff and the stiff family.
+    pub method_switches: u64,
+    /// Accepted steps made by the stiff family.
+    pub stiff_steps: u64,
+    /// Starts and restarts.
+    pub restarts: u64,
+    /// The highest order used.
+    pub highest_order: u64,
+}
+
+impl std::ops::AddAssign<&Statistics> for Statistics {
+    /// Counts add; the highest order is the higher one.
+    fn add_assign(&mut self, more: &Statistics) {
+        let Statistics {
+            steps,
+            rejected,
+            evaluations,
+            jacobians,
+            factorisations,
+            convergence_failures,
+            method_switches,
+            stiff_steps,
+            restarts,
+            highest_order,
+        } = more;
+        self.steps += steps;
+        self.rejected += rejected;
+        self.evaluations += evaluations;
+        self.jacobians += jacobians;
+        self.factorisations += factorisations;
+        self.convergence_failures += convergence_failures;
+        self.method_switches += method_switches;
+        self.stiff_steps += stiff_steps;
+        self.restarts += restarts;
+        self.highest_order = self.highest_order.max(*highest_order);
+    }
+}
+
+/// Whether an observer wants more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flow {
+    /// Go on.
+    Continue,
+    /// Stop after this step.
+    Stop,
+}
+
+/// Why a run ended. It is part of every summary, so that a run cut short is never taken for a whole one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StopReason {
+    /// The end time was reached.
+    EndTime,
+    /// The observer asked to stop: it has what it wanted.
+    Observer,
+    /// The watch asked to stop: somebody interrupted.
+    Watch,
+    /// The budget of steps is used up.
+    StepBudget,
+    /// The future is a set and nothing says which member to follow (Filippov motion only).
+    SetValued,
+}
+
+/// Why an integration could not go on. Each names the time and the state; the caller adds the run's name.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Failure {
+    /// The state or the right-hand side is infinite or not a number.
+    #[error(
+        "the right-hand side or the state is no longer finite at t = {t}, state {state:?}: check the parameters and the start"
+    )]
+    NotFinite {
+        /// Time of the last good state.
+        t: f64,
+        /// The last good state.
+        state: Vec<f64>,
+    },
+    /// The orbit came to a place where the equation has no value.
+    #[error(
+        "the orbit comes to the end of the field's domain at t = {t}, state {state:?}: {what}; change the expression, or end the run before (--t-end)"
+    )]
+    Undefined {
+        /// Time of the last good state.
+        t: f64,
+        /// The last good state.
+        state: Vec<f64>,
+        /// Which part of the equation has no value.
+        what: String,
+    },
+    /// The solution ends in finite time, or beyond the range of numbers.
+    #[error("the solution grows without bound near t = {t}, state {state:?}: end the run before (--t-end)")]
+    Unbounded {
+        /// When.
+        t: f64,
+        /// The last state.
+        state: Vec<f64>,
+    },
+    /// A method that needs smooth equations has come to a place where this one is not.
+    #[error(
+        "the equation is not smooth at t = {t}, state {state:?}: {what}; a series cannot go on there: use --method dopri5, lsoda or radau5, or make the argument the switching function h"
+    )]
+    NotSmooth {
+        /// When.
+        t: f64,
+        /// Where.
+        state: Vec<f64>,
+        /// Which part of the equation is not.
+        what: String,
+    },
+    /// The step became too small to advance time.
+    #[error(
+        "step size underflow ({h:e}) at t = {t}, state {state:?}: the tolerances ask for more than f64 can give here; loosen them (--rtol, --atol) or compare with another --method"
+    )]
+    StepUnderflow {
+        /// Time reached.
+        t: f64,
+        /// The step that was asked for.
+        h: f64,
+        /// State reached.
+        state: Vec<f64>,
+    },
+    /// The budget of steps is used up.
+    #[error(
+        "{limit} steps were not enough: stopped at t = {t}, state {state:?}. If the last steps were tiny, the equation is stiff or not smooth there: compare with another --method; otherwise raise the limit of steps (--max-steps)"
+    )]
+    TooManySteps {
+        /// Time reached.
+        t: f64,
+        /// The limit.
+        limit: u64,
+        /// State reached.
+        state: Vec<f64>,
+    },
+    /// The method is made for another kind of equation.
+    #[error("the method {method} cannot integrate this equation: {why}; take another method")]
+    NotApplicable {
+        /// The method's name.
+        method: &'static str,
+        /// What it is about the equation.
+        why: String,
+    },
+    /// An implicit method's nonlinear equations could not be solved even with tiny steps.
+    #[error(
+        "the implicit equations did not converge at t = {t}, step {h:e}, state {state:?}: the right-hand side is too rough for this method; compare with another --method"
+    )]
+    NotConverged {
+        /// Time reached.
+        t: f64,
+        /// The step that was tried last.
+        h: f64,
+        /// State reached.
+        state: Vec<f64>,
+    },
+}
+
+impl Failure {
+    /// The failure with its cause, as far as the equation on `tape` shows it: a place where it has no value, or a solution that grows without bound.
+    pub fn diagnosed(self, tape: &Tape) -> Self {
+        let (t, state, far) = match &self {
+            Self::NotFinite { t, state } => (*t, state.clone(), 1.0),
+            // Steps were found too long for another reason, perhaps: only what is near is to blame.
+            Self::StepUnderflow { t, state, .. } | Self::NotConverged { t, state, .. } => (*t, state.clone(), 1e-3),
+            _ => return self,
+        };
+        if state.len() != tape.variables() || state.iter().any(|x| !x.is_finite()) {
+            return self;
+        }
+        if let Some(what) = undefined(tape, &state) {
+            return Self::Undefined { t, state, what };
+        }
+        let field = |x: &[f64]| -> Vec<f64> {
+            let values = tape.values(x);
+            tape.outputs().iter().map(|node| values[*node]).collect()
+        };
+        let derivative = field(&state);
+        let ahead = |time: f64| -> Vec<f64> { state.iter().zip(&derivative).map(|(x, f)| x + time * f).collect() };
+        // The component that grows fastest, in its own size.
+        let growth = |x: &[f64], f: &[f64]| {
+            x.iter().zip(f).map(|(x, f)| if *x == 0.0 { 0.0 } else { f / x }).fold(0.0, f64::max)
+        };
+        let rate = growth(&state, &derivative);
+        let size = state.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
+        let scale = 1.0 + t.abs();
+        let soon = ahead(0.5 / rate);
+        let faster = growth(&soon, &field(&soon));
+        if size > 1e100 || size > 1e3 && rate * scale > 1e3 && !(faster <= 1.2 * rate) {
+            return Self::Unbounded { t: t + 1.0 / rate, state };
+        }
+        let mut time = 1e-16 * scale;
+        while time < far * scale {
+            if let Some(what) = leaves_domain(tape, &ahead(time)) {
+                return Self::Undefined { t, state, what };
+            }
+            time *= 2.0;
+        }
+        self
+    }
+
+    /// The state as the errors carry it.
+    pub fn state<const N: usize>(x: &SVector<f64, N>) -> Vec<f64> {
+        x.iter().copied().collect()
+    }
+}
+
+/// Whether every component is finite.
+pub(crate) fn finite<const N: usize>(x: &SVector<f64, N>) -> bool {
+    x.iter().all(|v| v.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::vector;
+
+    use super::*;
+
+    #[test]
+    fn work_adds_up() {
+        let work = |first: u64| Statistics {
+            steps: first,
+            rejected: first + 1,
+            evaluations: first + 2,
+            jacobians: first + 3,
+            factorisations: first + 4,
+            convergence_failures: first + 5,
+            method_switches: first + 6,
+            stiff_steps: first + 7,
+            restarts: first + 8,
+            highest_order: first % 7,
+        };
+        for (a, b) in [(100, 20), (20, 100)] {
+            let mut sum = work(a);
+            sum += &work(b);
+            let all = Statistics {
+                steps: 120,
+                rejected: 122,
+                evaluations: 124,
+                jacobians: 126,
+                factorisations: 128,
+                convergence_failures: 130,
+                method_switches: 132,
+                stiff_steps: 134,
+                restarts: 136,
+                highest_order: 6,
+            };
+            assert_eq!(sum, all);
+        }
+    }
+
+    /// t^2 and -t over [0, 1]; wrong at both ends, which a step knows better.
+    struct Wrong;
+    impl Interpolant<2> for Wrong {
+        fn at(&self, theta: f64) -> SVector<f64, 2> {
+            vector![theta * theta + 0.125, -theta]
+        }
+        fn degree(&self) -> usize {
+            2
+        }
+    }
+
+    #[test]
+    fn a_step_has_its_own_ends() {
+        let step = Step { t0: 3.0, t1: 5.0, x0: vector![0.0, 0.0], x1: vector![1.0, -1.0], interpolant: &Wrong };
+        assert_eq!((step.length(), step.time(0.0), step.time(0.25), step.time(1.0)), (2.0, 3.0, 3.5, 5.0));
+        for (theta, want) in
+            [(-0.5, [0.0, 0.0]), (0.0, [0.0, 0.0]), (0.5, [0.375, -0.5]), (1.0, [1.0, -1.0]), (1.5, [1.0, -1.0])]
+        {
+            assert_eq!(step.at(theta), SVector::from(want));
+            assert_eq!([0, 1].map(|i| step.coordinate(theta, i)), want);
+        }
+        // 0.1 + 1 (0.3 - 0.1) is not 0.3.
+        let step = Step { t0: 0.1, t1: 0.3, ..step };
+        assert_eq!(step.time(1.0), 0.3);
+        // An interpolant that says nothing of itself is not thought to be near, nor to be monotone.
+        assert!(Wrong.reach(0) == f64::INFINITY && !Wrong.is_monotone(0));
+        assert!(
+            finite(&vector![1.0, -2.0]) && !finite(&vector![1.0, f64::NAN]) && !finite(&vector![f64::INFINITY, 0.0])
+        );
+        assert_eq!(Failure::state(&vector![1.0, 2.0]), [1.0, 2.0]);
+    }
+}

@@ -1,0 +1,370 @@
+//! The question of what a run settles on.
+
+use std::sync::Arc;
+
+use serde_json::{Value, json};
+
+use super::answer::{Answer, Stop};
+use super::desk::Desk;
+use super::exponent::LargestExponent;
+use super::question::{AnyQuestion, JobError, Question};
+use super::run::Run;
+use super::spec::{Observation, RunSpec, SwitchSpec};
+use twofold_analyse::Direction;
+use twofold_analyse::attractor::{self, Evidence, SectionPoint, Thresholds, Verdict, classify};
+use twofold_analyse::lyapunov::{self, Exponent};
+use twofold_integrate::filippov::ExitRule;
+use twofold_integrate::{Schedule, Watch};
+
+/// What a run settles on, judged from its section: with the largest exponent where motion is not captured by a cycle, and beside its noise-free
+/// twin where there is noise. Fact: `evidence` ([`Evidence`]).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Classification {
+    /// The run; it records a section.
+    pub run: RunSpec,
+    /// The limits by which it is judged.
+    pub thresholds: Thresholds,
+}
+
+impl Classification {
+    /// The question with the usual limits.
+    pub fn of(run: RunSpec) -> Self {
+        Self { run, thresholds: Thresholds::default() }
+    }
+
+    /// The evidence that an answer to this question holds.
+    ///
+    /// # Errors
+    ///
+    /// Whatever the computation met.
+    pub fn ask(&self, desk: &Desk<'_>) -> Result<Evidence, JobError> {
+        Ok(desk.ask(self)?.fact("evidence")?)
+    }
+}
+
+impl Question for Classification {
+    fn kind(&self) -> &'static str {
+        "classification"
+    }
+
+    fn json(&self) -> Value {
+        json!({ "run": self.run, "thresholds": self.thresholds, "lengths": LENGTHS })
+    }
+
+    fn label(&self) -> String {
+        format!("what becomes of {}", Run(self.run.clone()).label())
+    }
+
+    fn cost(&self) -> f64 {
+        // Most runs are judged at a glance; some want an exponent.
+        0.02 * Run(self.run.clone()).cost()
+    }
+
+    fn rests_on(&self) -> Vec<AnyQuestion> {
+        if plane(&self.run).is_err() {
+            return Vec::new();
+        }
+        let twins = if self.run.schedule.kick.is_some() { self.noise_free_twins() } else { Vec::new() };
+        std::iter::once(self.run.clone()).chain(twins).map(|run| Arc::new(Run(run)) as _).collect()
+    }
+
+    fn compute(&self, desk: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        let evidence = self.evidence(desk)?;
+        Ok(Answer::of_tables(Vec::new()).with_fact("evidence", &evidence))
+    }
+}
+
+/// Numbers of the procedure that are not limits of the classifier.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+struct Lengths {
+    /// Time after which the first transient is over and a chaotic run is on its structure.
+    settling: f64,
+    /// Fewest points of a noise-free run that make a structure to compare with.
+    structure_points: usize,
+    /// Noise-free runs that are made to compare with ...
+    free_runs: usize,
+    /// ... how far apart they start ...
+    free_shift: f64,
+    /// ... and how long they are.
+    free_length: f64,
+    /// Time over which a hysteretic system's exponent is averaged: stiff for the explicit method of the variational equation.
+    hysteretic_average: f64,
+}
+
+const LENGTHS: Lengths = Lengths {
+    settling: 1000.0,
+    structure_points: 2000,
+    free_runs: 8,
+    free_shift: 1e-9,
+    free_length: 5e4,
+    hysteretic_average: 2_000.0,
+};
+
+/// A judgement, or what it waits for.
+pub(super) enum SoFar<T> {
+    Judged(T),
+    /// Neighbours part, or not: the points do not say.
+    Awaits(Box<LargestExponent>),
+}
+
+impl Classification {
+    fn evidence(&self, desk: &Desk<'_>) -> Result<Evidence, JobError> {
+        // What cannot be judged is not computed.
+        plane(&self.run)?;
+        self.evidence_of(desk, &*desk.ask(&Run(self.run.clone()))?)
+    }
+
+    /// The evidence that an answer to the run's question gives.
+    fn evidence_of(&self, desk: &Desk<'_>, answer: &Answer) -> Result<Evidence, JobError> {
+        match self.so_far(desk, answer)? {
+            SoFar::Judged(evidence) => Ok(evidence),
+            SoFar::Awaits(exponent) => self.with_exponent(answer, exponent.found(&*desk.ask(&*exponent)?)),
+        }
+    }
+
+    /// What an answer to the run's question comes to without the orbit's exponent.
+    pub(super) fn so_far(&self, desk: &Desk<'_>, answer: &Answer) -> Result<SoFar<Evidence>, JobError> {
+        let run = &self.run;
+        let (end, section) = section(run, answer)?;
+        let random_exits = matches!(run.switch, SwitchSpec::Filippov { exit: ExitRule::Random { .. }, .. });
+        let mut question = self.asked();
+        if question.kicked {
+            // Without its chance a random exit rule is no rule: there is nothing to compare with.
+            let reference = if random_exits { None } else { Some(self.noise_free_structure(desk)?) };
+            question.reference = reference.as_deref();
+            return Ok(SoFar::Judged(classify(&section, &question, &self.thresholds)));
+        }
+        let evidence = classify(&section, &question, &self.thresholds);
+        Ok(match evidence.verdict {
+            Verdict::Chaotic { .. } | Verdict::Undecided { .. } => SoFar::Awaits(Box::new(self.exponent(end))),
+            _ => SoFar::Judged(evidence),
+        })
+    }
+
+    /// The evidence with the exponent that was awaited; `None` if that orbit could not be followed.
+    pub(super) fn with_exponent(&self, answer: &Answer, exponent: Option<Exponent>) -> Result<Evidence, JobError> {
+        let (_, section) = section(&self.run, answer)?;
+        Ok(classify(&section, &attractor::Question { lyapunov: exponent, ..self.asked() }, &self.thresholds))
+    }
+
+    /// What is asked of the section's points.
+    fn asked(&self) -> attractor::Question<'static> {
+        let run = &self.run;
+        let random_exits = matches!(run.switch, SwitchSpec::Filippov { exit: ExitRule::Random { .. }, .. });
+        attractor::Question {
+            t_end: Some(run.t_end),
+            shown_from: 0.5 * run.t_end,
+            kicked: run.schedule.kick.is_some() || random_exits,
+            lyapunov: None,
+            reference: None,
+        }
+    }
+
+    /// The largest exponent of the run's system, from its final state.
+    fn exponent(&self, start: Vec<f64>) -> LargestExponent {
+        let settings = match self.run.switch {
+            SwitchSpec::Hysteretic { .. } => {
+                lyapunov::Settings { duration: LENGTHS.hysteretic_average, ..lyapunov::Settings::default() }
+            }
+            _ => lyapunov::Settings::default(),
+        };
+        LargestExponent { system: self.run.system.clone(), switch: self.run.switch, start, settings }
+    }
+
+    /// The same run without kicks, from starts a little apart.
+    fn noise_free_twins(&self) -> Vec<RunSpec> {
+        let run = &self.run;
+        let twin = |k: usize| {
+            let mut start = run.start.clone();
+            if let Some(x) = start.first_mut() {
+                *x += k as f64 * LENGTHS.free_shift;
+            }
+            let schedule = Schedule { kick: None, ..run.schedule };
+            RunSpec { start, schedule, t_end: run.t_end.min(LENGTHS.free_length), ..run.clone() }
+        };
+        (0..LENGTHS.free_runs).map(twin).collect()
+    }
+
+    /// The structure that noise can wash out: sections of its twins without kicks, each as long as it was not captured by a closed orbit.
+    fn noise_free_structure(&self, desk: &Desk<'_>) -> Result<Vec<Vec<SectionPoint>>, JobError> {
+        let mut free = Vec::new();
+        for twin in self.noise_free_twins() {
+            let (_, section) = section(&twin, &*desk.ask(&Run(twin.clone()))?)?;
+            let question = attractor::Question {
+                t_end: Some(twin.t_end),
+                shown_from: 0.5 * twin.t_end,
+                ..attractor::Question::default()
+            };
+            let verdict = classify(&section, &question, &self.thresholds).verdict;
+            let captured = verdict.cycle().map_or(f64::INFINITY, |c| c.captured_at);
+            let loose: Vec<SectionPoint> =
+                section.into_iter().filter(|p| p.t > LENGTHS.settling && p.t < captured).collect();
+            if loose.len() >= LENGTHS.structure_points {
+                free.push(loose);
+            }
+        }
+        Ok(free)
+    }
+}
+
+/// The states that span the plane in which a run is judged: the first two that its section leaves free, or the only one.
+fn plane(run: &RunSpec) -> Result<(&str, Option<&str>), JobError> {
+    let Observation::Section { coordinate, .. } = run.observe else {
+        return Err(refused("a run is classified from its section; record one with --section"));
+    };
+    let names = run.system.coordinates();
+    let states = names.len();
+    let mut free = names.into_iter().enumerate().filter(|(i, _)| *i != coordinate).map(|(_, name)| name);
+    match free.next() {
+        Some(first) if states > 1 => Ok((first, free.next())),
+        _ => Err(refused(
+            "a run is classified from where it meets a section, so its system must have at least two states",
+        )),
+    }
+}
+
+fn refused(why: &str) -> JobError {
+    JobError::Other(why.into())
+}
+
+/// Where the run ended, and its section as the classifier takes it: in the plane of the first two coordinates that the section leaves free. With
+/// two states there is one, and the other is 0; with more than three this is a projection, in which different points may fall together but
+/// one orbit's period, its approach and its irregularity are seen as they are.
+fn section(run: &RunSpec, answer: &Answer) -> Result<(Vec<f64>, Vec<SectionPoint>), JobError> {
+    let (first, second) = plane(run)?;
+    if answer.stop == Stop::Interrupted {
+        return Err(JobError::Interrupted);
+    }
+    let table = answer.table("section").ok_or_else(|| refused("the run has no table of its section"))?;
+    let (u, v) = (table.numbers(first), second.map(|name| table.numbers(name)));
+    let directions = table.words("direction").map(|word| word == Direction::Up.word());
+    let points = table.numbers("t").iter().zip(u).zip(directions).enumerate();
+    let points =
+        points.map(|(row, ((t, u), upward))| SectionPoint { t: *t, u: [*u, v.map_or(0.0, |v| v[row])], upward });
+    Ok((answer.fact("state")?, points.collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spec::{DEFAULT_MAX_STEPS, Method, MethodSpec};
+    use twofold_integrate::{StepCap, Tolerance};
+    use twofold_system::{Definition, System};
+
+    /// Van der Pol's oscillator at mu = 1, alone and with states that follow it or die out: period 6.663286859, amplitude 2.00861986 (Urabe 1958).
+    fn evidence(states: &str, field: &str, start: Vec<f64>) -> Result<Evidence, JobError> {
+        let text = format!("states = {states}\nh = \"y\"\nplus = {field}\nminus = {field}\n");
+        let run = RunSpec {
+            system: System::new(Definition::from_toml(&text, "oscillator.toml").unwrap()),
+            switch: SwitchSpec::tanh(1e-2),
+            start,
+            t_end: 2000.0,
+            method: MethodSpec {
+                name: Method::Dopri5,
+                tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
+                step_cap: StepCap::None,
+                max_steps: DEFAULT_MAX_STEPS,
+                precision: None,
+                order: None,
+            },
+            schedule: Schedule::default(),
+            observe: Observation::Section { coordinate: 1, value: 0.0 },
+        };
+        Classification::of(run).ask(&Desk::quiet())
+    }
+
+    #[test]
+    fn a_limit_cycle_is_recognised_in_two_states_and_in_five() {
+        let two = evidence("[\"x\", \"y\"]", "[\"y\", \"(1 - x*x)*y - x\"]", vec![0.1, 0.0]).unwrap();
+        let five = evidence(
+            "[\"a\", \"y\", \"x\", \"b\", \"c\"]",
+            "[\"-a\", \"(1 - x*x)*y - x\", \"y\", \"x - b\", \"y - 2*c\"]",
+            vec![1.0, 0.0, 0.1, 0.0, 0.0],
+        )
+        .unwrap();
+        for (evidence, amplitude) in [(two, 0), (five, 1)] {
+            let cycle = evidence.verdict.cycle().unwrap_or_else(|| panic!("{}", evidence.summary));
+            assert!(matches!(evidence.verdict, Verdict::Periodic(_)), "{}", evidence.summary);
+            assert_eq!(cycle.period, 1);
+            assert!((cycle.duration - 6.663_286_859).abs() < 1e-5, "{}", cycle.duration);
+            // A picture shows the second half; y goes up through 0 where x is below 0.
+            assert_eq!(evidence.shown_from, 1000.0);
+            assert!(cycle.points.len() == 2 && cycle.points.iter().all(|p| p.upward == (p.u[amplitude] < 0.0)));
+            let sizes = cycle.points.iter().map(|p| p.u[amplitude].abs());
+            // In five states the plane is (a, x).
+            sizes.for_each(|size| assert!((size - 2.008_619_86).abs() < 1e-6, "{size}"));
+        }
+    }
+
+    fn run(system: System, switch: SwitchSpec, t_end: f64) -> Classification {
+        Classification::of(crate::cases::run(system, switch, t_end, Observation::Section { coordinate: 0, value: 0.0 }))
+    }
+
+    /// A run rests on itself; a kicked one on its eight twins too; one without section on nothing, and is refused.
+    #[test]
+    fn what_a_verdict_rests_on() {
+        use twofold_integrate::{Kick, KickLaw};
+        let mut question = run(crate::cases::decays(2), SwitchSpec::tanh(1e-2), 9.0);
+        let runs = |question: &Classification| -> Vec<Value> { question.rests_on().iter().map(|q| q.json()).collect() };
+        assert_eq!(runs(&question), [Run(question.run.clone()).json()]);
+        let free = question.clone();
+        question.run.schedule.kick = Some(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 9, stream: 5 });
+        let kicked = runs(&question);
+        assert_eq!((kicked.len(), &kicked[1]), (9, &Run(free.run).json()));
+        question.run.observe = Observation::Path { chord: 1.0 };
+        assert!(runs(&question).is_empty());
+        assert!(question.ask(&Desk::quiet()).unwrap_err().to_string().contains("--section"));
+    }
+
+    /// Decays at the rates 1 and 2; a hysteretic one is followed for less long; x' = x^2 leaves and has none.
+    #[test]
+    fn exponents_are_those_of_the_runs_system() {
+        use crate::cases;
+        let desk = Desk::quiet();
+        let hysteretic = SwitchSpec::hysteretic(1e-2, twofold_system::Relaxation::Single);
+        for (switch, duration) in [(SwitchSpec::tanh(1e-2), 10_000.0), (hysteretic, 2000.0)] {
+            let question = run(cases::decays(2), switch, 9.0);
+            let of = |q: &Classification| {
+                let exponent = q.exponent(vec![1.0, 1.0]);
+                exponent.found(&desk.ask(&exponent).unwrap())
+            };
+            let exponent = of(&question).unwrap();
+            assert!((exponent.value + 1.0).abs() < 1e-5 && exponent.duration == duration, "{exponent:?}");
+        }
+        let leaving = run(cases::smooth(&["x", "y"], "x + 1", &["x*x", "-y"]), SwitchSpec::tanh(1e-2), 0.5);
+        let exponent = leaving.exponent(vec![1.0, 1.0]);
+        assert_eq!(exponent.found(&desk.ask(&exponent).unwrap()), None);
+    }
+
+    /// Three oscillators of frequencies that have no common measure, seen in the positions of two of them: nothing captures that.
+    #[test]
+    fn structures_are_what_was_not_captured_after_the_transient() {
+        let system = crate::cases::smooth(
+            &["x", "u", "p", "y", "v", "q"],
+            "x + 9",
+            &["y", "1.207*v", "1.618*q", "-x", "-1.207*u", "-1.618*p"],
+        );
+        let mut question = run(system, SwitchSpec::tanh(1e-2), 7500.0);
+        question.run.method.tolerance = Tolerance { rtol: 1e-6, atol: 1e-6 };
+        let twins = question.noise_free_twins();
+        let shifts: Vec<f64> = twins.iter().map(|twin| twin.start[0] - 1.0).collect();
+        assert!(shifts.iter().enumerate().all(|(k, s)| (s - 1e-9 * k as f64).abs() < 1e-15), "{shifts:?}");
+        let free = question.noise_free_structure(&Desk::quiet()).unwrap();
+        assert_eq!(free.len(), 8);
+        // Two passages a turn.
+        let wanted = 6500.0 / std::f64::consts::PI;
+        for loose in free {
+            assert!(
+                loose.iter().all(|p| p.t > 1000.0) && (loose.len() as f64 / wanted - 1.0).abs() < 0.01,
+                "{}",
+                loose.len()
+            );
+        }
+    }
+
+    #[test]
+    fn one_state_has_no_section_to_judge() {
+        let error = evidence("[\"y\"]", "[\"-y\"]", vec![1.0]).unwrap_err();
+        assert!(error.to_string().contains("at least two states"), "{error}");
+    }
+}

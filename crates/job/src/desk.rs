@@ -1,0 +1,265 @@
+//! Where questions are asked: each is computed once, or taken from the store.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use super::answer::{Answer, Stop};
+use super::plan::Plan;
+use super::question::{AnyQuestion, JobError, Question, key};
+use super::store::{Kept, Store};
+use crate::record::Hash;
+use twofold_integrate::Watch;
+
+/// Shows how far jobs have come.
+pub trait Progress: Sync {
+    /// A job begins; its watch will be told values up to `extent`.
+    fn begin<'a>(&'a self, label: &str, extent: f64) -> Box<dyn JobWatch + 'a>;
+    /// One line for the user.
+    fn line(&self, _text: &str) {}
+}
+
+/// Follows one job.
+pub trait JobWatch: Watch {
+    /// The job is over; `what` is said of it.
+    fn done(self: Box<Self>, what: &str);
+}
+
+impl Progress for () {
+    fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn JobWatch + 'a> {
+        Box::new(())
+    }
+}
+
+impl JobWatch for () {
+    fn done(self: Box<Self>, _: &str) {}
+}
+
+/// An answer in the making, or made.
+type Cell = Arc<OnceLock<Result<Arc<Answer>, JobError>>>;
+
+/// Asks each question once.
+///
+/// Several threads may ask at a time; who asks for what another thread is computing waits for it. That cannot lock up: a job rests only on
+/// jobs that do not rest on it, and a job that computes never turns to other work in between (see [`Question`]).
+pub struct Desk<'a> {
+    store: Option<Store>,
+    progress: &'a dyn Progress,
+    answers: Mutex<HashMap<Hash, Cell>>,
+}
+
+impl Desk<'static> {
+    /// A desk without store and without display.
+    pub fn quiet() -> Self {
+        Desk::new(None, &())
+    }
+}
+
+impl<'a> Desk<'a> {
+    /// A desk that keeps answers in `store`, if there is one, and reports to `progress`.
+    pub fn new(store: Option<Store>, progress: &'a dyn Progress) -> Self {
+        Self { store, progress, answers: Mutex::default() }
+    }
+
+    /// The display.
+    pub fn progress(&self) -> &'a dyn Progress {
+        self.progress
+    }
+
+    /// The store, if answers are kept.
+    pub fn store(&self) -> Option<&Store> {
+        self.store.as_ref()
+    }
+
+    /// The answer to a question.
+    ///
+    /// # Errors
+    ///
+    /// Whatever the computation met; asked again, the same.
+    pub fn ask(&self, question: &dyn Question) -> Result<Arc<Answer>, JobError> {
+        let key = key(question);
+        let cell = {
+            // A panic in another job left nothing half done: the map only grows.
+            let mut answers = self.answers.lock().unwrap_or_else(PoisonError::into_inner);
+            answers.entry(key.clone()).or_default().clone()
+        };
+        cell.get_or_init(|| self.answer(question, &key)).clone()
+    }
+
+    /// The answer to a question that nobody else is expected to ask: it is not kept in memory, only in the store.
+    ///
+    /// # Errors
+    ///
+    /// As [`Desk::ask`].
+    pub fn ask_in_passing(&self, question: &dyn Question) -> Result<Arc<Answer>, JobError> {
+        let key = key(question);
+        let cell = self.answers.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
+        match cell {
+            Some(cell) => cell.get_or_init(|| self.answer(question, &key)).clone(),
+            None => self.answer(question, &key),
+        }
+    }
+
+    fn answer(&self, question: &dyn Question, key: &Hash) -> Result<Arc<Answer>, JobError> {
+        if let Some(store) = &self.store {
+            match store.get(key, question) {
+                Kept::Answer(answer) => return Ok(Arc::new(answer)),
+                Kept::Nothing => {}
+                Kept::Damaged(why) => self.progress.line(&format!("{why}; computing it again")),
+            }
+        }
+        let watch = self.progress.begin(&question.label(), question.extent());
+        let answer = question.compute(self, &*watch);
+        match &answer {
+            Ok(answer) => watch.done(&said(answer)),
+            Err(_) => watch.done("failed"),
+        }
+        let answer = answer?;
+        if let Some(store) = &self.store
+            && answer.stop != Stop::Interrupted
+            && let Err(error) = store.put(key, question, &answer)
+        {
+            // The answer is there; only the next run will have to compute it again.
+            self.progress.line(&format!("not kept for the next run: {error}"));
+        }
+        Ok(Arc::new(answer))
+    }
+
+    /// Sees to it that all these questions have answers, side by side on the current thread pool: first what others rest on, and of that the longest. With a
+    /// store, answers are there and not in memory. Errors wait in the desk until they are asked for, or are met again.
+    pub fn gather(&self, questions: &[AnyQuestion]) {
+        Plan::of(questions).carry_out(|question| match &self.store {
+            Some(store) if store.has(&key(&**question)) => {}
+            _ => drop(self.ask(&**question)),
+        });
+        if self.store.is_some() {
+            self.forget();
+        }
+    }
+
+    /// Lets go of every answer that the store has and nobody holds.
+    pub fn forget(&self) {
+        let Some(store) = &self.store else { return };
+        let mut answers = self.answers.lock().unwrap_or_else(PoisonError::into_inner);
+        answers.retain(|key, cell| {
+            let unused = cell.get().is_some_and(|answer| answer.as_ref().is_ok_and(|a| Arc::strong_count(a) == 1));
+            !(unused && store.has(key))
+        });
+    }
+}
+
+/// What a finished job's line says.
+fn said(answer: &Answer) -> String {
+    let rows = format!("{} rows", answer.rows());
+    let work = answer.statistics.as_ref().map(|s| format!("{} steps, {rows}", s.steps)).unwrap_or(rows);
+    match answer.stop {
+        Stop::Finished => work,
+        other => format!("{work}, {}", other.word()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// Fibonacci numbers, each resting on two others; counts how often it is computed.
+    #[derive(Debug)]
+    struct Fibonacci<'a>(u64, &'a AtomicUsize);
+
+    impl Question for Fibonacci<'static> {
+        fn kind(&self) -> &'static str {
+            "fibonacci"
+        }
+        fn json(&self) -> Value {
+            json!(self.0)
+        }
+        fn cost(&self) -> f64 {
+            self.0 as f64
+        }
+        fn compute(&self, desk: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+            self.1.fetch_add(1, Ordering::Relaxed);
+            let value: u64 = match self.0 {
+                13 => return Err(JobError::Other("unlucky".into())),
+                n @ 0..2 => n,
+                n => {
+                    let before =
+                        |k| -> Result<u64, JobError> { Ok(desk.ask(&Fibonacci(n - k, self.1))?.fact("value")?) };
+                    before(1)? + before(2)?
+                }
+            };
+            Ok(Answer::of_tables(Vec::new()).with_fact("value", &value))
+        }
+    }
+
+    #[test]
+    fn each_question_is_computed_once_whatever_the_threads() {
+        static COUNT: AtomicUsize = AtomicUsize::new(0);
+        let desk = Desk::quiet();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(4).build().unwrap();
+        let questions: Vec<AnyQuestion> = (0..13).chain(0..13).map(|n| Arc::new(Fibonacci(n, &COUNT)) as _).collect();
+        pool.install(|| desk.gather(&questions));
+        assert_eq!(COUNT.load(Ordering::Relaxed), 13);
+        assert_eq!(desk.ask(&Fibonacci(12, &COUNT)).unwrap().fact::<u64>("value"), Ok(144));
+        assert_eq!(COUNT.load(Ordering::Relaxed), 13);
+    }
+
+    #[test]
+    fn what_the_store_has_is_not_held_in_memory() {
+        static COUNT: AtomicUsize = AtomicUsize::new(0);
+        let folder = tempfile::tempdir().unwrap();
+        let questions: Vec<AnyQuestion> = (0..8).map(|n| Arc::new(Fibonacci(n, &COUNT)) as _).collect();
+        let held = |desk: &Desk<'_>| desk.answers.lock().unwrap().len();
+
+        let desk = Desk::new(Some(Store::new(folder.path())), &());
+        desk.gather(&questions);
+        assert_eq!((COUNT.load(Ordering::Relaxed), held(&desk)), (8, 0));
+        // Asked for, they come from the store; what somebody holds stays.
+        let held_by_us = desk.ask(&Fibonacci(7, &COUNT)).unwrap();
+        desk.ask(&Fibonacci(6, &COUNT)).unwrap();
+        desk.forget();
+        assert_eq!((COUNT.load(Ordering::Relaxed), held(&desk)), (8, 1));
+        drop(held_by_us);
+
+        // A desk that begins with them reads none of them (one is damaged and not missed), and computes only what is missing.
+        let next = Desk::new(Some(Store::new(folder.path())), &());
+        let path = Store::new(folder.path()).path(&key(&*questions[3]));
+        let whole = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &whole[1..]).unwrap();
+        next.gather(&questions);
+        std::fs::write(&path, &whole).unwrap();
+        assert_eq!((COUNT.load(Ordering::Relaxed), held(&next)), (8, 0));
+        next.gather(&[Arc::new(Fibonacci(8, &COUNT)) as _]);
+        assert_eq!(COUNT.load(Ordering::Relaxed), 9);
+
+        // Without a store, memory is the only place.
+        let without = Desk::quiet();
+        without.gather(&questions);
+        without.forget();
+        assert_eq!(held(&without), 8);
+    }
+
+    #[test]
+    fn what_is_asked_in_passing_is_not_kept() {
+        static COUNT: AtomicUsize = AtomicUsize::new(0);
+        let (desk, question) = (Desk::quiet(), Fibonacci(1, &COUNT));
+        for times in 1..=2 {
+            assert_eq!(desk.ask_in_passing(&question).unwrap().fact::<u64>("value"), Ok(1));
+            assert_eq!(COUNT.load(Ordering::Relaxed), times);
+        }
+        // What is there already is taken.
+        desk.ask(&question).unwrap();
+        desk.ask_in_passing(&question).unwrap();
+        assert_eq!(COUNT.load(Ordering::Relaxed), 3);
+    }
+
+    #[test]
+    fn an_error_reaches_whoever_asks() {
+        static COUNT: AtomicUsize = AtomicUsize::new(0);
+        let desk = Desk::quiet();
+        for _ in 0..2 {
+            assert_eq!(desk.ask(&Fibonacci(14, &COUNT)).unwrap_err(), JobError::Other("unlucky".into()));
+        }
+        assert_eq!(desk.ask(&Fibonacci(3, &COUNT)).unwrap().fact::<u64>("value"), Ok(2));
+    }
+}

@@ -1,0 +1,738 @@
+//! The question of a closed orbit, and of how it changes with a parameter.
+
+use std::cell::RefCell;
+
+use nalgebra::SVector;
+use serde::Serialize;
+use serde_json::Value;
+
+use super::answer::{Answer, Stop};
+use super::desk::Desk;
+use super::question::{JobError, Question};
+use super::run::Run;
+use super::spec::{Observation, RunSpec, SpecError, SwitchSpec};
+use super::table::{Column, Entry, Table};
+use twofold_analyse::branch::{self, Course, End, Newton, Orbit, ReturnMap};
+use twofold_analyse::filippov_return;
+use twofold_analyse::floquet::{self, Plane, Returned};
+use twofold_integrate::filippov::SlidingFlow;
+use twofold_integrate::{Failure, Schedule, Tolerance, Watch};
+use twofold_num::elementary::sqrt;
+use twofold_num::tape::Program;
+use twofold_system::{Bound, Field, System, VectorField};
+
+/// The closed orbit through a plane near a start, by Newton's method, and its branch along a parameter if one is named.
+///
+/// Smoothed and hysteretic systems: the return map's derivative is exact (variational equation). Discontinuous ones: by differences,
+/// through crossings and sliding; grazing and set-valued orbits are refused (see [`filippov_return`]).
+///
+/// Tables: `orbit` (its passages through the plane), `branch` (a row per orbit) and `bifurcations` if a parameter is followed. Facts: `period`,
+/// `multipliers` (real, imaginary), `largest_modulus`, `rate`, `residual`, `iterations`, `returns`, `point`; `end` of the branch.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ClosedOrbit {
+    /// The system.
+    pub system: System,
+    /// The switch.
+    pub switch: SwitchSpec,
+    /// Where to begin.
+    pub start: Vec<f64>,
+    /// How the motion settles before Newton's method begins, at most until this time; 0: not at all.
+    pub settle: f64,
+    /// The plane.
+    pub plane: Plane,
+    /// Passages per turn in the plane's direction; none: as many as the settled motion shows.
+    pub returns: Option<usize>,
+    /// Local error of the orbit and its tangent vectors.
+    pub tolerance: Tolerance,
+    /// Give up on a return after this time.
+    pub longest_return: f64,
+    /// The parameter to follow it along.
+    pub along: Option<Along>,
+}
+
+/// A parameter, and from where to where.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Along {
+    /// Its name: one of the system's, or `eps`.
+    pub parameter: String,
+    /// Where the first orbit is looked for.
+    pub from: f64,
+    /// The other end.
+    pub to: f64,
+    /// Steps that the range is divided into, at least.
+    pub steps: usize,
+    /// Most orbits.
+    pub most: usize,
+}
+
+/// Largest |P(u) - u| that counts as closed, in tolerances; and never less than [`LEAST_CLOSED`].
+const CLOSED: f64 = 100.0;
+const LEAST_CLOSED: f64 = 1e-10;
+/// Newton iterations.
+const ITERATIONS: usize = 30;
+/// Most returns that are looked for in a settled motion.
+const MOST_RETURNS: usize = 32;
+/// Two passages this near, in shares of their size, are taken for one when returns are counted: Newton's method then decides.
+const SAME_PASSAGE: f64 = 1e-3;
+/// Systems with up to so many states; a hysteretic switch adds one.
+const MOST_STATES: usize = 8;
+
+impl Question for ClosedOrbit {
+    fn kind(&self) -> &'static str {
+        "closed-orbit"
+    }
+
+    fn json(&self) -> Value {
+        serde_json::to_value(self).expect("questions are plain data")
+    }
+
+    fn label(&self) -> String {
+        match &self.along {
+            Some(along) => format!("closed orbits along {}", along.parameter),
+            None => "closed orbit".into(),
+        }
+    }
+
+    fn cost(&self) -> f64 {
+        let members = self.along.as_ref().map_or(1.0, |a| 3.0 * a.steps as f64);
+        10.0 * (self.settle + members * 50.0)
+    }
+
+    fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+        self.validate()?;
+        let (guess, returns) = self.guess(desk)?;
+        let map = Map { question: self, returns, failure: RefCell::new(None) };
+        let newton = Newton {
+            closed: (CLOSED * self.tolerance.atol.max(self.tolerance.rtol)).max(LEAST_CLOSED),
+            iterations: ITERATIONS,
+        };
+        let value = self.along.as_ref().map_or(0.0, |a| a.from);
+        let first = branch::closed_orbit(&map, &guess, value, newton).map_err(|why| map.error(why))?;
+        let mut answer = self.facts(&first, returns);
+        let Some(along) = &self.along else { return Ok(answer) };
+        let course =
+            Course { from: along.from, to: along.to, longest: 1.0 / along.steps as f64, most: along.most, newton };
+        let width = (along.to - along.from).abs();
+        let mut go_on = |orbit: &Orbit| watch.reached(((orbit.parameter - along.from) / width).abs().min(1.0));
+        let found = branch::follow(&map, first, &course, &mut go_on);
+        if found.end == End::Interrupted {
+            answer.stop = Stop::Interrupted;
+        }
+        answer.tables.push(self.branch_table(&found.orbits));
+        let mut table = Table::new(
+            "bifurcations",
+            [Column::words("change"), Column::numbers(&along.parameter), Column::numbers("uncertainty")],
+        );
+        for b in &found.bifurcations {
+            table.push([b.change.word().into(), b.parameter.into(), b.uncertainty.into()]);
+        }
+        answer.tables.push(table);
+        Ok(answer.with_fact("end", &found.end))
+    }
+}
+
+impl ClosedOrbit {
+    fn validate(&self) -> Result<(), JobError> {
+        let wrong = |field, value: String, rule| Err(SpecError { field, value, rule }.into());
+        let n = self.system.dimension();
+        if !(2..=MOST_STATES).contains(&n) {
+            return wrong(
+                "system",
+                format!("one of {n} states"),
+                "closed orbits are looked for in systems of 2 to 8 states",
+            );
+        }
+        if self.plane.axis >= n {
+            return wrong(
+                "section",
+                self.plane.axis.to_string(),
+                "that is not the number of a state; they count from 0",
+            );
+        }
+        if let Some(along) = &self.along {
+            for end in [along.from, along.to] {
+                if let Err(error) = self.at(end) {
+                    let value = format!("\"{}\" ({error})", along.parameter);
+                    return wrong("along", value, "name a parameter of the system and values that it may have, or eps");
+                }
+            }
+            if along.from == along.to || along.steps == 0 {
+                return wrong(
+                    "along",
+                    format!("{} to {}", along.from, along.to),
+                    "give two ends and at least one step",
+                );
+            }
+        }
+        if self.returns == Some(0) {
+            return wrong(
+                "returns",
+                "0".into(),
+                "a closed orbit crosses its plane at least once per turn: ask for one return or more",
+            );
+        }
+        Ok(())
+    }
+
+    /// System and switch at a value of the parameter.
+    fn at(&self, value: f64) -> Result<(System, SwitchSpec), JobError> {
+        let Some(along) = &self.along else { return Ok((self.system.clone(), self.switch)) };
+        if along.parameter == "eps" && self.system.parameter("eps").is_none() {
+            let switch = match self.switch {
+                SwitchSpec::Smoothed { transition, .. } if value > 0.0 => {
+                    SwitchSpec::Smoothed { eps: value, transition }
+                }
+                SwitchSpec::Hysteretic { eps_prime, relaxation, phi0, .. } if value > 0.0 => {
+                    SwitchSpec::Hysteretic { eps: value, eps_prime, relaxation, phi0 }
+                }
+                SwitchSpec::Filippov { .. } => {
+                    return Err(JobError::Other("the discontinuous system has no eps to follow".into()));
+                }
+                _ => return Err(JobError::Other(format!("eps = {value}: it is above 0"))),
+            };
+            return Ok((self.system.clone(), switch));
+        }
+        let system = self.system.clone().with(&along.parameter, value).map_err(|e| JobError::Other(e.to_string()))?;
+        Ok((system, self.switch))
+    }
+
+    /// Where Newton's method begins, in the equation's states, and the number of returns.
+    fn guess(&self, desk: &Desk<'_>) -> Result<(Vec<f64>, usize), JobError> {
+        let (system, switch) = self.at(self.along.as_ref().map_or(0.0, |a| a.from))?;
+        let mut point = self.start.clone();
+        let mut returns = self.returns;
+        if self.settle > 0.0 {
+            let spec = RunSpec {
+                system: system.clone(),
+                switch,
+                start: self.start.clone(),
+                t_end: self.settle,
+                method: super::spec::MethodSpec {
+                    name: super::spec::Method::Dopri5,
+                    tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
+                    step_cap: twofold_integrate::StepCap::None,
+                    max_steps: super::spec::DEFAULT_MAX_STEPS,
+                    precision: None,
+                    order: None,
+                },
+                schedule: Schedule::default(),
+                observe: Observation::Section { coordinate: self.plane.axis, value: self.plane.value },
+            };
+            let settled = desk.ask(&Run(spec))?;
+            if settled.stop == Stop::Interrupted {
+                return Err(JobError::Interrupted);
+            }
+            let section = settled.table("section").ok_or_else(|| JobError::Other("a section was asked for".into()))?;
+            let columns: Vec<&[f64]> = system.coordinates().iter().map(|name| section.numbers(name)).collect();
+            let wanted = if self.plane.upward { "up" } else { "down" };
+            let rows: Vec<usize> =
+                section.words("direction").enumerate().filter(|(_, w)| *w == wanted).map(|(row, _)| row).collect();
+            let state = |row: usize| columns.iter().map(|c| c[row]).collect::<Vec<f64>>();
+            let Some(last) = rows.last() else {
+                return Err(JobError::Other(format!(
+                    "the motion from the start does not pass the plane {}wards within t = {}: choose another plane or start, or \
+                     let it settle for longer",
+                    wanted, self.settle
+                )));
+            };
+            point = state(*last);
+            let size = 1.0 + point.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
+            let near = |row: usize| {
+                let d = state(row).iter().zip(&point).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+                sqrt(d) < SAME_PASSAGE * size
+            };
+            returns =
+                returns.or_else(|| (1..=MOST_RETURNS.min(rows.len() - 1)).find(|k| near(rows[rows.len() - 1 - k])));
+        }
+        point[self.plane.axis] = self.plane.value;
+        if let SwitchSpec::Hysteretic { .. } = switch {
+            let mut h = [f64::NAN];
+            Program::new(&system.tape().select([0])).evaluate(&point, &mut h);
+            point.push(if h[0] > 0.0 { 1.0 } else { 0.0 });
+        }
+        Ok((point, returns.unwrap_or(1)))
+    }
+
+    /// States of the equation: a hysteretic switch has one more.
+    fn states(&self) -> usize {
+        self.system.dimension() + usize::from(matches!(self.switch, SwitchSpec::Hysteretic { .. }))
+    }
+
+    fn names(&self) -> Vec<String> {
+        let mut names: Vec<String> = self.system.coordinates().into_iter().map(Into::into).collect();
+        if self.states() > names.len() {
+            names.push(if names.iter().any(|n| n == "phi") { "phi_".into() } else { "phi".into() });
+        }
+        names
+    }
+
+    fn facts(&self, orbit: &Orbit, returns: usize) -> Answer {
+        let names = self.names();
+        let columns = names.iter().map(|n| Column::numbers(n)).chain([Column::words("direction")]);
+        let mut table = Table::new("orbit", columns);
+        let (here, there) = if self.plane.upward { ("up", "down") } else { ("down", "up") };
+        for (points, word) in [(&orbit.same, here), (&orbit.opposite, there)] {
+            for point in points {
+                table.push(point.iter().map(|x| Entry::Number(*x)).chain([word.into()]));
+            }
+        }
+        Answer::of_tables(vec![table])
+            .with_fact("period", &orbit.period)
+            .with_fact("point", &orbit.point)
+            .with_fact("multipliers", &orbit.multipliers)
+            .with_fact("largest_modulus", &orbit.largest_modulus())
+            .with_fact("rate", &orbit.rate())
+            .with_fact("residual", &orbit.residual)
+            .with_fact("iterations", &orbit.iterations)
+            .with_fact("returns", &returns)
+    }
+
+    fn branch_table(&self, orbits: &[Orbit]) -> Table {
+        let parameter = self.along.as_ref().map_or("", |a| a.parameter.as_str());
+        let multipliers = orbits.iter().map(|o| o.multipliers.len()).max().unwrap_or(0);
+        let numbered = (1..=multipliers).flat_map(|k| [format!("multiplier{k}_re"), format!("multiplier{k}_im")]);
+        let columns = [Column::numbers(parameter), Column::numbers("period"), Column::words("stability")]
+            .into_iter()
+            .chain(self.names().into_iter().map(|n| Column::numbers(&n)))
+            .chain(numbered.map(|n| Column::numbers(&n)));
+        let mut table = Table::new("branch", columns);
+        for o in orbits {
+            let stability = if o.attracts() { "stable" } else { "unstable" };
+            let mut row: Vec<Entry> = vec![o.parameter.into(), o.period.into(), stability.into()];
+            row.extend(o.point.iter().map(|x| Entry::Number(*x)));
+            row.extend(
+                (0..multipliers).flat_map(|k| o.multipliers.get(k).map_or([f64::NAN; 2], |m| *m).map(Entry::Number)),
+            );
+            table.push(row);
+        }
+        table
+    }
+}
+
+/// The return map of a question's system.
+struct Map<'a> {
+    question: &'a ClosedOrbit,
+    returns: usize,
+    /// An error of the question that a return met: the words of the search do not hide it.
+    failure: RefCell<Option<JobError>>,
+}
+
+impl Map<'_> {
+    fn error(&self, why: String) -> JobError {
+        self.failure.borrow_mut().take().unwrap_or(JobError::Other(why))
+    }
+
+    /// By the variational equation.
+    fn smooth<const N: usize, const M: usize>(&self, field: &Field, u: &[f64]) -> Result<Returned, JobError> {
+        let tangent = field.variational(N).bind::<M>()?;
+        let u = SVector::<f64, N>::from_column_slice(u);
+        let found = floquet::return_map::<N, M, _>(&tangent, self.question.plane, self.returns, &u, &self.settings());
+        found.map_err(|error| match error {
+            floquet::Error::Integration(failure) => JobError::Other(without_tangents(failure, N).to_string()),
+            other => JobError::Other(other.to_string()),
+        })
+    }
+
+    /// Of the discontinuous system.
+    fn discontinuous<const N: usize, const M: usize>(
+        &self,
+        system: &System,
+        u: &[f64],
+        derivative: bool,
+    ) -> Result<Returned, JobError>
+    where
+        for<'b> SlidingFlow<'b, Bound<N>, N>: VectorField<M>,
+    {
+        let u = SVector::<f64, N>::from_column_slice(u);
+        let system = system.bind::<N>()?;
+        filippov_return::return_map(&system, self.question.plane, self.returns, &u, &self.settings(), derivative)
+            .map_err(|e| JobError::Other(e.to_string()))
+    }
+
+    fn settings(&self) -> floquet::Settings {
+        floquet::Settings {
+            tolerance: self.question.tolerance,
+            longest_return: self.question.longest_return,
+            ..floquet::Settings::default()
+        }
+    }
+
+    fn find(&self, u: &[f64], p: f64, derivative: bool) -> Result<Returned, JobError> {
+        let (system, switch) = self.question.at(p)?;
+        let field = match switch {
+            SwitchSpec::Filippov { .. } => {
+                return match u.len() {
+                    2 => self.discontinuous::<2, 3>(&system, u, derivative),
+                    3 => self.discontinuous::<3, 4>(&system, u, derivative),
+                    4 => self.discontinuous::<4, 5>(&system, u, derivative),
+                    5 => self.discontinuous::<5, 6>(&system, u, derivative),
+                    6 => self.discontinuous::<6, 7>(&system, u, derivative),
+                    7 => self.discontinuous::<7, 8>(&system, u, derivative),
+                    8 => self.discontinuous::<8, 9>(&system, u, derivative),
+                    n => Err(JobError::Other(format!("no closed orbits with {n} states"))),
+                };
+            }
+            SwitchSpec::Smoothed { eps, transition } => Field::smoothed(&system, transition, eps),
+            SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. } => {
+                Field::hysteretic(&system, eps, eps_prime, relaxation)
+            }
+        };
+        match u.len() {
+            2 => self.smooth::<2, 6>(&field, u),
+            3 => self.smooth::<3, 12>(&field, u),
+            4 => self.smooth::<4, 20>(&field, u),
+            5 => self.smooth::<5, 30>(&field, u),
+            6 => self.smooth::<6, 42>(&field, u),
+            7 => self.smooth::<7, 56>(&field, u),
+            8 => self.smooth::<8, 72>(&field, u),
+            9 => self.smooth::<9, 90>(&field, u),
+            n => Err(JobError::Other(format!("no closed orbits with {n} states"))),
+        }
+    }
+}
+
+/// A failure that speaks of the orbit alone, not of the tangent vectors beside it.
+fn without_tangents(mut failure: Failure, states: usize) -> Failure {
+    match &mut failure {
+        Failure::NotFinite { state, .. }
+        | Failure::StepUnderflow { state, .. }
+        | Failure::Undefined { state, .. }
+        | Failure::Unbounded { state, .. }
+        | Failure::NotSmooth { state, .. }
+        | Failure::TooManySteps { state, .. }
+        | Failure::NotConverged { state, .. } => state.truncate(states),
+        Failure::NotApplicable { .. } => {}
+    }
+    failure
+}
+
+impl ReturnMap for Map<'_> {
+    fn states(&self) -> usize {
+        self.question.states()
+    }
+
+    fn axis(&self) -> usize {
+        self.question.plane.axis
+    }
+
+    fn returned(&self, u: &[f64], p: f64, derivative: bool) -> Result<Returned, String> {
+        if !u.iter().all(|x| x.is_finite()) {
+            return Err(format!(
+                "the search left the finite numbers; start nearer ({})",
+                Failure::NotFinite { t: 0.0, state: u.to_vec() }
+            ));
+        }
+        self.find(u, p, derivative).map_err(|error| {
+            let said = error.to_string();
+            if !matches!(error, JobError::Other(_)) {
+                *self.failure.borrow_mut() = Some(error);
+            }
+            said
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+    use std::sync::Mutex;
+
+    use super::*;
+    use crate::cases;
+    use twofold_integrate::filippov::{ExitRule, Side};
+    use twofold_system::Relaxation;
+
+    fn question(system: System, switch: SwitchSpec, axis: usize) -> ClosedOrbit {
+        ClosedOrbit {
+            start: vec![0.3; system.dimension()],
+            system,
+            switch,
+            settle: 0.0,
+            plane: Plane { axis, value: 0.0, upward: true },
+            returns: None,
+            tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
+            longest_return: 100.0,
+            along: None,
+        }
+    }
+
+    /// Turns about the origin at unit speed, r' = side (mu r - r^3): the circle r^2 = mu has the multiplier exp(-4 pi mu side). Beside it decays at the
+    /// rates 1, 2, 3 ..., whose multipliers are exp(-2 pi k).
+    fn circle(states: usize) -> System {
+        let decays = 1..=states - 2;
+        let names: Vec<String> =
+            ["x".into(), "y".into()].into_iter().chain(decays.clone().map(|k| format!("a{k}"))).collect();
+        let turn = ["side*x*(mu - x*x - y*y) - y".into(), "side*y*(mu - x*x - y*y) + x".into()];
+        let field: Vec<String> = turn.into_iter().chain(decays.map(|k| format!("-{k}*a{k}"))).collect();
+        let text = format!("states = {names:?}\nh = 'x'\nplus = {field:?}\nminus = {field:?}\n");
+        cases::of(&format!("{text}[parameters]\nmu = 0.1\nside = 1\n"))
+    }
+
+    fn switches() -> [SwitchSpec; 3] {
+        let exit = ExitRule::AtOnce { side: Side::Plus };
+        let hysteretic = SwitchSpec::hysteretic(1e-2, Relaxation::Single);
+        [SwitchSpec::tanh(1e-2), hysteretic, SwitchSpec::Filippov { exit, funnel: None }]
+    }
+
+    #[test]
+    fn a_circle_is_found_in_two_to_eight_states() {
+        let known = (-0.4 * PI).exp();
+        for n in 2..=8 {
+            for switch in switches() {
+                let answer = question(circle(n), switch, 1).compute(&Desk::quiet(), &()).unwrap();
+                let fact = |name: &str| answer.fact::<f64>(name).unwrap();
+                let near = |a: f64, b: f64, by: f64| assert!((a - b).abs() < by, "{n} {switch:?}: {a} {b}");
+                near(fact("period"), 2.0 * PI, 1e-6);
+                near(fact("largest_modulus"), known, 1e-4);
+                near(fact("rate"), 0.2, 1e-4);
+                assert!(fact("residual") < 1e-7 && fact("iterations") >= 1.0 && fact("returns") == 1.0);
+                let multipliers: Vec<[f64; 2]> = answer.fact("multipliers").unwrap();
+                let phi = usize::from(matches!(switch, SwitchSpec::Hysteretic { .. }));
+                assert_eq!(multipliers.len(), n - 1 + phi);
+                let decays = (1..n - 1).map(|k| (-2.0 * PI * k as f64).exp());
+                let all = std::iter::once(known).chain(decays).chain([0.0]);
+                for (m, known) in multipliers.iter().zip(all) {
+                    near(m[0], known, 1e-4);
+                    near(m[1], 0.0, 1e-4);
+                }
+                // Upwards through y = 0 at the right, downwards at the left.
+                let orbit = answer.table("orbit").unwrap();
+                assert_eq!(orbit.words("direction").collect::<Vec<_>>(), ["up", "down"]);
+                let point: Vec<f64> = answer.fact("point").unwrap();
+                assert_eq!((point.len(), point[0]), (n + phi, orbit.numbers("x")[0]));
+                near(orbit.numbers("x")[0], 0.1_f64.sqrt(), 1e-6);
+                near(orbit.numbers("x")[1], -(0.1_f64.sqrt()), 1e-6);
+                assert_eq!(orbit.numbers("phi").len(), 2 * phi);
+            }
+        }
+        // The other way through the plane.
+        let mut down = question(circle(2), SwitchSpec::tanh(1e-2), 1);
+        (down.plane.upward, down.start) = (false, vec![-0.3, 0.0]);
+        let answer = down.compute(&Desk::quiet(), &()).unwrap();
+        let orbit = answer.table("orbit").unwrap();
+        assert_eq!(orbit.words("direction").collect::<Vec<_>>(), ["down", "up"]);
+        assert!(orbit.numbers("x")[0] < 0.0 && orbit.numbers("x")[1] > 0.0);
+    }
+
+    /// Hears how far a branch has come; refuses after so many.
+    struct Heard(Mutex<Vec<f64>>, usize);
+
+    impl Watch for Heard {
+        fn reached(&self, t: f64) -> bool {
+            let mut heard = self.0.lock().unwrap();
+            heard.push(t);
+            heard.len() < self.1
+        }
+    }
+
+    fn along(side: f64, from: f64, to: f64) -> ClosedOrbit {
+        let along = Along { parameter: "mu".into(), from, to, steps: 4, most: 100 };
+        let system = circle(2).with("side", side).unwrap();
+        ClosedOrbit { along: Some(along), ..question(system, SwitchSpec::tanh(1e-2), 1) }
+    }
+
+    /// Attracting and repelling, up and down in mu.
+    #[test]
+    fn a_branch_of_circles_has_known_multipliers() {
+        for (side, from, to) in [(1.0, 0.1, 0.3), (-1.0, 0.1, 0.2), (1.0, 0.2, 0.1)] {
+            let heard = Heard(Mutex::default(), 1000);
+            let answer = along(side, from, to).compute(&Desk::quiet(), &heard).unwrap();
+            assert_eq!((answer.stop, answer.fact("end")), (Stop::Finished, Ok(End::Reached)));
+            let branch = answer.table("branch").unwrap();
+            let names: Vec<&str> = branch.columns.iter().map(|c| c.name.as_str()).collect();
+            assert_eq!(names, ["mu", "period", "stability", "x", "y", "multiplier1_re", "multiplier1_im"]);
+            let mu = branch.numbers("mu");
+            assert!(mu.len() > 4 && mu[0] == from && mu[mu.len() - 1] == to, "{mu:?}");
+            assert!(
+                mu.windows(2).all(|w| (w[1] - w[0]).signum() == (to - from).signum()
+                    && (w[1] - w[0]).abs() < 0.26 * (to - from).abs()),
+                "{mu:?}"
+            );
+            let known = if side > 0.0 { "stable" } else { "unstable" };
+            assert!(branch.words("stability").all(|word| word == known));
+            for (row, mu) in mu.iter().enumerate() {
+                let near = |name: &str, b: f64| {
+                    let a = branch.numbers(name)[row];
+                    assert!((a - b).abs() < 1e-5, "{name} at {mu}: {a} {b}");
+                };
+                near("period", 2.0 * PI);
+                near("x", mu.sqrt());
+                near("y", 0.0);
+                near("multiplier1_re", (-4.0 * PI * mu * side).exp());
+                near("multiplier1_im", 0.0);
+            }
+            let changes = answer.table("bifurcations").unwrap();
+            assert!(changes.is_empty() && changes.columns[1].name == "mu");
+            // Told of each orbit but the first, in shares of the way.
+            let heard = heard.0.into_inner().unwrap();
+            let shares: Vec<f64> = mu[1..].iter().map(|mu| ((mu - from) / (to - from)).min(1.0)).collect();
+            assert!(
+                heard.len() == shares.len() && heard.iter().zip(shares).all(|(a, b)| (a - b).abs() < 1e-12),
+                "{heard:?}"
+            );
+        }
+        let cut = along(1.0, 0.1, 0.3).compute(&Desk::quiet(), &Heard(Mutex::default(), 2)).unwrap();
+        assert_eq!((cut.stop, cut.fact("end")), (Stop::Interrupted, Ok(End::Interrupted)));
+        assert_eq!(cut.table("branch").unwrap().len(), 3);
+    }
+
+    /// On the unit circle z is cos 2 theta: it passes 0 twice a turn in each direction, upwards at (1, -1)/sqrt 2 and opposite. What settles there is seen to come back at the
+    /// second passage.
+    #[test]
+    fn returns_are_counted_in_the_settled_motion() {
+        let field = ["x*(1 - x*x - y*y) - y", "y*(1 - x*x - y*y) + x", "-z + x*x - y*y - 4*x*y"];
+        let system = cases::smooth(&["x", "y", "z"], "x + 9", &field);
+        let question = ClosedOrbit { settle: 40.0, ..question(system, SwitchSpec::tanh(1e-2), 2) };
+        let answer = question.compute(&Desk::quiet(), &()).unwrap();
+        assert_eq!(answer.fact("returns"), Ok(2));
+        assert!((answer.fact::<f64>("period").unwrap() - 2.0 * PI).abs() < 1e-6);
+        let orbit = answer.table("orbit").unwrap();
+        assert_eq!(orbit.words("direction").collect::<Vec<_>>(), ["up", "up", "down", "down"]);
+        let (x, y) = (orbit.numbers("x"), orbit.numbers("y"));
+        assert!((0..2).all(|k| (x[k] + y[k]).abs() < 1e-6) && (x[0] + x[1]).abs() < 1e-6, "{x:?} {y:?}");
+        assert!((0..4).all(|k| (x[k].abs() - 0.5_f64.sqrt()).abs() < 1e-6));
+        for (upward, word) in [(true, "upwards within t = 40"), (false, "downwards within t = 40")] {
+            let plane = Plane { axis: 2, value: 5.0, upward };
+            let missed = ClosedOrbit { plane, ..question.clone() };
+            let said = missed.compute(&Desk::quiet(), &()).unwrap_err().to_string();
+            assert!(said.contains(word), "{said}");
+        }
+        struct Never;
+        impl crate::Progress for Never {
+            fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn crate::JobWatch + 'a> {
+                Box::new(Never)
+            }
+        }
+        impl crate::JobWatch for Never {
+            fn done(self: Box<Self>, _: &str) {}
+        }
+        impl Watch for Never {
+            fn reached(&self, _: f64) -> bool {
+                false
+            }
+        }
+        let long = ClosedOrbit { settle: 4000.0, ..question };
+        assert_eq!(long.compute(&Desk::new(None, &Never), &()), Err(JobError::Interrupted));
+    }
+
+    /// Two turns beside each other, of (x, y) at unit speed and of (u, v) at a third of it and a little more: at x = 4,
+    /// where y = 0 is passed upwards, u and v are again what they were after three passages, but for `apart`. That
+    /// counts as the same within a thousandth of 1 + 4.
+    #[test]
+    fn a_passage_is_the_same_within_a_thousandth_of_its_size() {
+        let guess = |apart: f64, passages: f64| {
+            let speed = 1.0 / 3.0 + apart / (6.0 * PI);
+            let field = ["-y".to_owned(), "x".into(), format!("-{speed:?}*v"), format!("{speed:?}*u")];
+            let field: Vec<&str> = field.iter().map(String::as_str).collect();
+            let system = cases::smooth(&["x", "y", "u", "v"], "x + 9", &field);
+            let start = vec![4.0 * 0.5_f64.cos(), -4.0 * 0.5_f64.sin(), 1.0, 0.0];
+            let settle = 1.0 + 2.0 * PI * (passages - 1.0);
+            let question = ClosedOrbit { settle, start, ..question(system, SwitchSpec::tanh(1e-2), 1) };
+            question.guess(&Desk::quiet()).unwrap()
+        };
+        for (apart, returns) in [(4.5e-3, 3), (5.5e-3, 1)] {
+            let (point, found) = guess(apart, 6.0);
+            assert!((point[0] - 4.0).abs() < 1e-6 && point[1] == 0.0 && found == returns, "{apart}: {found} {point:?}");
+        }
+        // Three passages are too few to see it; one return is tried.
+        assert_eq!(guess(0.0, 3.0).1, 1);
+        assert_eq!(guess(0.0, 4.0).1, 3);
+    }
+
+    /// Not in half of the time that a turn takes; and a period is as good as the tolerance that was asked for.
+    #[test]
+    fn a_return_is_computed_as_it_is_asked_for() {
+        let question = question(circle(2), SwitchSpec::tanh(1e-2), 1);
+        let hasty = ClosedOrbit { longest_return: PI, ..question.clone() };
+        let said = hasty.compute(&Desk::quiet(), &()).unwrap_err().to_string();
+        assert!(said.contains(&format!("within t = {PI}")), "{said}");
+        let period = |tolerance: f64| -> f64 {
+            let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
+            let answer = ClosedOrbit { tolerance, ..question.clone() }.compute(&Desk::quiet(), &()).unwrap();
+            (answer.fact::<f64>("period").unwrap() - 2.0 * PI).abs()
+        };
+        assert!(period(1e-4) > 1e-8 && period(1e-12) < 1e-10, "{} {}", period(1e-4), period(1e-12));
+    }
+
+    /// Without settling: the start, moved onto the plane, with phi on its side of h = 0.
+    #[test]
+    fn a_hysteretic_guess_has_phi() {
+        for (x, phi) in [(0.5, 1.0), (-0.5, 0.0), (0.0, 0.0)] {
+            let mut question = question(circle(3), switches()[1], 1);
+            (question.start, question.plane.value) = (vec![x, 7.0, 8.0], 2.0);
+            assert_eq!(question.guess(&Desk::quiet()).unwrap(), (vec![x, 2.0, 8.0, phi], 1));
+            assert_eq!((question.states(), question.names()), (4, ["x", "y", "a1", "phi"].map(String::from).to_vec()));
+        }
+        let phi = question(cases::smooth(&["x", "phi"], "x", &["phi", "-x"]), switches()[1], 1);
+        assert_eq!(phi.names(), ["x", "phi", "phi_"]);
+        let smoothed = question(circle(3), switches()[0], 1);
+        assert_eq!((smoothed.states(), smoothed.names().len()), (3, 3));
+    }
+
+    #[test]
+    fn the_parameter_may_be_the_width() {
+        let at = |switch: SwitchSpec, system: System, value: f64| {
+            let along = Along { parameter: "eps".into(), from: 1e-3, to: 1e-2, steps: 1, most: 9 };
+            ClosedOrbit { along: Some(along), ..question(system, switch, 1) }.at(value)
+        };
+        let [smoothed, _, filippov] = switches();
+        let hysteretic =
+            |eps| SwitchSpec::Hysteretic { eps, eps_prime: 0.3, relaxation: Relaxation::Single, phi0: 0.7 };
+        for (switch, wanted) in [(smoothed, SwitchSpec::tanh(0.5)), (hysteretic(0.1), hysteretic(0.5))] {
+            assert_eq!(at(switch, circle(2), 0.5).unwrap(), (circle(2), wanted));
+            for value in [0.0, -1.0, f64::NAN] {
+                assert!(at(switch, circle(2), value).unwrap_err().to_string().contains("above 0"), "{value}");
+            }
+        }
+        assert!(at(filippov, circle(2), 0.5).unwrap_err().to_string().contains("no eps"));
+        // A system's own parameter of that name comes first.
+        let own = cases::of(
+            "states = ['x', 'y']\nh = 'x'\nplus = ['y', '-eps*x']\nminus = ['y', '-x']\n[parameters]\neps = 2",
+        );
+        assert_eq!(at(smoothed, own.clone(), 0.5).unwrap(), (own.with("eps", 0.5).unwrap(), smoothed));
+    }
+
+    #[test]
+    fn wrong_questions_are_refused() {
+        let along =
+            |parameter: &str, from, to, steps| Some(Along { parameter: parameter.into(), from, to, steps, most: 9 });
+        let [smoothed, _, filippov] = switches();
+        let good = question(circle(2), smoothed, 1);
+        assert_eq!(good.validate(), Ok(()));
+        let of = |n: usize| question(cases::decays(n), smoothed, 0);
+        for (wrong, field, word) in [
+            (of(1), "system", "2 to 8 states"),
+            (of(9), "system", "2 to 8 states"),
+            (question(circle(2), smoothed, 2), "section", "count from 0"),
+            (ClosedOrbit { along: along("nu", 0.1, 0.2, 4), ..good.clone() }, "along", "name a parameter"),
+            (ClosedOrbit { along: along("mu", 0.1, f64::NAN, 4), ..good.clone() }, "along", "name a parameter"),
+            (ClosedOrbit { along: along("eps", 0.1, -0.1, 4), ..good.clone() }, "along", "name a parameter"),
+            (ClosedOrbit { along: along("eps", 0.0, 0.1, 4), ..good.clone() }, "along", "name a parameter"),
+            (
+                ClosedOrbit { along: along("eps", 0.1, 0.2, 4), switch: filippov, ..good.clone() },
+                "along",
+                "name a parameter",
+            ),
+            (ClosedOrbit { along: along("mu", 0.1, 0.1, 4), ..good.clone() }, "along", "two ends"),
+            (ClosedOrbit { along: along("mu", 0.1, 0.2, 0), ..good.clone() }, "along", "at least one step"),
+            (ClosedOrbit { returns: Some(0), ..good.clone() }, "returns", "at least once"),
+        ] {
+            match wrong.compute(&Desk::quiet(), &()) {
+                Err(JobError::Spec(error)) => {
+                    assert!(error.field == field && error.rule.contains(word), "{field}, {word}: {error}");
+                }
+                other => panic!("{field}, {word}: {other:?}"),
+            }
+        }
+    }
+
+    /// A search that leaves the finite numbers, and one that finds nothing: in words, of the orbit's states alone.
+    #[test]
+    fn a_search_that_fails_says_why() {
+        let leaving = cases::smooth(&["x", "y"], "x + 9", &["x*x*x", "x"]);
+        let said = question(leaving, switches()[0], 1).compute(&Desk::quiet(), &()).unwrap_err().to_string();
+        assert!(!said.is_empty());
+        let failure = Failure::NotFinite { t: 1.0, state: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0] };
+        assert_eq!(without_tangents(failure, 2), Failure::NotFinite { t: 1.0, state: vec![1.0, 2.0] });
+    }
+}

@@ -1,0 +1,56 @@
+//! The question of a run: what happens from a start.
+
+use serde_json::Value;
+
+use super::answer::Answer;
+use super::desk::Desk;
+use super::question::{JobError, Question};
+use super::simulate;
+use super::spec::{Method, RunSpec, SwitchSpec};
+use twofold_integrate::Watch;
+
+/// A run, and what is recorded of it: see [`Recording`](super::Recording) for the answer's tables. Facts: `t` and `state` at the end,
+/// `most_steps_in_segment`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run(pub RunSpec);
+
+impl Question for Run {
+    fn kind(&self) -> &'static str {
+        "run"
+    }
+
+    fn json(&self) -> Value {
+        serde_json::to_value(&self.0).expect("specs are plain data")
+    }
+
+    fn label(&self) -> String {
+        let every = self.0.schedule.restart_every.map_or_else(String::new, |t| format!(", restarts every {t}"));
+        format!("{} to t = {}{every}", self.0.method.name.name(), self.0.t_end)
+    }
+
+    fn extent(&self) -> f64 {
+        self.0.t_end
+    }
+
+    fn cost(&self) -> f64 {
+        // Ratios of measured times per unit of time; they order the work and decide nothing else.
+        let switch = match self.0.switch {
+            SwitchSpec::Hysteretic { .. } => 6.0,
+            SwitchSpec::Smoothed { .. } => 1.0,
+            SwitchSpec::Filippov { .. } => 0.1,
+        };
+        let method = match self.0.method.name {
+            Method::Lsoda => 2.0,
+            Method::Radau5 => 6.0,
+            Method::Dopri5 => 1.0,
+            Method::Taylor => 10.0,
+            Method::TaylorExtended => 500.0,
+            Method::Layered => 0.3,
+        };
+        self.0.t_end * switch * method
+    }
+
+    fn compute(&self, _: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+        simulate::answer(&self.0, watch)
+    }
+}

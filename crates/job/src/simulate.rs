@@ -1,0 +1,776 @@
+//! From a spec to a recording. Pure: the same spec gives the same bytes.
+
+use nalgebra::{SVector, vector};
+
+use super::answer::{Answer, Stop};
+use super::question::JobError;
+use super::recording::{Data, Future, Recording};
+use super::spec::{FunnelSpec, MethodSpec, Observation, RunSpec, SpecError, SwitchSpec};
+use super::table::Table;
+use twofold_analyse::path::MOST_POINTS;
+use twofold_analyse::{Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder, TimedMotion, TimesRecorder};
+use twofold_integrate::filippov::{
+    self, AllModes, ExitRule, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent, SlidingFlow,
+};
+use twofold_integrate::{
+    Course, Flow, Observer, PRECISIONS, Part, Statistics, Step, Stepper, StopReason, Summary, Watch, WithStepper,
+    drive_part, with_extended,
+};
+use twofold_system::{Bound, Compiled, Field, Hysteretic, PiecewiseSmooth, Smoothed, VectorField};
+
+/// Computes a run of a system with three states.
+///
+/// # Errors
+///
+/// If the spec is wrong, the system has not three states, or the orbit cannot be followed.
+pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, JobError> {
+    spec.validate()?;
+    if spec.system.dimension() != 3 {
+        return Err(too_many_states(spec, "three states are looked at here"));
+    }
+    let recording = three_states(spec, &mut Aside::default(), watch)?;
+    if recording.stop == StopReason::Observer {
+        return Err(full(recording.t));
+    }
+    Ok(recording)
+}
+
+/// Says of a state whether a run that has come there may end.
+pub type Until<'a> = &'a dyn Fn(&[f64]) -> bool;
+
+/// Computes the section of a smoothed or hysteretic run of a system with three states, and ends it at the first step's end of which `until`
+/// holds: the recording then stops with [`StopReason::Observer`], and is otherwise that of [`simulate`].
+///
+/// # Errors
+///
+/// As [`simulate`].
+pub fn simulate_until(spec: &RunSpec, until: Until<'_>, watch: &dyn Watch) -> Result<Recording, JobError> {
+    spec.validate()?;
+    if spec.system.dimension() != 3 {
+        return Err(too_many_states(spec, "three states are looked at here"));
+    }
+    let recording = three_states(spec, &mut Aside { until: Some(until), ..Aside::default() }, watch)?;
+    if recording.stop == StopReason::Observer && recording.data.len() >= MOST_POINTS {
+        return Err(full(recording.t));
+    }
+    Ok(recording)
+}
+
+/// Computes a run of a system with any number of states.
+///
+/// # Errors
+///
+/// If the spec is wrong, or the orbit cannot be followed.
+pub fn answer(spec: &RunSpec, watch: &dyn Watch) -> Result<Answer, JobError> {
+    spec.validate()?;
+    let answer = match spec.system.dimension() {
+        1 => record::<1, 2>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        2 => record::<2, 3>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        3 => three_states(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        4 => record::<4, 5>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        5 => record::<5, 6>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        6 => record::<6, 7>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        7 => record::<7, 8>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        8 => record::<8, 9>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        _ => return Err(too_many_states(spec, UP_TO_EIGHT)),
+    };
+    if answer.stop == Stop::Found { Err(full(answer.fact("t")?)) } else { Ok(answer) }
+}
+
+const UP_TO_EIGHT: &str = "runs are computed with up to eight states";
+
+/// Computes a part of a smoothed or hysteretic run whose section is recorded, from the equation's state at that part's beginning (which `spec`'s
+/// start and phi are): the rows, the time at its end, and the equation's state there.
+///
+/// # Errors
+///
+/// As [`answer`].
+pub(super) fn part(spec: &RunSpec, part: Part, watch: &dyn Watch) -> Result<(Table, f64, Vec<f64>), JobError> {
+    spec.validate()?;
+    match spec.system.dimension() {
+        1 => one_part(spec, part, |aside| record::<1, 2>(spec, aside, watch)),
+        2 => one_part(spec, part, |aside| record::<2, 3>(spec, aside, watch)),
+        3 => one_part(spec, part, |aside| three_states(spec, aside, watch)),
+        4 => one_part(spec, part, |aside| record::<4, 5>(spec, aside, watch)),
+        5 => one_part(spec, part, |aside| record::<5, 6>(spec, aside, watch)),
+        6 => one_part(spec, part, |aside| record::<6, 7>(spec, aside, watch)),
+        7 => one_part(spec, part, |aside| record::<7, 8>(spec, aside, watch)),
+        8 => one_part(spec, part, |aside| record::<8, 9>(spec, aside, watch)),
+        _ => Err(too_many_states(spec, UP_TO_EIGHT)),
+    }
+}
+
+fn one_part<const D: usize>(
+    spec: &RunSpec,
+    part: Part,
+    run: impl FnOnce(&mut Aside<'_, D>) -> Result<Recording<D>, JobError>,
+) -> Result<(Table, f64, Vec<f64>), JobError> {
+    let mut aside = Aside { part, ..Aside::default() };
+    let recording = run(&mut aside)?;
+    match recording.stop {
+        StopReason::EndTime => {}
+        StopReason::Watch => return Err(JobError::Interrupted),
+        _ => return Err(full(recording.t)),
+    }
+    let rows =
+        Recording::part(spec, &recording.data, 0).ok_or_else(|| JobError::Other("a funnel has no parts".into()))?;
+    Ok((rows, recording.t, aside.end))
+}
+
+/// How a streamed run ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Streamed {
+    /// Final time.
+    pub t: f64,
+    /// Rows given away.
+    pub rows: u64,
+    /// Work done.
+    pub statistics: Statistics,
+    /// Why it ended; [`Stop::Found`] where `rows` wanted no more.
+    pub stop: Stop,
+}
+
+/// Computes a run and gives its first table away in parts, in order and without gaps: together they are the table of [`answer`]. Memory
+/// stays flat however long the run is. `rows` says whether it wants more.
+///
+/// # Errors
+///
+/// If the spec is wrong or a funnel (whose members are computed one after the other), or the orbit cannot be followed.
+pub fn stream(spec: &RunSpec, rows: &mut dyn FnMut(&Table) -> bool, watch: &dyn Watch) -> Result<Streamed, JobError> {
+    spec.validate()?;
+    if let SwitchSpec::Filippov { funnel: Some(_), .. } = spec.switch {
+        return Err(JobError::Other("a funnel is not given away in parts".into()));
+    }
+    match spec.system.dimension() {
+        1 => streamed(spec, rows, |aside| record::<1, 2>(spec, aside, watch)),
+        2 => streamed(spec, rows, |aside| record::<2, 3>(spec, aside, watch)),
+        3 => streamed(spec, rows, |aside| three_states(spec, aside, watch)),
+        4 => streamed(spec, rows, |aside| record::<4, 5>(spec, aside, watch)),
+        5 => streamed(spec, rows, |aside| record::<5, 6>(spec, aside, watch)),
+        6 => streamed(spec, rows, |aside| record::<6, 7>(spec, aside, watch)),
+        7 => streamed(spec, rows, |aside| record::<7, 8>(spec, aside, watch)),
+        8 => streamed(spec, rows, |aside| record::<8, 9>(spec, aside, watch)),
+        _ => Err(too_many_states(spec, UP_TO_EIGHT)),
+    }
+}
+
+/// Receives parts of a recording; says whether more is wanted.
+type Sink<'a, const D: usize> = &'a mut dyn FnMut(Data<D>) -> bool;
+
+/// What looks on while a recording grows.
+struct Aside<'a, const D: usize> {
+    /// Takes parts of it away; without one everything is kept.
+    sink: Option<Sink<'a, D>>,
+    /// Ends a smoothed or hysteretic run.
+    until: Option<Until<'a>>,
+    /// Which part of a smoothed or hysteretic run is computed.
+    part: Part,
+    /// The equation's whole state at its end.
+    end: Vec<f64>,
+}
+
+impl<const D: usize> Default for Aside<'_, D> {
+    fn default() -> Self {
+        Self { sink: None, until: None, part: Part::WHOLE, end: Vec::new() }
+    }
+}
+
+fn streamed<const D: usize>(
+    spec: &RunSpec,
+    rows: &mut dyn FnMut(&Table) -> bool,
+    run: impl FnOnce(&mut Aside<'_, D>) -> Result<Recording<D>, JobError>,
+) -> Result<Streamed, JobError> {
+    let (mut first_piece, mut count) = (0, 0);
+    let mut give = |data: Data<D>| {
+        let more = Recording::part(spec, &data, first_piece).is_none_or(|table| {
+            count += table.len() as u64;
+            rows(&table)
+        });
+        if let Data::Motion(motion) = &data {
+            // The last piece goes on.
+            first_piece += motion.pieces.len().saturating_sub(1);
+        }
+        more
+    };
+    let end = run(&mut Aside { sink: Some(&mut give), ..Aside::default() })?;
+    let wanted = give(end.data);
+    let stop = if wanted { end.stop.into() } else { Stop::Found };
+    Ok(Streamed { t: end.t, rows: count, statistics: end.statistics, stop })
+}
+
+/// Points that are kept before they are given away.
+const PART: usize = 8192;
+
+/// A recorder whose points are given away.
+struct Draining<'a, 'b, R, const D: usize> {
+    recorder: R,
+    aside: &'a mut Aside<'b, D>,
+}
+
+/// Something that records and can forget.
+trait Recorder<const D: usize> {
+    fn kept(&self) -> usize;
+    fn take(&mut self) -> Data<D>;
+}
+
+impl<const D: usize> Recorder<D> for PathRecorder<D> {
+    fn kept(&self) -> usize {
+        self.len()
+    }
+    fn take(&mut self) -> Data<D> {
+        Data::Path(PathRecorder::take(self))
+    }
+}
+
+impl<const D: usize> Recorder<D> for TimesRecorder<D> {
+    fn kept(&self) -> usize {
+        self.len()
+    }
+    fn take(&mut self) -> Data<D> {
+        Data::Path(TimesRecorder::take(self))
+    }
+}
+
+impl<const D: usize> Recorder<D> for SectionRecorder<D> {
+    fn kept(&self) -> usize {
+        self.crossings().len()
+    }
+    fn take(&mut self) -> Data<D> {
+        Data::Section(SectionRecorder::take(self))
+    }
+}
+
+impl<const D: usize> Recorder<D> for MotionRecorder<D> {
+    fn kept(&self) -> usize {
+        MotionRecorder::kept(self)
+    }
+    fn take(&mut self) -> Data<D> {
+        Data::Motion(MotionRecorder::take(self))
+    }
+}
+
+impl<const D: usize> Recorder<D> for TimedMotion<D> {
+    fn kept(&self) -> usize {
+        TimedMotion::kept(self)
+    }
+    fn take(&mut self) -> Data<D> {
+        Data::Motion(TimedMotion::take(self))
+    }
+}
+
+impl<R: Recorder<D>, const D: usize> Draining<'_, '_, R, D> {
+    fn drained(&mut self, flow: Flow) -> Flow {
+        if let Some(sink) = self.aside.sink.as_mut()
+            && self.recorder.kept() >= PART
+        {
+            return if sink(self.recorder.take()) { Flow::Continue } else { Flow::Stop };
+        }
+        flow
+    }
+}
+
+impl<R: Recorder<D> + Observer<N>, const D: usize, const N: usize> Observer<N> for Draining<'_, '_, R, D> {
+    fn step(&mut self, step: &Step<'_, N>) -> Flow {
+        let flow = self.recorder.step(step);
+        let flow = self.drained(flow);
+        match self.aside.until {
+            Some(until) if until(&step.x1.as_slice()[..D.min(N)]) => Flow::Stop,
+            _ => flow,
+        }
+    }
+    fn kick(&mut self, t: f64, before: &SVector<f64, N>, after: &SVector<f64, N>) {
+        self.recorder.kick(t, before, after);
+    }
+}
+
+impl<R: Recorder<D> + FilippovObserver<D>, const D: usize> FilippovObserver<D> for Draining<'_, '_, R, D> {
+    fn step(&mut self, mode: Mode, step: &Step<'_, D>) -> Flow {
+        let flow = self.recorder.step(mode, step);
+        self.drained(flow)
+    }
+    fn event(&mut self, event: &ModeEvent<D>) -> Flow {
+        self.recorder.event(event)
+    }
+}
+
+/// The only observers here are recorders, which stop a run when they are full.
+fn full(t: f64) -> JobError {
+    JobError::TooManyPoints { t, limit: MOST_POINTS }
+}
+
+/// What a dimension that is not provided for looks like to the one who asked.
+fn too_many_states(spec: &RunSpec, rule: &'static str) -> JobError {
+    SpecError { field: "system", value: format!("one of {} states", spec.system.dimension()), rule }.into()
+}
+
+/// Three states: by the compiled equations where there are some, which give the same bits as the recorded ones and give them sooner.
+fn three_states(spec: &RunSpec, aside: &mut Aside<'_, 3>, watch: &dyn Watch) -> Result<Recording, JobError> {
+    let x0 = start::<3>(spec);
+    match (spec.system.compiled(), spec.switch) {
+        (Some(Compiled::Caricature(system)), SwitchSpec::Smoothed { eps, transition }) => {
+            observe(spec, &Smoothed { system, transition, eps }, x0, aside, watch)
+        }
+        (Some(Compiled::Caricature(system)), SwitchSpec::Hysteretic { eps, eps_prime, relaxation, phi0 }) => {
+            let field = Hysteretic { system, eps, eps_prime, relaxation };
+            observe(spec, &field, vector![x0[0], x0[1], x0[2], phi0], aside, watch)
+        }
+        (Some(Compiled::Caricature(system)), SwitchSpec::Filippov { exit, funnel }) => {
+            discontinuous(spec, &system, x0, exit, funnel, aside, watch)
+        }
+        (Some(Compiled::Wheel(system)), SwitchSpec::Smoothed { eps, transition }) => {
+            observe(spec, &Smoothed { system, transition, eps }, x0, aside, watch)
+        }
+        _ => record::<3, 4>(spec, aside, watch),
+    }
+}
+
+/// `D` states, by the recorded equations; `M` is `D + 1`.
+fn record<const D: usize, const M: usize>(
+    spec: &RunSpec,
+    aside: &mut Aside<'_, D>,
+    watch: &dyn Watch,
+) -> Result<Recording<D>, JobError>
+where
+    for<'a> SlidingFlow<'a, Bound<D>, D>: VectorField<M>,
+{
+    let x0 = start::<D>(spec);
+    match spec.switch {
+        SwitchSpec::Smoothed { eps, transition } => {
+            let field = Field::smoothed(&spec.system, transition, eps).bind::<D>()?;
+            observe(spec, &field, x0, aside, watch)
+        }
+        SwitchSpec::Hysteretic { eps, eps_prime, relaxation, phi0 } => {
+            let field = Field::hysteretic(&spec.system, eps, eps_prime, relaxation).bind::<M>()?;
+            let x0 = SVector::<f64, M>::from_fn(|i, _| if i < D { x0[i] } else { phi0 });
+            observe(spec, &field, x0, aside, watch)
+        }
+        SwitchSpec::Filippov { exit, funnel } => match spec.system.faces() {
+            None => discontinuous(spec, &spec.system.bind::<D>()?, x0, exit, funnel, aside, watch),
+            Some([[a, b], [c, d]]) => {
+                let faces = [[a.bind()?, b.bind()?], [c.bind()?, d.bind()?]];
+                watched(spec, aside, &mut |settings, observer| {
+                    filippov::run_two_surfaces(&faces, x0, spec.t_end, settings, exit, observer, watch)
+                })
+            }
+        },
+    }
+}
+
+fn start<const D: usize>(spec: &RunSpec) -> SVector<f64, D> {
+    SVector::from_fn(|i, _| spec.start.get(i).copied().unwrap_or(f64::NAN))
+}
+
+/// The discontinuous system, event by event.
+fn discontinuous<P: PiecewiseSmooth<D>, const D: usize, const M: usize>(
+    spec: &RunSpec,
+    system: &P,
+    x0: SVector<f64, D>,
+    exit: ExitRule,
+    funnel: Option<FunnelSpec>,
+    aside: &mut Aside<'_, D>,
+    watch: &dyn Watch,
+) -> Result<Recording<D>, JobError>
+where
+    for<'a> SlidingFlow<'a, P, D>: VectorField<M>,
+{
+    match funnel {
+        Some(funnel) => futures(spec, system, x0, &settings(spec), &funnel),
+        None => watched(spec, aside, &mut |settings, observer| {
+            filippov::run_watched(system, x0, spec.t_end, settings, exit, observer, watch)
+        }),
+    }
+}
+
+/// How a Filippov run is made.
+fn settings(spec: &RunSpec) -> filippov::Settings {
+    filippov::Settings {
+        tolerance: spec.method.tolerance,
+        max_step: spec.method.step_cap.for_segment(spec.t_end),
+        max_steps: spec.method.max_steps,
+        ..filippov::Settings::default()
+    }
+}
+
+/// A Filippov run, given what looks on.
+type FilippovRun<'a, const D: usize> = dyn FnMut(&filippov::Settings, &mut dyn FilippovObserver<D>) -> Result<FilippovSummary<D>, filippov::FilippovError>
+    + 'a;
+
+/// A Filippov run, and what is to be recorded of it.
+fn watched<const D: usize>(
+    spec: &RunSpec,
+    aside: &mut Aside<'_, D>,
+    run: &mut FilippovRun<'_, D>,
+) -> Result<Recording<D>, JobError> {
+    let settings = settings(spec);
+    let mut run = |observer: &mut dyn FilippovObserver<D>| run(&settings, observer)?.within_budget();
+    let recording = |data, summary: FilippovSummary<D>| Recording {
+        data,
+        t: summary.t,
+        x: summary.x.into(),
+        most_steps_in_segment: summary.statistics.steps,
+        statistics: summary.statistics,
+        stop: summary.stop,
+    };
+    match spec.observe {
+        Observation::Path { chord } => {
+            let mut draining = Draining { recorder: MotionRecorder::new(chord), aside };
+            let end = run(&mut draining)?;
+            Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
+        }
+        Observation::Times { every } => {
+            let mut draining = Draining { recorder: TimedMotion::new(&start(spec), every), aside };
+            let end = run(&mut draining)?;
+            Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
+        }
+        Observation::Section { coordinate, value } => {
+            let mut draining = Draining { recorder: SectionRecorder::new(coordinate, value), aside };
+            let end = run(&mut AllModes(&mut draining))?;
+            Ok(recording(Data::Section(draining.recorder.into_crossings()), end))
+        }
+    }
+}
+
+/// Any observer, so that methods are compiled once for all of them.
+struct AnyObserver<'a, O: ?Sized>(&'a mut O);
+
+impl<const N: usize> Observer<N> for AnyObserver<'_, dyn Observer<N> + '_> {
+    fn step(&mut self, step: &Step<'_, N>) -> Flow {
+        self.0.step(step)
+    }
+    fn kick(&mut self, t: f64, before: &SVector<f64, N>, after: &SVector<f64, N>) {
+        self.0.kick(t, before, after);
+    }
+}
+
+/// The funnel: the approach to the set-valued point, and its futures.
+fn futures<P: PiecewiseSmooth<D>, const D: usize, const M: usize>(
+    spec: &RunSpec,
+    system: &P,
+    x0: SVector<f64, D>,
+    settings: &filippov::Settings,
+    funnel: &FunnelSpec,
+) -> Result<Recording<D>, JobError>
+where
+    for<'a> SlidingFlow<'a, P, D>: VectorField<M>,
+{
+    let grid = FunnelGrid {
+        shortest: funnel.shortest,
+        longest: funnel.longest,
+        times: funnel.times,
+        horizon: funnel.horizon,
+        until_two_fold: funnel.until_two_fold,
+        per_step: POINTS_PER_STEP,
+    };
+    let found = filippov::funnel(system, x0, spec.t_end, settings, &grid)?;
+    let mut statistics = found.statistics.clone();
+    let mut most_steps_in_segment = statistics.steps;
+    for member in &found.members {
+        statistics += &member.summary.statistics;
+        most_steps_in_segment = most_steps_in_segment.max(member.summary.statistics.steps);
+    }
+    let futures = found
+        .members
+        .into_iter()
+        .map(|m| Future { exit_time: m.exit_time, side: m.side, motion: motion(m.trajectory) })
+        .collect();
+    Ok(Recording {
+        data: Data::Funnel { approach: motion(found.approach), futures },
+        t: found.t,
+        x: found.point.into(),
+        most_steps_in_segment,
+        statistics,
+        stop: StopReason::SetValued,
+    })
+}
+
+/// Recorded points in each step of a funnel's orbits.
+const POINTS_PER_STEP: usize = 6;
+
+fn motion<const D: usize>(trajectory: filippov::Trajectory<D>) -> Motion<D> {
+    let samples =
+        |points: Vec<(f64, SVector<f64, D>)>| points.into_iter().map(|(t, x)| Sample { t, x: x.into() }).collect();
+    let pieces = trajectory.pieces.into_iter().map(|p| (p.mode, samples(p.points))).collect();
+    Motion { pieces, events: trajectory.events }
+}
+
+fn observe<F: VectorField<N>, const D: usize, const N: usize>(
+    spec: &RunSpec,
+    field: &F,
+    x0: SVector<f64, N>,
+    aside: &mut Aside<'_, D>,
+    watch: &dyn Watch,
+) -> Result<Recording<D>, JobError> {
+    let part = aside.part;
+    let (summary, data) = match spec.observe {
+        Observation::Path { chord } => {
+            let mut draining = Draining { recorder: PathRecorder::<D>::new(&x0, chord), aside: &mut *aside };
+            (integrate(spec, field, x0, D, part, &mut draining, watch)?, Data::Path(draining.recorder.into_samples()))
+        }
+        Observation::Times { every } => {
+            let mut draining = Draining { recorder: TimesRecorder::<D>::new(&x0, every), aside: &mut *aside };
+            (integrate(spec, field, x0, D, part, &mut draining, watch)?, Data::Path(draining.recorder.into_samples()))
+        }
+        Observation::Section { coordinate, value } => {
+            let mut draining = Draining { recorder: SectionRecorder::<D>::new(coordinate, value), aside: &mut *aside };
+            (
+                integrate(spec, field, x0, D, part, &mut draining, watch)?,
+                Data::Section(draining.recorder.into_crossings()),
+            )
+        }
+    };
+    aside.end = summary.x.as_slice().to_vec();
+    Ok(Recording {
+        data,
+        t: summary.t,
+        x: std::array::from_fn(|i| summary.x[i]),
+        statistics: summary.statistics,
+        most_steps_in_segment: summary.most_steps_in_segment,
+        stop: summary.stop,
+    })
+}
+
+/// The run itself; `states` of the equation's components are the system's.
+fn integrate<'a, F: VectorField<N>, const N: usize>(
+    spec: &RunSpec,
+    field: &'a F,
+    x0: SVector<f64, N>,
+    states: usize,
+    part: Part,
+    observer: &'a mut (dyn Observer<N> + 'a),
+    watch: &'a dyn Watch,
+) -> Result<Summary<N>, JobError> {
+    let MethodSpec { name, tolerance, step_cap, max_steps, precision, order } = spec.method;
+    let course = Course { t_end: spec.t_end, schedule: spec.schedule, step_cap, max_steps, kicked_states: states };
+    let orbit = Drive { field, x0, course, part, observer: AnyObserver(observer), watch };
+    match (precision, order) {
+        (None, None) => name.with_stepper(tolerance, orbit),
+        _ => with_extended(precision.unwrap_or(PRECISIONS[0]), order, tolerance, orbit),
+    }
+}
+
+/// A run that waits for its method.
+struct Drive<'a, F, const N: usize> {
+    field: &'a F,
+    x0: SVector<f64, N>,
+    course: Course,
+    part: Part,
+    observer: AnyObserver<'a, dyn Observer<N> + 'a>,
+    watch: &'a dyn Watch,
+}
+
+impl<F: VectorField<N>, const N: usize> WithStepper<N> for Drive<'_, F, N> {
+    type Answer = Result<Summary<N>, JobError>;
+    fn with<M: Stepper<N>>(self, mut stepper: M) -> Self::Answer {
+        let Self { field, x0, course, part, mut observer, watch } = self;
+        Ok(drive_part(field, x0, &course, part, &mut stepper, &mut observer, watch)?.within_budget()?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cases;
+    use twofold_integrate::filippov::Side;
+    use twofold_integrate::{Kick, KickLaw, Schedule, StepCap, Tolerance};
+    use twofold_system::Relaxation;
+
+    const EVERY: Observation = Observation::Times { every: 0.25 };
+
+    fn switches() -> [SwitchSpec; 3] {
+        let exit = ExitRule::AtOnce { side: Side::Plus };
+        let hysteretic = SwitchSpec::hysteretic(1e-2, Relaxation::Single);
+        [SwitchSpec::tanh(1e-2), hysteretic, SwitchSpec::Filippov { exit, funnel: None }]
+    }
+
+    /// What is given away in parts: all rows, and how many each part had.
+    fn in_parts(run: &RunSpec) -> (Streamed, Vec<Vec<crate::Entry>>, Vec<usize>) {
+        let (mut rows, mut parts) = (Vec::new(), Vec::new());
+        let mut take = |table: &Table| {
+            parts.push(table.len());
+            rows.extend(table.rows());
+            true
+        };
+        (stream(run, &mut take, &()).unwrap(), rows, parts)
+    }
+
+    /// Decays at the rates 1, 2, 3 ...: as a whole, given away in parts, and computed in parts.
+    #[test]
+    fn runs_have_one_to_eight_states() {
+        for n in 1..=8 {
+            for switch in switches() {
+                let run = cases::run(cases::decays(n), switch, 1.0, EVERY);
+                let whole = answer(&run, &()).unwrap();
+                let points = &whole.tables[0];
+                assert_eq!(points.numbers("t"), [0.0, 0.25, 0.5, 0.75, 1.0]);
+                for k in 1..=n {
+                    let state = points.numbers(&format!("a{k}"));
+                    let right = |(t, x): (&f64, &f64)| (x - (-(k as f64) * t).exp()).abs() < 1e-10;
+                    assert!(points.numbers("t").iter().zip(state).all(right), "{n} {switch:?}: {state:?}");
+                }
+                let state: Vec<f64> = whole.fact("state").unwrap();
+                assert_eq!((state.len(), state[n - 1]), (n, points.numbers(&format!("a{n}"))[4]));
+                let (end, rows, parts) = in_parts(&run);
+                // Blanks are not equal to each other, but look alike.
+                assert_eq!((format!("{rows:?}"), parts), (format!("{:?}", points.rows()), vec![5]));
+                assert_eq!((end.t, end.rows, end.stop), (1.0, 5, Stop::Finished));
+                assert_eq!(Some(&end.statistics), whole.statistics.as_ref());
+                if let SwitchSpec::Filippov { .. } = switch {
+                    continue;
+                }
+                // a1 is 1/2 at ln 2, between the first restart and the second.
+                let schedule = Schedule { restart_every: Some(0.4), kick: None };
+                let observe = Observation::Section { coordinate: 0, value: 0.5 };
+                let run = RunSpec { schedule, observe, ..run };
+                let (rows, t, state) = part(&run, Part { from: 0, to: 2 }, &()).unwrap();
+                assert!((rows.numbers("t")[0] - 2.0_f64.ln()).abs() < 1e-8 && rows.len() == 1 && t == 0.8, "{rows:?}");
+                assert_eq!(state.len(), n + usize::from(matches!(switch, SwitchSpec::Hysteretic { .. })));
+                assert!((state[n - 1] - (-0.8 * n as f64).exp()).abs() < 1e-10);
+            }
+        }
+        for switch in switches() {
+            let many = cases::run(cases::decays(9), switch, 1.0, Observation::Section { coordinate: 0, value: 0.5 });
+            let said = [
+                answer(&many, &()).unwrap_err(),
+                part(&many, Part::WHOLE, &()).unwrap_err(),
+                stream(&many, &mut |_| true, &()).unwrap_err(),
+            ];
+            assert!(said.iter().all(|e| e.to_string().contains("up to eight states")), "{said:?}");
+        }
+    }
+
+    /// Every state begins at its own value, not at phi's.
+    #[test]
+    fn a_hysteretic_run_begins_where_it_is_asked_to() {
+        let mut run = cases::run(cases::decays(2), switches()[1], 1.0, EVERY);
+        run.start = vec![0.3, -0.7];
+        let points = &answer(&run, &()).unwrap().tables[0];
+        for (name, from, rate) in [("a1", 0.3, 1.0), ("a2", -0.7, 2.0)] {
+            let state = points.numbers(name);
+            let right = |(t, x): (&f64, &f64)| (x - from * (-rate * t).exp()).abs() < 1e-10;
+            assert!(state[0] == from && points.numbers("t").iter().zip(state).all(right), "{state:?}");
+        }
+    }
+
+    /// Looked at each 4096 steps: it is not that there was no more room.
+    #[test]
+    fn an_interrupted_part_says_so() {
+        struct Never;
+        impl Watch for Never {
+            fn reached(&self, _: f64) -> bool {
+                false
+            }
+        }
+        let section = Observation::Section { coordinate: 0, value: 0.5 };
+        let mut run = cases::run(cases::decays(1), SwitchSpec::tanh(1e-2), 1.0, section);
+        run.method.step_cap = StepCap::Absolute(1e-4);
+        assert_eq!(part(&run, Part::WHOLE, &Never), Err(JobError::Interrupted));
+    }
+
+    #[test]
+    fn recordings_are_of_three_states() {
+        let section = Observation::Section { coordinate: 0, value: 0.5 };
+        let run = |n: usize| cases::run(cases::decays(n), SwitchSpec::tanh(1e-2), 10.0, section);
+        for n in [2, 4] {
+            for found in [simulate(&run(n), &()), simulate_until(&run(n), &|_| true, &())] {
+                assert!(found.unwrap_err().to_string().contains("three states are looked at"));
+            }
+        }
+        let (whole, all) = (simulate(&run(3), &()).unwrap(), simulate_until(&run(3), &|_| false, &()).unwrap());
+        assert_eq!(whole, all);
+        // a2 = 1/16 at 2 ln 2: the first step's end after that.
+        let until = simulate_until(&run(3), &|x| x[1] < 0.0625, &()).unwrap();
+        assert_eq!((until.stop, until.data.len()), (StopReason::Observer, 1));
+        assert!(until.x[1] < 0.0625 && until.t < 2.0 && whole.t == 10.0);
+    }
+
+    /// A ball that falls to x = 0 from either side, passing once in two units of time: parts are cut inside pieces of its motion.
+    #[test]
+    fn parts_are_the_whole() {
+        let ball = cases::of("states = ['x', 'v']\nh = 'x'\nplus = ['v', '-1']\nminus = ['v', '1']");
+        let turning = cases::smooth(&["x", "v"], "x + 9", &["v", "-x"]);
+        let [tanh, _, filippov] = switches();
+        let times = Observation::Times { every: 1e-3 };
+        let chord = |chord| Observation::Path { chord };
+        for (system, switch, observe, pieces) in [
+            (turning.clone(), tanh, times, 0),
+            (turning, tanh, chord(3e-8), 0),
+            (ball.clone(), filippov, times, 10),
+            (ball, filippov, chord(1e-7), 10),
+        ] {
+            let start = vec![0.5, 0.0];
+            let run = RunSpec { start, ..cases::run(system, switch, 20.0, observe) };
+            let whole = answer(&run, &()).unwrap();
+            let (end, rows, parts) = in_parts(&run);
+            let (last, full) = parts.split_last().unwrap();
+            assert!(full.len() >= 2 && full.iter().all(|n| (PART..3 * PART).contains(n)) && *last < PART, "{parts:?}");
+            assert!(whole.tables[0].integers("piece").last().is_none_or(|last| *last == pieces));
+            // Blanks are not equal to each other, but look alike.
+            assert!(format!("{rows:?}") == format!("{:?}", whole.tables[0].rows()), "{observe:?}");
+            assert_eq!((end.rows as usize, end.stop), (rows.len(), Stop::Finished));
+            // Enough is enough.
+            let mut parts = 0;
+            let mut take = |_: &Table| {
+                parts += 1;
+                parts < 2
+            };
+            let cut = stream(&run, &mut take, &()).unwrap();
+            assert_eq!(cut.stop, Stop::Found);
+            assert!(cut.t < end.t && cut.rows < end.rows);
+        }
+    }
+
+    /// Passages of a circle at unit speed through y = 0: one each pi.
+    #[test]
+    fn sections_are_given_away_in_parts() {
+        let circle = cases::smooth(&["x", "y"], "x + 9", &["x*(1 - x*x - y*y) - y", "y*(1 - x*x - y*y) + x"]);
+        let section = Observation::Section { coordinate: 1, value: 0.0 };
+        let mut run = cases::run(circle, SwitchSpec::tanh(1e-2), 30_000.0, section);
+        run.method.tolerance = Tolerance { rtol: 1e-3, atol: 1e-3 };
+        let (end, rows, parts) = in_parts(&run);
+        assert!(parts.len() == 2 && parts[0] == PART && end.rows as usize == rows.len(), "{parts:?}");
+        assert!(rows == answer(&run, &()).unwrap().tables[0].rows());
+    }
+
+    /// A kick is two points of a path at one time, as far from each other as it is large.
+    #[test]
+    fn kicks_are_seen_in_a_path() {
+        let kick = Some(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 1, stream: 2 });
+        let mut run = cases::run(cases::decays(3), SwitchSpec::tanh(1e-2), 1.0, Observation::Path { chord: 1.0 });
+        run.schedule = Schedule { restart_every: None, kick };
+        let path = &answer(&run, &()).unwrap().tables[0];
+        let t = path.numbers("t");
+        let kicked: Vec<usize> = (1..t.len()).filter(|k| t[*k] == t[k - 1]).collect();
+        assert_eq!(kicked.len(), 3, "{t:?}");
+        for (k, time) in kicked.into_iter().zip([0.3, 0.6, 0.9]) {
+            let apart = ["a1", "a2", "a3"].map(|name| path.numbers(name)[k] - path.numbers(name)[k - 1]);
+            let size = apart.iter().map(|d| d * d).sum::<f64>().sqrt();
+            assert!((t[k] - time).abs() < 1e-12 && (size - 1e-3).abs() < 1e-12, "{size} at {}", t[k]);
+        }
+    }
+
+    #[test]
+    fn a_filippov_run_has_the_tolerance_the_longest_step_and_the_budget_asked_for() {
+        let [_, _, filippov] = switches();
+        let steps = |change: &dyn Fn(&mut MethodSpec)| {
+            let mut run = cases::run(cases::decays(2), filippov, 1.0, EVERY);
+            change(&mut run.method);
+            answer(&run, &()).map(|answer| answer.statistics.unwrap().steps)
+        };
+        let fine = steps(&|_| {}).unwrap();
+        assert!(steps(&|m| m.tolerance = Tolerance { rtol: 1e-3, atol: 1e-3 }).unwrap() < fine / 2);
+        let capped = steps(&|m| m.step_cap = StepCap::Absolute(1e-3)).unwrap();
+        assert!((1000..1010).contains(&capped), "{capped}");
+        // The step that exceeds the budget has been made.
+        let said = steps(&|m| m.max_steps = 50).unwrap_err().to_string();
+        assert!(fine > 51 && said.starts_with("51 steps were not enough"), "{said}");
+    }
+
+    #[test]
+    fn a_funnel_has_no_parts() {
+        let funnel = FunnelSpec { shortest: 0.1, longest: 1.0, times: 3, horizon: 5.0, until_two_fold: true };
+        let switch = SwitchSpec::Filippov { exit: ExitRule::All, funnel: Some(funnel) };
+        let run = cases::run(cases::decays(3), switch, 1.0, Observation::Path { chord: 1e-2 });
+        let said = stream(&run, &mut |_| true, &()).unwrap_err().to_string();
+        assert!(said.contains("not given away in parts"), "{said}");
+    }
+}

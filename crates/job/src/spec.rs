@@ -1,0 +1,680 @@
+//! Runs as plain data: everything a computation depends on, and nothing else.
+//!
+//! A [`RunSpec`] can be written as JSON, hashed, and given back to `twofold run --spec`. Two equal specs give the same
+//! bytes on any machine.
+
+use serde::{Deserialize, Serialize};
+
+pub use twofold_integrate::Method;
+use twofold_integrate::filippov::ExitRule;
+use twofold_integrate::{PRECISIONS, Schedule, StepCap, Tolerance, layered};
+use twofold_num::elementary::exp10;
+use twofold_system::{Field, Relaxation, System, Transition};
+
+/// One run: system, switch, start, method, schedule, and what is recorded.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunSpec {
+    /// The piecewise-smooth system.
+    pub system: System,
+    /// How the switch at h = 0 is modelled.
+    pub switch: SwitchSpec,
+    /// Initial state, one number for each of the system's.
+    pub start: Vec<f64>,
+    /// Final time; the run starts at 0.
+    pub t_end: f64,
+    /// Integration method and its settings.
+    pub method: MethodSpec,
+    /// Restarts and kicks.
+    pub schedule: Schedule,
+    /// What is recorded.
+    pub observe: Observation,
+}
+
+/// What stands in for the discontinuity.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum SwitchSpec {
+    /// Eq. (8): phi is a function of h/eps.
+    Smoothed {
+        /// Stiffness parameter.
+        eps: f64,
+        /// Transition function.
+        transition: Transition,
+    },
+    /// Eq. (10): phi is a state.
+    Hysteretic {
+        /// Half-width of the loop.
+        eps: f64,
+        /// Relaxation time.
+        eps_prime: f64,
+        /// Reading of eq. (10).
+        relaxation: Relaxation,
+        /// phi at the start.
+        phi0: f64,
+    },
+    /// The discontinuous system itself, in Filippov's sense (sec. 3).
+    Filippov {
+        /// How repelling sliding ends: the choice that the equations do not make.
+        exit: ExitRule,
+        /// Which futures are followed if `exit` is [`ExitRule::All`]; required there, absent elsewhere.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        funnel: Option<FunnelSpec>,
+    },
+}
+
+/// Which members of a funnel are computed: exit times, geometrically spaced, and both sides of each.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FunnelSpec {
+    /// Shortest time of repelling sliding.
+    pub shortest: f64,
+    /// Longest time of repelling sliding.
+    pub longest: f64,
+    /// Number of times.
+    pub times: usize,
+    /// Follow each future so long at most.
+    pub horizon: f64,
+    /// Stop a future when it next comes to a two-fold.
+    pub until_two_fold: bool,
+}
+
+impl SwitchSpec {
+    /// tanh smoothing, sec. 4.1.
+    pub fn tanh(eps: f64) -> Self {
+        SwitchSpec::Smoothed { eps, transition: Transition::Tanh }
+    }
+
+    /// The hysteretic system of sec. 4.3 with eps' = 10 eps and phi(0) = 1.
+    pub fn hysteretic(eps: f64, relaxation: Relaxation) -> Self {
+        SwitchSpec::Hysteretic { eps, eps_prime: 10.0 * eps, relaxation, phi0: 1.0 }
+    }
+}
+
+/// A method with its settings.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MethodSpec {
+    /// The method.
+    pub name: Method,
+    /// Local error control.
+    pub tolerance: Tolerance,
+    /// Longest step.
+    pub step_cap: StepCap,
+    /// Most steps of the whole run before it is given up as a failure.
+    pub max_steps: u64,
+    /// Bits of the numbers of [`Method::TaylorExtended`], one of [`PRECISIONS`]; 106 if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub precision: Option<u16>,
+    /// Degree of its series; what the tolerance asks for (Jorba & Zou 2005) if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub order: Option<u16>,
+}
+
+/// A budget far above what any run of the paper needs; a run on the stiff far attractor reaches it within minutes.
+pub const DEFAULT_MAX_STEPS: u64 = 400_000_000;
+
+impl MethodSpec {
+    /// NDSolve's defaults: AccuracyGoal = PrecisionGoal = MachinePrecision/2, so rtol = atol = 10^-7.97727; MaxStepFraction
+    /// = 1/10 of the interval.
+    pub fn ndsolve_defaults(name: Method) -> Self {
+        let tolerance = exp10(-7.97727);
+        Self {
+            name,
+            tolerance: Tolerance { rtol: tolerance, atol: tolerance },
+            step_cap: StepCap::FractionOfSegment(0.1),
+            max_steps: DEFAULT_MAX_STEPS,
+            precision: None,
+            order: None,
+        }
+    }
+
+    /// What a method does if nothing else is asked for: as NDSolve, but extended precision is used to its end, 1e-32.
+    pub fn defaults(name: Method) -> Self {
+        let mut defaults = Self::ndsolve_defaults(name);
+        if name == Method::TaylorExtended {
+            defaults.tolerance = Tolerance { rtol: FINEST_EXTENDED, atol: FINEST_EXTENDED };
+        }
+        defaults
+    }
+}
+
+/// The finest tolerance that double-double arithmetic can hold.
+const FINEST_EXTENDED: f64 = 1e-32;
+
+/// Longest series that can be asked for: their cost grows with the square.
+const MOST_DEGREES: u16 = 1000;
+
+/// The finest tolerance that numbers of so many bits can hold: 1e-32 for 106, 2^(1 - bits) for more.
+pub fn finest_extended(bits: u16) -> f64 {
+    let most = PRECISIONS[PRECISIONS.len() - 1];
+    if bits <= PRECISIONS[0] { FINEST_EXTENDED } else { f64::from_bits((1024 - u64::from(bits.min(most))) << 52) }
+}
+
+/// What is recorded of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Observation {
+    /// The path, as a polyline that stays within `chord` of the dense output.
+    Path {
+        /// Largest distance, in the state's units.
+        chord: f64,
+    },
+    /// The path at the multiples of an interval.
+    Times {
+        /// The interval.
+        every: f64,
+    },
+    /// Passages through the plane `coordinate = value`.
+    Section {
+        /// Index of the coordinate.
+        coordinate: usize,
+        /// Its value.
+        value: f64,
+    },
+}
+
+/// The latest end time: its neighbours in f64 are 1e-4 apart.
+const LATEST: f64 = 1e12;
+/// The smallest absolute tolerance: methods square the quotient of an error and its tolerance.
+const FINEST_ATOL: f64 = 1e-140;
+
+/// Columns of recorded data beside the states'.
+const COLUMNS: [&str; 16] = [
+    "t",
+    "signs",
+    "direction",
+    "mode",
+    "piece",
+    "future",
+    "exit_time",
+    "exit_side",
+    "event",
+    "from",
+    "to",
+    "side",
+    "leg",
+    "error",
+    "time",
+    "arc",
+];
+
+/// A wrong number in a spec: which, and what is allowed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{field} is {value}: {rule}")]
+pub struct SpecError {
+    /// The field, as it is called on the command line.
+    pub field: &'static str,
+    /// Its value.
+    pub value: String,
+    /// What would be right.
+    pub rule: &'static str,
+}
+
+/// A check's outcome.
+type Checked = Result<(), SpecError>;
+
+fn wrong(field: &'static str, value: f64, rule: &'static str) -> Checked {
+    Err(SpecError { field, value: format!("{value:?}"), rule })
+}
+
+fn wrong_choice(field: &'static str, value: u16, rule: &'static str) -> Checked {
+    Err(SpecError { field, value: value.to_string(), rule })
+}
+
+fn positive(field: &'static str, value: f64) -> Checked {
+    if value.is_finite() && value > 0.0 { Ok(()) } else { wrong(field, value, "give a finite number above zero") }
+}
+
+fn finite(field: &'static str, value: f64) -> Checked {
+    if value.is_finite() { Ok(()) } else { wrong(field, value, "give a finite number") }
+}
+
+impl RunSpec {
+    /// Checks every number; a spec that passes can be run.
+    ///
+    /// # Errors
+    ///
+    /// The first field that is wrong, its value, and the rule that it breaks.
+    pub fn validate(&self) -> Result<(), SpecError> {
+        positive("t-end", self.t_end)?;
+        if self.t_end > LATEST {
+            return wrong("t-end", self.t_end, "beyond 1e12 a time in f64 has no digits left for a step");
+        }
+        self.validate_system()?;
+        match self.switch {
+            SwitchSpec::Smoothed { eps, transition } => {
+                positive("eps", eps)?;
+                if let Transition::PerturbedTanh { sigma } = transition {
+                    finite("sigma", sigma)?;
+                }
+            }
+            SwitchSpec::Hysteretic { .. } if self.system.definition().second().is_some() => {
+                return Err(SpecError {
+                    field: "switch",
+                    value: "hysteretic".into(),
+                    rule: "hysteresis is for systems with one switching surface; this one has two, so smooth them or take filippov",
+                });
+            }
+            SwitchSpec::Hysteretic { eps, eps_prime, phi0, .. } => {
+                positive("eps", eps)?;
+                positive("eps-prime", eps_prime)?;
+                finite("phi0", phi0)?;
+            }
+            SwitchSpec::Filippov { exit, funnel } => self.validate_filippov(exit, funnel)?,
+        }
+        self.method.validate()?;
+        if self.method.name == Method::Layered {
+            self.validate_layered()?;
+        }
+        self.validate_schedule()?;
+        self.validate_observation()
+    }
+
+    fn validate_system(&self) -> Checked {
+        let states = self.system.coordinates();
+        if self.start.len() != states.len() {
+            return Err(SpecError {
+                field: "start",
+                value: format!("{:?}", self.start),
+                rule: "give one number for each of the system's states",
+            });
+        }
+        for value in &self.start {
+            finite("start", *value)?;
+        }
+        if let Err(wrong) = self.system.check() {
+            let value = format!("one in which {wrong}");
+            return Err(SpecError { field: "system", value, rule: "the equations make no sense with it" });
+        }
+        match states.iter().find(|s| COLUMNS.contains(s)) {
+            Some(name) => Err(SpecError {
+                field: "system",
+                value: format!("one with a state called {name}"),
+                rule: "recorded data have a column of this name; rename the state",
+            }),
+            None => Ok(()),
+        }
+    }
+
+    fn validate_filippov(&self, exit: ExitRule, funnel: Option<FunnelSpec>) -> Checked {
+        let wrong_exit = |rule| Err(SpecError { field: "exit", value: exit.to_string(), rule });
+        if exit.validate().is_err() {
+            return wrong_exit("times and lengths are finite and not below 0, probabilities between 0 and 1");
+        }
+        if (exit == ExitRule::All) != funnel.is_some() {
+            return wrong_exit("\"all\" and a description of the funnel go together");
+        }
+        if funnel.is_some() && self.system.definition().second().is_some() {
+            return wrong_exit(
+                "all futures are followed at one switching surface; this system has two, so give another rule",
+            );
+        }
+        if let Some(funnel) = funnel {
+            positive("funnel-shortest", funnel.shortest)?;
+            positive("funnel-longest", funnel.longest)?;
+            positive("funnel-horizon", funnel.horizon)?;
+            if funnel.times == 0 || funnel.times > 100_000 {
+                return wrong("funnel-times", funnel.times as f64, "give a number from 1 to 100000");
+            }
+            match self.observe {
+                Observation::Path { .. } => {}
+                Observation::Section { .. } => {
+                    return wrong_exit("a funnel is recorded as paths; leave out --section");
+                }
+                Observation::Times { .. } => {
+                    return wrong_exit("a funnel is recorded at fixed points of each step; leave out --every");
+                }
+            }
+        }
+        if self.method.name != Method::Dopri5 {
+            return Err(SpecError {
+                field: "method",
+                value: self.method.name.name().into(),
+                rule: "Filippov motion is integrated by dopri5 between events",
+            });
+        }
+        if self.schedule != Schedule::default() {
+            return Err(SpecError {
+                field: "switch",
+                value: "filippov".into(),
+                rule: "restarts and kicks apply to smoothed and hysteretic runs; leave them out",
+            });
+        }
+        Ok(())
+    }
+
+    fn validate_layered(&self) -> Checked {
+        let refused = |rule| Err(SpecError { field: "method", value: Method::Layered.name().into(), rule });
+        let SwitchSpec::Smoothed { eps, transition } = self.switch else {
+            return refused("it is for smoothed systems, whose layer it crosses; take lsoda or radau5");
+        };
+        match layered::applicable(Field::smoothed(&self.system, transition, eps).tape()) {
+            Ok(()) => Ok(()),
+            Err(_) => refused(
+                "it needs fields f+ and f- that are polynomials, and the transition tanh between them: this system has others; take taylor, lsoda or dopri5",
+            ),
+        }
+    }
+
+    fn validate_schedule(&self) -> Checked {
+        if let Some(every) = self.schedule.restart_every {
+            positive("restart", every)?;
+            if self.t_end / every > 1e9 {
+                return wrong("restart", every, "that is more than 10^9 restarts; give a longer interval");
+            }
+        }
+        let Some(kick) = self.schedule.kick else { return Ok(()) };
+        positive("kick-every", kick.every)?;
+        if self.t_end / kick.every > 1e9 {
+            return wrong("kick-every", kick.every, "that is more than 10^9 kicks; give a longer interval");
+        }
+        if !(kick.size.is_finite() && kick.size >= 0.0) {
+            return wrong("kick-size", kick.size, "give a finite number, zero or above");
+        }
+        Ok(())
+    }
+
+    fn validate_observation(&self) -> Checked {
+        match self.observe {
+            Observation::Path { chord } => positive("chord", chord),
+            Observation::Times { every } => {
+                positive("every", every)?;
+                if self.t_end / every > 1e15 {
+                    return wrong("every", every, "f64 cannot count so many moments; give a longer interval");
+                }
+                Ok(())
+            }
+            Observation::Section { coordinate, value } => {
+                if coordinate >= self.system.dimension() {
+                    return wrong("section", coordinate as f64, "that is not the number of a state; they count from 0");
+                }
+                finite("section", value)
+            }
+        }
+    }
+}
+
+impl MethodSpec {
+    fn validate(&self) -> Checked {
+        positive("rtol", self.tolerance.rtol)?;
+        positive("atol", self.tolerance.atol)?;
+        if let Some(bits) = self.precision {
+            if self.name != Method::TaylorExtended {
+                return wrong(
+                    "precision",
+                    f64::from(bits),
+                    "only taylor-extended has a choice of precision; leave it out",
+                );
+            }
+            if !PRECISIONS.contains(&bits) {
+                return wrong(
+                    "precision",
+                    f64::from(bits),
+                    "numbers have 106, 192, 256, 384 or 512 bits; give one of these",
+                );
+            }
+        }
+        if let Some(order) = self.order {
+            if self.name != Method::TaylorExtended {
+                return wrong_choice("order", order, "only taylor-extended has a choice of order; leave it out");
+            }
+            if !(4..=MOST_DEGREES).contains(&order) {
+                return wrong_choice("order", order, "series have 4 to 1000 degrees");
+            }
+        }
+        let (finest, rule) = match self.name {
+            Method::TaylorExtended => match self.precision {
+                None | Some(106) => (FINEST_EXTENDED, "double-double arithmetic carries 32 digits; give 1e-32 or more"),
+                Some(bits) => (
+                    finest_extended(bits),
+                    "numbers of that precision do not carry so many digits; give more, or raise the precision",
+                ),
+            },
+            Method::Taylor => (1e-17, "f64 carries 16 digits; give 1e-17 or more"),
+            _ => (1e-15, "f64 carries 16 digits; give 1e-15 or more"),
+        };
+        if self.tolerance.rtol < finest {
+            return wrong("rtol", self.tolerance.rtol, rule);
+        }
+        if self.tolerance.atol < FINEST_ATOL && self.precision.is_none() {
+            let rule = "errors are divided by it and squared, which f64 cannot hold below 1e-140; give that or more";
+            return wrong("atol", self.tolerance.atol, rule);
+        }
+        match self.step_cap {
+            StepCap::None => {}
+            StepCap::Absolute(h) => positive("max-step", h)?,
+            StepCap::FractionOfSegment(f) => positive("max-step fraction", f)?,
+        }
+        if self.max_steps == 0 { wrong("max-steps", 0.0, "give at least one step") } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cases;
+    use twofold_integrate::filippov::{Side, SlidingLaw};
+    use twofold_integrate::{Kick, KickLaw};
+    use twofold_system::Caricature;
+
+    type Change = fn(&mut RunSpec);
+
+    const SECTION: Observation = Observation::Section { coordinate: 1, value: 0.0 };
+
+    fn smoothed() -> RunSpec {
+        let run = cases::run(Caricature::with_reinjection(1e-1, 1e-5).into(), SwitchSpec::tanh(1e-3), 20.0, SECTION);
+        assert_eq!(run.validate(), Ok(()));
+        run
+    }
+
+    fn filippov() -> RunSpec {
+        let exit = ExitRule::AtOnce { side: Side::Plus };
+        let run = RunSpec { switch: SwitchSpec::Filippov { exit, funnel: None }, ..smoothed() };
+        assert_eq!(run.validate(), Ok(()));
+        run
+    }
+
+    const FUNNEL: FunnelSpec =
+        FunnelSpec { shortest: 0.1, longest: 1.0, times: 100_000, horizon: 5.0, until_two_fold: true };
+
+    fn funnel() -> RunSpec {
+        let switch = SwitchSpec::Filippov { exit: ExitRule::All, funnel: Some(FUNNEL) };
+        let run = RunSpec { switch, observe: Observation::Path { chord: 1e-2 }, ..smoothed() };
+        assert_eq!(run.validate(), Ok(()));
+        run
+    }
+
+    fn refused(good: fn() -> RunSpec, cases: &[(Change, &str, &str)]) {
+        for (i, (change, field, word)) in cases.iter().enumerate() {
+            let mut run = good();
+            change(&mut run);
+            let error = run.validate().expect_err(&format!("case {i}, {field}: {word}"));
+            assert!(error.field == *field && error.rule.contains(word), "case {i}, {field}, {word}: {error}");
+        }
+    }
+
+    const KICK: Kick = Kick { every: 0.3, size: 0.0, law: KickLaw::Sphere, seed: 1, stream: 0 };
+
+    fn extended(run: &mut RunSpec, precision: Option<u16>, order: Option<u16>, tolerance: f64) {
+        let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
+        run.method = MethodSpec { name: Method::TaylorExtended, tolerance, precision, order, ..run.method };
+    }
+
+    #[test]
+    fn every_rule_of_a_smoothed_run_is_kept() {
+        let cases: &[(Change, &str, &str)] = &[
+            (|r| r.t_end = 0.0, "t-end", "above zero"),
+            (|r| r.t_end = f64::INFINITY, "t-end", "finite"),
+            (|r| r.t_end = f64::NAN, "t-end", "finite"),
+            (|r| r.t_end = 1.1e12, "t-end", "no digits left"),
+            (|r| r.start.truncate(2), "start", "one number for each"),
+            (|r| r.start[2] = f64::NAN, "start", "finite"),
+            (|r| r.system = cases::smooth(&["x", "mode", "z"], "x", &["1", "1", "1"]), "system", "rename the state"),
+            (|r| r.system = cases::smooth(&["x", "y", "arc"], "x", &["1", "1", "1"]), "system", "rename the state"),
+            (|r| r.switch = SwitchSpec::tanh(0.0), "eps", "above zero"),
+            (|r| r.switch = SwitchSpec::tanh(f64::NAN), "eps", "finite"),
+            (
+                |r| {
+                    let transition = Transition::PerturbedTanh { sigma: f64::INFINITY };
+                    r.switch = SwitchSpec::Smoothed { eps: 1e-3, transition };
+                },
+                "sigma",
+                "finite",
+            ),
+            (|r| r.switch = SwitchSpec::hysteretic(-1.0, Relaxation::Single), "eps", "above zero"),
+            (|r| r.switch = hysteretic(0.0, 0.0), "eps-prime", "above zero"),
+            (|r| r.switch = hysteretic(1e-2, f64::NAN), "phi0", "finite"),
+            (|r| r.method.tolerance.rtol = 0.0, "rtol", "above zero"),
+            (|r| r.method.tolerance.rtol = 9e-16, "rtol", "1e-15"),
+            (|r| r.method.tolerance.atol = 0.0, "atol", "above zero"),
+            (|r| r.method.tolerance.atol = 9e-141, "atol", "1e-140"),
+            (|r| r.method.precision = Some(106), "precision", "leave it out"),
+            (|r| r.method.order = Some(20), "order", "leave it out"),
+            (|r| r.method.step_cap = StepCap::Absolute(0.0), "max-step", "above zero"),
+            (|r| r.method.step_cap = StepCap::FractionOfSegment(f64::NAN), "max-step fraction", "finite"),
+            (|r| r.method.max_steps = 0, "max-steps", "at least one"),
+            (|r| (r.method.name, r.method.tolerance.rtol) = (Method::Taylor, 9e-18), "rtol", "1e-17"),
+            (|r| extended(r, None, None, 9e-33), "rtol", "1e-32"),
+            (|r| extended(r, Some(106), None, 9e-33), "rtol", "1e-32"),
+            (|r| extended(r, Some(192), None, 3e-58), "rtol", "raise the precision"),
+            (|r| extended(r, Some(100), None, 1e-9), "precision", "one of these"),
+            (|r| extended(r, None, Some(3), 1e-9), "order", "4 to 1000"),
+            (|r| extended(r, None, Some(1001), 1e-9), "order", "4 to 1000"),
+            (
+                |r| {
+                    r.method.name = Method::Layered;
+                    r.switch = SwitchSpec::Smoothed { eps: 1e-3, transition: Transition::Arctan };
+                },
+                "method",
+                "transition tanh",
+            ),
+            (
+                |r| {
+                    r.method.name = Method::Layered;
+                    r.switch = SwitchSpec::hysteretic(1e-3, Relaxation::Single);
+                },
+                "method",
+                "for smoothed systems",
+            ),
+            (|r| r.schedule.restart_every = Some(0.0), "restart", "above zero"),
+            (|r| r.schedule.restart_every = Some(1.9e-8), "restart", "10^9"),
+            (|r| r.schedule.kick = Some(Kick { every: -1.0, ..KICK }), "kick-every", "above zero"),
+            (|r| r.schedule.kick = Some(Kick { every: 1.9e-8, ..KICK }), "kick-every", "10^9"),
+            (|r| r.schedule.kick = Some(Kick { size: -1.0, ..KICK }), "kick-size", "zero or above"),
+            (|r| r.schedule.kick = Some(Kick { size: f64::INFINITY, ..KICK }), "kick-size", "zero or above"),
+            (|r| r.observe = Observation::Path { chord: 0.0 }, "chord", "above zero"),
+            (|r| r.observe = Observation::Times { every: 0.0 }, "every", "above zero"),
+            (|r| r.observe = Observation::Times { every: 1.9e-14 }, "every", "cannot count"),
+            (|r| r.observe = Observation::Section { coordinate: 3, value: 0.0 }, "section", "count from 0"),
+            (|r| r.observe = Observation::Section { coordinate: 2, value: f64::NAN }, "section", "finite"),
+        ];
+        refused(smoothed, cases);
+    }
+
+    fn hysteretic(eps_prime: f64, phi0: f64) -> SwitchSpec {
+        SwitchSpec::Hysteretic { eps: 1e-3, eps_prime, relaxation: Relaxation::Single, phi0 }
+    }
+
+    #[test]
+    fn what_lies_on_an_edge_is_allowed() {
+        let cases: [Change; 15] = [
+            |r| r.t_end = 1e12,
+            |r| r.switch = hysteretic(1e-2, -3.0),
+            |r| r.method.tolerance = Tolerance { rtol: 1e-15, atol: 1e-140 },
+            |r| (r.method.name, r.method.tolerance.rtol) = (Method::Taylor, 1e-17),
+            |r| extended(r, None, Some(4), 1e-32),
+            |r| extended(r, Some(106), Some(1000), 1e-32),
+            |r| extended(r, Some(192), None, finest_extended(192)),
+            // Below 1e-140, which is no rule for numbers of many bits.
+            |r| extended(r, Some(512), None, finest_extended(512)),
+            |r| r.method.name = Method::Layered,
+            |r| r.schedule.restart_every = Some(2.1e-8),
+            |r| r.schedule.kick = Some(Kick { every: 2.1e-8, ..KICK }),
+            |r| r.observe = Observation::Times { every: 2.1e-14 },
+            |r| r.observe = Observation::Section { coordinate: 2, value: -1.0 },
+            |r| r.method.max_steps = 1,
+            |r| r.switch = SwitchSpec::Smoothed { eps: 1e-3, transition: Transition::PerturbedTanh { sigma: -1.0 } },
+        ];
+        for (i, change) in cases.iter().enumerate() {
+            let mut run = smoothed();
+            change(&mut run);
+            assert_eq!(run.validate(), Ok(()), "case {i}");
+        }
+    }
+
+    fn exit(run: &mut RunSpec, exit: ExitRule) {
+        run.switch = SwitchSpec::Filippov { exit, funnel: None };
+    }
+
+    /// Moves on straight lines, switches at x = 0 and at y = 0.
+    fn two_surfaces() -> System {
+        let field = "plus = ['1', '2', '0']\nminus = ['1', '2', '0']\n";
+        cases::of(&format!("states = ['x', 'y', 'z']\nh = 'x'\n{field}[second]\nh = 'y'\n{field}"))
+    }
+
+    #[test]
+    fn every_rule_of_a_filippov_run_is_kept() {
+        let law = SlidingLaw::Exponential { mean: 0.5 };
+        assert!(ExitRule::Random { law, plus_probability: 1.0, seed: 1, stream: 0 }.validate().is_ok());
+        let cases: &[(Change, &str, &str)] = &[
+            (|r| exit(r, ExitRule::AfterTime { time: -1.0, side: Side::Plus }), "exit", "not below 0"),
+            (|r| exit(r, ExitRule::AfterArc { arc: f64::NAN, side: Side::Plus }), "exit", "not below 0"),
+            (
+                |r| {
+                    let law = SlidingLaw::Uniform { longest: 1.0 };
+                    exit(r, ExitRule::Random { law, plus_probability: 1.1, seed: 1, stream: 0 });
+                },
+                "exit",
+                "between 0 and 1",
+            ),
+            (|r| exit(r, ExitRule::All), "exit", "go together"),
+            (
+                |r| {
+                    let exit = ExitRule::AtOnce { side: Side::Plus };
+                    r.switch = SwitchSpec::Filippov { exit, funnel: Some(FUNNEL) };
+                },
+                "exit",
+                "go together",
+            ),
+            (|r| r.method.name = Method::Lsoda, "method", "by dopri5"),
+            (|r| r.schedule.restart_every = Some(1.0), "switch", "leave them out"),
+            (|r| r.schedule.kick = Some(KICK), "switch", "leave them out"),
+        ];
+        refused(filippov, cases);
+        fn with(run: &mut RunSpec, funnel: FunnelSpec) {
+            run.switch = SwitchSpec::Filippov { exit: ExitRule::All, funnel: Some(funnel) };
+        }
+        let cases: &[(Change, &str, &str)] = &[
+            (|r| with(r, FunnelSpec { shortest: 0.0, ..FUNNEL }), "funnel-shortest", "above zero"),
+            (|r| with(r, FunnelSpec { longest: f64::NAN, ..FUNNEL }), "funnel-longest", "finite"),
+            (|r| with(r, FunnelSpec { horizon: -1.0, ..FUNNEL }), "funnel-horizon", "above zero"),
+            (|r| with(r, FunnelSpec { times: 0, ..FUNNEL }), "funnel-times", "1 to 100000"),
+            (|r| with(r, FunnelSpec { times: 100_001, ..FUNNEL }), "funnel-times", "1 to 100000"),
+            (|r| r.observe = SECTION, "exit", "leave out --section"),
+            (|r| r.observe = Observation::Times { every: 1.0 }, "exit", "leave out --every"),
+            (|r| r.system = two_surfaces(), "exit", "has two"),
+        ];
+        refused(funnel, cases);
+        let two = || RunSpec { system: two_surfaces(), ..filippov() };
+        assert_eq!(two().validate(), Ok(()));
+        let hysteresis: Change = |r| r.switch = SwitchSpec::hysteretic(1e-3, Relaxation::Single);
+        refused(two, &[(hysteresis, "switch", "this one has two")]);
+    }
+
+    /// 106 bits hold 32 digits; more bits, their last one beside a leading 1.
+    #[test]
+    fn the_finest_tolerance_is_the_last_bit() {
+        let power = |k: i32| 2.0_f64.powi(k);
+        for (bits, finest) in
+            [(53, 1e-32), (106, 1e-32), (192, power(-191)), (256, power(-255)), (512, power(-511)), (999, power(-511))]
+        {
+            assert_eq!(finest_extended(bits), finest, "{bits} bits");
+        }
+        // Half of the digits of a double (53 bits are 15.95 of them).
+        let half = MethodSpec::defaults(Method::Lsoda).tolerance;
+        assert!(half.rtol == half.atol && (-half.rtol.log10() - 0.5 * 53.0 * 2.0_f64.log10()).abs() < 1e-4);
+        let finest = MethodSpec::defaults(Method::TaylorExtended).tolerance;
+        assert_eq!(finest, Tolerance { rtol: 1e-32, atol: 1e-32 });
+    }
+}

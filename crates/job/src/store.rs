@@ -1,0 +1,329 @@
+//! Answers on disk, by key, so that nothing is computed twice.
+//!
+//! An entry is one file, written to a temporary name and renamed, so that several processes may use one store: who reads sees a whole entry or
+//! none. An entry names its question and carries the digest of its own bytes; one that is damaged, cut short, or belongs to another
+//! question is noticed and computed again. Nothing that is checked or published rests on a store: see `--fresh`.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use super::answer::{Answer, Stop};
+use super::encode;
+use super::question::{NUMERICS, Question};
+use crate::record::hash::canonical_json;
+use crate::record::{FileError, Hash, files};
+use twofold_integrate::Statistics;
+
+/// A folder of answers.
+#[derive(Clone, Debug)]
+pub struct Store {
+    folder: PathBuf,
+}
+
+/// What a store has under a key.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Kept {
+    /// The answer.
+    Answer(Answer),
+    /// Nothing.
+    Nothing,
+    /// A file that is not the answer, and why.
+    Damaged(String),
+}
+
+/// How an entry begins.
+const MAGIC: &[u8; 16] = b"twofold answer 1";
+/// Length of the digest at an entry's end, in hexadecimal.
+const DIGEST: usize = 64;
+/// The files' ending.
+const ENDING: &str = "answer";
+
+/// The readable part of an entry.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Header {
+    key: Hash,
+    kind: String,
+    numerics: String,
+    question: Value,
+    facts: Map<String, Value>,
+    statistics: Option<Statistics>,
+    stop: Stop,
+}
+
+impl Store {
+    /// The store in `folder`, which need not exist yet.
+    pub fn new(folder: impl Into<PathBuf>) -> Self {
+        Self { folder: folder.into() }
+    }
+
+    /// Where it is.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The file of an entry. Two digits of the key make a folder, so that none grows too large.
+    pub fn path(&self, key: &Hash) -> PathBuf {
+        let text = key.as_str();
+        self.folder.join(&text[..2]).join(format!("{text}.{ENDING}"))
+    }
+
+    /// Whether something is kept under `key`; whether it is of use, [`Store::get`] says.
+    pub fn has(&self, key: &Hash) -> bool {
+        self.path(key).is_file()
+    }
+
+    /// What is kept under `key` for `question`.
+    pub fn get(&self, key: &Hash, question: &dyn Question) -> Kept {
+        let path = self.path(key);
+        let bytes = match files::read(&path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.source.kind() == std::io::ErrorKind::NotFound => return Kept::Nothing,
+            Err(error) => return Kept::Damaged(error.to_string()),
+        };
+        match read(&bytes) {
+            Ok((header, answer)) => {
+                if header.key == *key && header.kind == question.kind() && header.question == question.json() {
+                    Kept::Answer(answer)
+                } else {
+                    Kept::Damaged(format!("{} answers another question", path.display()))
+                }
+            }
+            Err(why) => Kept::Damaged(format!("{} is damaged ({why})", path.display())),
+        }
+    }
+
+    /// Keeps an answer.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be written.
+    pub fn put(&self, key: &Hash, question: &dyn Question, answer: &Answer) -> Result<(), FileError> {
+        let header = Header {
+            key: key.clone(),
+            kind: question.kind().to_owned(),
+            numerics: NUMERICS.to_owned(),
+            question: question.json(),
+            facts: answer.facts.clone(),
+            statistics: answer.statistics.clone(),
+            stop: answer.stop,
+        };
+        let header = canonical_json(&header);
+        let mut bytes = MAGIC.to_vec();
+        bytes.extend_from_slice(&(header.len() as u64).to_le_bytes());
+        bytes.extend(header);
+        bytes.extend(encode::bits(&answer.tables));
+        let digest = Hash::of(&bytes);
+        bytes.extend_from_slice(digest.as_str().as_bytes());
+        files::write(&self.path(key), &bytes)
+    }
+
+    /// The entries: path inside the store, bytes, and whether this program's numerics made it. Sorted by path.
+    ///
+    /// # Errors
+    ///
+    /// If the folder cannot be read.
+    pub fn entries(&self) -> Result<Vec<Entry>, FileError> {
+        if !self.folder.exists() {
+            return Ok(Vec::new());
+        }
+        let found = crate::record::read_tree(&self.folder, &|path| path.ends_with(&format!(".{ENDING}")))?;
+        Ok(found
+            .files
+            .into_iter()
+            .map(|file| Entry {
+                current: read(&file.bytes).is_ok_and(|(h, _)| h.numerics == NUMERICS),
+                bytes: file.bytes.len() as u64,
+                path: file.path,
+            })
+            .collect())
+    }
+
+    /// Removes entries; those that `unwanted` says. Gives back how many bytes that freed.
+    ///
+    /// # Errors
+    ///
+    /// If the folder cannot be read, or a file not removed.
+    pub fn prune(&self, unwanted: impl Fn(&Entry) -> bool) -> Result<u64, FileError> {
+        let mut freed = 0;
+        for entry in self.entries()?.iter().filter(|e| unwanted(e)) {
+            files::remove(&self.folder.join(&entry.path))?;
+            freed += entry.bytes;
+        }
+        Ok(freed)
+    }
+}
+
+/// An entry of a store, from outside.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Path inside the store.
+    pub path: String,
+    /// Length.
+    pub bytes: u64,
+    /// Whether it is whole and was made by this program's numerics: others are never used again.
+    pub current: bool,
+}
+
+/// The answer in the bytes of an entry, whatever question it is for.
+///
+/// # Errors
+///
+/// If they are no whole entry.
+pub fn answer_in(bytes: &[u8]) -> Result<Answer, encode::Malformed> {
+    read(bytes).map(|(_, answer)| answer).map_err(encode::Malformed)
+}
+
+/// The header and answer in an entry's bytes.
+fn read(bytes: &[u8]) -> Result<(Header, Answer), String> {
+    let (content, digest) = bytes.split_at_checked(bytes.len().saturating_sub(DIGEST)).ok_or("it is too short")?;
+    if Hash::of(content).as_str().as_bytes() != digest {
+        return Err("its digest is not that of its content".into());
+    }
+    let content = content.strip_prefix(MAGIC).ok_or("it is not an answer of this version")?;
+    let (length, content) = content.split_at_checked(8).ok_or("it is too short")?;
+    let length = u64::from_le_bytes(length.try_into().map_err(|_| "it is too short")?);
+    let (header, tables) =
+        usize::try_from(length).ok().and_then(|n| content.split_at_checked(n)).ok_or("its header is cut short")?;
+    let header: Header = serde_json::from_slice(header).map_err(|e| e.to_string())?;
+    let tables = encode::from_bits(tables).map_err(|e| e.to_string())?;
+    let answer =
+        Answer { tables, facts: header.facts.clone(), statistics: header.statistics.clone(), stop: header.stop };
+    Ok((header, answer))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::desk::Desk;
+    use crate::question::{JobError, key};
+    use crate::table::{Column, Table};
+    use serde_json::json;
+    use std::fs;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use twofold_integrate::Watch;
+
+    static COMPUTED: AtomicUsize = AtomicUsize::new(0);
+
+    #[derive(Debug)]
+    struct Square(f64);
+
+    impl Question for Square {
+        fn kind(&self) -> &'static str {
+            "square"
+        }
+        fn json(&self) -> Value {
+            json!({ "of": self.0 })
+        }
+        fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+            COMPUTED.fetch_add(1, Ordering::Relaxed);
+            let mut table = Table::new("square", [Column::numbers("x")]);
+            table.push([(self.0 * self.0).into()]);
+            Ok(Answer::of_tables(vec![table]).with_fact("of", &self.0))
+        }
+    }
+
+    #[test]
+    fn answers_survive_and_damage_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::new(folder.path().join("store"));
+        let question = Square(1.0 / 3.0);
+        let key = key(&question);
+        assert_eq!(store.get(&key, &question), Kept::Nothing);
+        let ask = || Desk::new(Some(store.clone()), &()).ask(&question).unwrap();
+        let first = ask();
+        assert_eq!(ask(), first);
+        assert_eq!(COMPUTED.load(Ordering::Relaxed), 1, "the second answer comes from the store");
+
+        // Every byte counts.
+        let path = store.path(&key);
+        let whole = fs::read(&path).unwrap();
+        for at in 0..whole.len() {
+            let mut bytes = whole.clone();
+            bytes[at] ^= 1;
+            fs::write(&path, &bytes).unwrap();
+            assert!(matches!(store.get(&key, &question), Kept::Damaged(_)), "byte {at}");
+        }
+        for cut in [0, 1, 70, whole.len() - 1] {
+            fs::write(&path, &whole[..cut]).unwrap();
+            assert!(matches!(store.get(&key, &question), Kept::Damaged(_)), "cut at {cut}");
+        }
+        assert_eq!(ask(), first);
+        assert_eq!(COMPUTED.load(Ordering::Relaxed), 2, "a damaged answer is computed again");
+        assert_eq!(fs::read(&path).unwrap(), whole, "and kept again");
+
+        // A foreign entry under our name, whole in itself.
+        let other = Square(2.0);
+        let foreign = super::super::question::key(&other);
+        store.put(&foreign, &other, &other.compute(&Desk::quiet(), &()).unwrap()).unwrap();
+        fs::copy(store.path(&foreign), &path).unwrap();
+        assert!(matches!(store.get(&key, &question), Kept::Damaged(why) if why.contains("another question")));
+
+        let entries = store.entries().unwrap();
+        assert_eq!(entries.len(), 2);
+        assert!(entries.iter().all(|e| e.current));
+        assert_eq!(store.prune(|e| !e.current).unwrap(), 0);
+        assert!(store.prune(|_| true).unwrap() > 0);
+        assert_eq!(store.entries().unwrap(), []);
+    }
+
+    /// An entry is its question's by its key, its kind, and what is asked: each by itself.
+    #[test]
+    fn an_entry_is_its_questions_in_everything() {
+        #[derive(Debug)]
+        struct Cube(f64);
+        impl Question for Cube {
+            fn kind(&self) -> &'static str {
+                "cube"
+            }
+            fn json(&self) -> Value {
+                Square(self.0).json()
+            }
+            fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+                Square(self.0).compute(desk, watch)
+            }
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::new(folder.path());
+        let (question, answer) = (Square(3.0), Answer::of_tables(Vec::new()).with_fact("of", &3.0));
+        let (ours, others) = (key(&question), key(&Square(4.0)));
+        let another = |kept: Kept| matches!(kept, Kept::Damaged(why) if why.contains("another question"));
+        store.put(&ours, &Cube(3.0), &answer).unwrap();
+        assert!(another(store.get(&ours, &question)), "of another kind");
+        store.put(&ours, &Square(4.0), &answer).unwrap();
+        assert!(another(store.get(&ours, &question)), "another is asked");
+        store.put(&others, &question, &answer).unwrap();
+        fs::copy(store.path(&others), store.path(&ours)).unwrap();
+        assert!(another(store.get(&ours, &question)), "under another key");
+        store.put(&ours, &question, &answer).unwrap();
+        assert_eq!(store.get(&ours, &question), Kept::Answer(answer));
+        // What is there and no file cannot be read; it is not nothing.
+        fs::remove_file(store.path(&others)).unwrap();
+        assert_eq!(store.get(&others, &question), Kept::Nothing);
+        fs::create_dir(store.path(&others)).unwrap();
+        assert!(matches!(store.get(&others, &question), Kept::Damaged(_)));
+    }
+
+    #[test]
+    fn what_was_interrupted_is_not_kept() {
+        #[derive(Debug)]
+        struct Cut;
+        impl Question for Cut {
+            fn kind(&self) -> &'static str {
+                "cut"
+            }
+            fn json(&self) -> Value {
+                Value::Null
+            }
+            fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+                Ok(Answer { stop: Stop::Interrupted, ..Answer::of_tables(Vec::new()) })
+            }
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::new(folder.path());
+        Desk::new(Some(store.clone()), &()).ask(&Cut).unwrap();
+        assert_eq!(store.get(&key(&Cut), &Cut), Kept::Nothing);
+    }
+}

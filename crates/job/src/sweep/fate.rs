@@ -1,0 +1,256 @@
+//! What becomes of one cell of a sweep.
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use super::far;
+use crate::answer::{Answer, Stop};
+use crate::classification::{Classification, SoFar};
+use crate::desk::Desk;
+use crate::question::{JobError, Question};
+use crate::run::Run;
+use crate::simulate::simulate_until;
+use crate::spec::SwitchSpec;
+use twofold_analyse::attractor::{Evidence, Verdict};
+use twofold_analyse::lyapunov::Exponent;
+use twofold_integrate::Watch;
+
+/// What a run settles on, as [`Classification`] has it, or that it goes to the far state: the region that no orbit leaves. Fact: `outcome`
+/// ([`Outcome`]).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fate(pub Classification);
+
+/// Where a run ends, in a row's worth of numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Outcome {
+    /// In a word: `period-1`, `leaving-period-1` (turns around it and moves away), `quasi-periodic`, `irregular`, `undecided`, `noisy`,
+    /// `noisy-around-period-1`, `far`, `escaped`, `too-few`.
+    pub word: String,
+    /// Period of the closed orbit, 0 where there is none.
+    pub period: u64,
+    /// From then on the run only turns around that orbit; of a far run, when it entered the region without return.
+    pub captured_at: Option<f64>,
+    /// From then on it is there.
+    pub settled_at: Option<f64>,
+    /// Mean distance from the orbit at the end.
+    pub radius: Option<f64>,
+    /// Rate of the approach per unit time ...
+    pub rate: Option<f64>,
+    /// ... and its standard error.
+    pub rate_error: Option<f64>,
+    /// Time for one turn.
+    pub turn: Option<f64>,
+    /// Largest exponent per unit time, where it was needed ...
+    pub exponent: Option<f64>,
+    /// ... and the standard error of its block means.
+    pub exponent_error: Option<f64>,
+    /// Passages through the section.
+    pub crossings: u64,
+    /// Time reached.
+    pub end: f64,
+    /// Steps made.
+    pub steps: u64,
+}
+
+impl Outcome {
+    fn of(evidence: &Evidence, answer: &Answer) -> Result<Self, JobError> {
+        let cycle = evidence.verdict.cycle();
+        let approach = cycle.and_then(|c| c.approach);
+        let word = match &evidence.verdict {
+            Verdict::Spiralling(c) if approach.is_some_and(|r| r.per_time < 0.0) => {
+                format!("leaving-period-{}", c.period)
+            }
+            Verdict::Periodic(c) | Verdict::Spiralling(c) => format!("period-{}", c.period),
+            Verdict::QuasiPeriodic(_) => "quasi-periodic".to_owned(),
+            Verdict::Chaotic { .. } => "irregular".to_owned(),
+            Verdict::Noisy { around: Some(c), .. } => format!("noisy-around-period-{}", c.period),
+            other => other.name().to_owned(),
+        };
+        Ok(Self {
+            word,
+            period: cycle.map_or(0, |c| c.period as u64),
+            captured_at: cycle.map(|c| c.captured_at),
+            settled_at: cycle.and_then(|c| c.settled_at),
+            radius: cycle.map(|c| c.radius),
+            rate: approach.map(|r| r.per_time),
+            rate_error: approach.map(|r| r.standard_error),
+            turn: cycle.map(|c| c.duration),
+            exponent: evidence.lyapunov.map(|l| l.value),
+            exponent_error: evidence.lyapunov.map(|l| l.standard_error),
+            crossings: evidence.crossings as u64,
+            end: answer.fact("t")?,
+            steps: steps(answer),
+        })
+    }
+
+    fn far(answer: &Answer) -> Result<Self, JobError> {
+        let end: f64 = answer.fact("t")?;
+        Ok(Self {
+            word: "far".into(),
+            period: 0,
+            captured_at: Some(end),
+            settled_at: None,
+            radius: None,
+            rate: None,
+            rate_error: None,
+            turn: None,
+            exponent: None,
+            exponent_error: None,
+            crossings: answer.rows() as u64,
+            end,
+            steps: steps(answer),
+        })
+    }
+}
+
+fn steps(answer: &Answer) -> u64 {
+    answer.statistics.as_ref().map_or(0, |s| s.steps)
+}
+
+impl Question for Fate {
+    fn kind(&self) -> &'static str {
+        "fate"
+    }
+
+    fn json(&self) -> Value {
+        json!({ "classification": self.0.json(), "far": far::corner(&self.0.run) })
+    }
+
+    fn label(&self) -> String {
+        self.0.label()
+    }
+
+    fn extent(&self) -> f64 {
+        self.0.run.t_end
+    }
+
+    fn cost(&self) -> f64 {
+        // The run is a part of it, and no question of its own.
+        Run(self.0.run.clone()).cost() + self.0.cost()
+    }
+
+    fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+        let answer = self.run(desk, watch)?;
+        Ok(Answer::of_tables(Vec::new()).with_fact("outcome", &self.judged(desk, &answer)?))
+    }
+}
+
+impl Fate {
+    /// Whether a state is one that no orbit of the run's system comes back from.
+    fn is_far(&self) -> Option<impl Fn(&[f64]) -> bool + use<>> {
+        far::corner(&self.0.run).map(|c| move |x: &[f64]| x[1] > c && x[2] > c)
+    }
+
+    /// The answer to the run's question; of a run that goes far, up to there.
+    ///
+    /// # Errors
+    ///
+    /// Whatever the computation met.
+    pub(super) fn run(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+        let run = &self.0.run;
+        match (&self.is_far(), run.switch) {
+            // Filippov motion has no layer to be stiff in: it gets to its end.
+            (Some(is_far), SwitchSpec::Smoothed { .. } | SwitchSpec::Hysteretic { .. }) => {
+                Ok(simulate_until(run, is_far, watch)?.to_answer(run))
+            }
+            _ => Run(run.clone()).compute(desk, watch),
+        }
+    }
+
+    /// What the answer to the run's question comes to.
+    ///
+    /// # Errors
+    ///
+    /// Whatever the computation met.
+    fn judged(&self, desk: &Desk<'_>, answer: &Answer) -> Result<Outcome, JobError> {
+        match self.so_far(desk, answer)? {
+            SoFar::Judged(outcome) => Ok(outcome),
+            SoFar::Awaits(exponent) => self.with_exponent(answer, exponent.found(&*desk.ask(&*exponent)?)),
+        }
+    }
+
+    /// The same without the orbit's exponent.
+    ///
+    /// # Errors
+    ///
+    /// As [`Fate::judged`].
+    pub(super) fn so_far(&self, desk: &Desk<'_>, answer: &Answer) -> Result<SoFar<Outcome>, JobError> {
+        if answer.stop == Stop::Interrupted {
+            return Err(JobError::Interrupted);
+        }
+        let state: Vec<f64> = answer.fact("state")?;
+        if self.is_far().is_some_and(|far| far(&state)) {
+            return Ok(SoFar::Judged(Outcome::far(answer)?));
+        }
+        Ok(match self.0.so_far(desk, answer)? {
+            SoFar::Judged(evidence) => SoFar::Judged(Outcome::of(&evidence, answer)?),
+            SoFar::Awaits(exponent) => SoFar::Awaits(exponent),
+        })
+    }
+
+    /// What the answer comes to with the exponent that was awaited.
+    ///
+    /// # Errors
+    ///
+    /// If the answer is none to the run's question.
+    pub(super) fn with_exponent(&self, answer: &Answer, exponent: Option<Exponent>) -> Result<Outcome, JobError> {
+        Outcome::of(&self.0.with_exponent(answer, exponent)?, answer)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cases;
+    use crate::spec::Observation;
+    use twofold_analyse::attractor::{Cycle, Rate};
+    use twofold_integrate::Statistics;
+
+    /// Each verdict's word, and where its numbers go.
+    #[test]
+    fn an_outcome_is_its_verdict_in_a_row() {
+        let system = cases::smooth(&["x", "v"], "x + 9", &["v", "-x"]);
+        let section = Observation::Section { coordinate: 0, value: 0.0 };
+        let run = cases::run(system, SwitchSpec::tanh(1e-2), 20.0, section);
+        let evidence = Classification::of(run).ask(&Desk::quiet()).unwrap();
+        let statistics = Some(Statistics { steps: 77, ..Statistics::default() });
+        let answer = Answer { statistics, ..Answer::of_tables(Vec::new()) }.with_fact("t", &20.0);
+        let cycle = |per_time: Option<f64>| Cycle {
+            period: 3,
+            points: Vec::new(),
+            duration: 4.5,
+            radius: 1e-3,
+            captured_at: 100.0,
+            settled_at: Some(200.0),
+            approach: per_time.map(|per_time| Rate { per_time, standard_error: 1e-4, from: 1.0, to: 2.0 }),
+            rotation: None,
+        };
+        let lyapunov = Some(Exponent { value: 0.25, standard_error: 0.01, duration: 1e4 });
+        for (verdict, word) in [
+            (Verdict::Periodic(cycle(Some(-0.1))), "period-3"),
+            (Verdict::Spiralling(cycle(Some(0.1))), "period-3"),
+            (Verdict::Spiralling(cycle(Some(-0.1))), "leaving-period-3"),
+            (Verdict::Spiralling(cycle(None)), "period-3"),
+            (Verdict::QuasiPeriodic(cycle(None)), "quasi-periodic"),
+            (Verdict::Chaotic { lyapunov, bands: 2 }, "irregular"),
+            (Verdict::Undecided { lyapunov: None }, "undecided"),
+            (Verdict::Noisy { contrast: None, around: Some(cycle(None)) }, "noisy-around-period-3"),
+            (Verdict::Noisy { contrast: None, around: None }, "noisy"),
+            (Verdict::Escaped { last_crossing: 3.0 }, "escaped"),
+            (Verdict::TooFew { points: 3 }, "too-few"),
+        ] {
+            let cycle = verdict.cycle().cloned();
+            let evidence = Evidence { verdict, lyapunov, crossings: 6, ..evidence.clone() };
+            let found = Outcome::of(&evidence, &answer).unwrap();
+            assert_eq!((found.word.as_str(), found.crossings, found.end, found.steps), (word, 6, 20.0, 77));
+            let (captured, settled) = (cycle.as_ref().map(|_| 100.0), cycle.as_ref().map(|_| 200.0));
+            assert_eq!((found.captured_at, found.settled_at), (captured, settled));
+            assert_eq!((found.radius, found.turn), (cycle.as_ref().map(|_| 1e-3), cycle.as_ref().map(|_| 4.5)));
+            assert_eq!(found.period, if cycle.is_some() { 3 } else { 0 });
+            let approach = cycle.and_then(|c| c.approach);
+            assert_eq!((found.rate, found.rate_error), (approach.map(|a| a.per_time), approach.map(|_| 1e-4)));
+            assert_eq!((found.exponent, found.exponent_error), (Some(0.25), Some(0.01)));
+        }
+    }
+}

@@ -1,0 +1,621 @@
+//! The rows of a sweep, from wherever they come, and the files that hold them.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::{Value, json};
+
+use super::{Outcome, Shard, Sweep};
+use crate::encode::{self, Heading, Malformed};
+use crate::question::NUMERICS;
+use crate::record::Hash;
+use crate::record::hash::canonical_json;
+use crate::table::{Column, Entry, Kind, Table};
+
+/// What files of ours say they are.
+const FORMAT: &str = "twofold-sweep";
+/// The version of that format.
+const VERSION: u64 = 1;
+/// Hexadecimal digits of a question's digest that a row carries: as many as fit a whole number of a table.
+const KEY: usize = 15;
+
+/// A finished cell of a sweep.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    number: u64,
+    cells: Vec<Entry>,
+}
+
+/// Why rows do not go together.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RowsError {
+    /// The file is not one of ours.
+    #[error(transparent)]
+    Malformed(#[from] Malformed),
+    /// Two sweeps.
+    #[error("they are of different sweeps ({0} and {1}): only parts of one sweep are merged")]
+    OtherSweep(String, String),
+    /// Two values.
+    #[error("row {0} has two different contents: they were computed by different versions, or one is damaged")]
+    Conflict(u64),
+}
+
+/// The columns that every sweep has after its axes.
+fn found_columns() -> [Column; 16] {
+    let time = |name| Column::new(name, "1", Kind::Number);
+    [
+        Column::integers("key"),
+        Column::words("outcome"),
+        Column::integers("period"),
+        time("captured_at"),
+        time("settled_at"),
+        time("radius"),
+        time("rate"),
+        time("rate_error"),
+        time("turn"),
+        time("exponent"),
+        time("exponent_error"),
+        Column::integers("crossings"),
+        time("end"),
+        Column::integers("steps"),
+        Column::words("reason"),
+        Column::integers("row"),
+    ]
+}
+
+impl Row {
+    pub(super) fn found(number: u64, settings: Vec<Entry>, key: &Hash, outcome: Outcome) -> Self {
+        let blank = |v: Option<f64>| Entry::Number(v.unwrap_or(f64::NAN));
+        let whole = |v: u64| Entry::Integer(i64::try_from(v).unwrap_or(i64::MAX));
+        let mut cells = settings;
+        cells.extend([
+            key_entry(Some(key)),
+            Entry::Word(outcome.word),
+            whole(outcome.period),
+            blank(outcome.captured_at),
+            blank(outcome.settled_at),
+            blank(outcome.radius),
+            blank(outcome.rate),
+            blank(outcome.rate_error),
+            blank(outcome.turn),
+            blank(outcome.exponent),
+            blank(outcome.exponent_error),
+            whole(outcome.crossings),
+            Entry::Number(outcome.end),
+            whole(outcome.steps),
+            Entry::Word(String::new()),
+            whole(number),
+        ]);
+        Self { number, cells }
+    }
+
+    pub(super) fn failed(number: u64, settings: Vec<Entry>, key: Option<&Hash>, reason: String) -> Self {
+        let blank = || Entry::Number(f64::NAN);
+        let mut cells = settings;
+        cells.extend([key_entry(key), Entry::Word("failed".into()), Entry::Integer(0)]);
+        cells.extend((0..8).map(|_| blank()));
+        cells.extend([
+            Entry::Integer(0),
+            blank(),
+            Entry::Integer(0),
+            // One line, whatever the reason says.
+            Entry::Word(reason.replace(['\n', '\r'], " ")),
+            Entry::Integer(i64::try_from(number).unwrap_or(i64::MAX)),
+        ]);
+        Self { number, cells }
+    }
+
+    /// Its number.
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// How it ended, in a word.
+    pub fn outcome(&self) -> &str {
+        self.cell_from_last(15).word()
+    }
+
+    /// Why it failed, if it did.
+    pub fn reason(&self) -> Option<&str> {
+        let reason = self.cell_from_last(2).word();
+        (!reason.is_empty()).then_some(reason)
+    }
+
+    /// The leading digits of its question's digest.
+    pub fn key(&self) -> i64 {
+        match self.cell_from_last(16) {
+            Entry::Integer(key) => *key,
+            _ => 0,
+        }
+    }
+
+    fn cell_from_last(&self, i: usize) -> &Entry {
+        &self.cells[self.cells.len() - i]
+    }
+
+    /// The row as a line of JSON: its cells in order, blanks as null.
+    pub fn line(&self) -> String {
+        let cells: Vec<Value> = self
+            .cells
+            .iter()
+            .map(|cell| match cell {
+                // Not-a-number becomes null.
+                Entry::Number(v) => json!(v),
+                Entry::Integer(v) => json!(v),
+                Entry::Word(w) => json!(w),
+            })
+            .collect();
+        Value::Array(cells).to_string()
+    }
+
+    fn of_line(line: &str, columns: &[Column]) -> Result<Self, Malformed> {
+        let wrong = |what: &str| Malformed(format!("a row is {what}: {line}"));
+        let Ok(Value::Array(values)) = serde_json::from_str(line) else { return Err(wrong("not a list")) };
+        if values.len() != columns.len() {
+            return Err(wrong("of another length than its heading says"));
+        }
+        let cells: Option<Vec<Entry>> = values
+            .iter()
+            .zip(columns)
+            .map(|(value, column)| match column.kind() {
+                Kind::Number if value.is_null() => Some(Entry::Number(f64::NAN)),
+                Kind::Number => value.as_f64().map(Entry::Number),
+                Kind::Integer => value.as_i64().map(Entry::Integer),
+                Kind::Word => value.as_str().map(Entry::from),
+            })
+            .collect();
+        Self::of_cells(cells.ok_or_else(|| wrong("not of its heading's kinds"))?)
+    }
+
+    fn of_cells(cells: Vec<Entry>) -> Result<Self, Malformed> {
+        match cells.last() {
+            Some(Entry::Integer(number)) if *number >= 0 => Ok(Self { number: *number as u64, cells }),
+            _ => Err(Malformed("a row has no number".into())),
+        }
+    }
+}
+
+fn key_entry(key: Option<&Hash>) -> Entry {
+    Entry::Integer(key.and_then(|k| i64::from_str_radix(&k.as_str()[..KEY], 16).ok()).unwrap_or(0))
+}
+
+/// Rows of one sweep, each once, in order.
+#[derive(Clone, Debug)]
+pub struct Rows {
+    sweep: Sweep,
+    /// The versions of the numerics that computed them.
+    numerics: BTreeSet<String>,
+    /// As lines, by number: two rows are the same if their lines are.
+    lines: BTreeMap<u64, String>,
+}
+
+impl Rows {
+    /// No rows yet.
+    pub fn of(sweep: Sweep) -> Self {
+        Self { sweep, numerics: BTreeSet::from([NUMERICS.to_owned()]), lines: BTreeMap::new() }
+    }
+
+    /// The sweep.
+    pub fn sweep(&self) -> &Sweep {
+        &self.sweep
+    }
+
+    /// The versions of the numerics that computed these rows.
+    pub fn numerics(&self) -> impl Iterator<Item = &str> {
+        self.numerics.iter().map(String::as_str)
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.lines.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.lines.is_empty()
+    }
+
+    /// Whether the row of this number is there.
+    pub fn has(&self, number: u64) -> bool {
+        self.lines.contains_key(&number)
+    }
+
+    /// The row of this number.
+    pub fn get(&self, number: u64) -> Option<Row> {
+        Row::of_line(self.lines.get(&number)?, &self.columns()).ok()
+    }
+
+    /// The rows, in order.
+    pub fn iter(&self) -> impl Iterator<Item = Row> {
+        let columns = self.columns();
+        self.lines.values().filter_map(move |line| Row::of_line(line, &columns).ok())
+    }
+
+    /// The numbers of a shard that are not there.
+    pub fn missing(&self, shard: Shard) -> Vec<u64> {
+        shard.rows(&self.sweep).filter(|row| !self.has(*row)).collect()
+    }
+
+    /// Adds a row.
+    ///
+    /// # Errors
+    ///
+    /// If another one of its number is there already.
+    pub fn insert(&mut self, row: Row) -> Result<(), RowsError> {
+        let line = row.line();
+        match self.lines.get(&row.number) {
+            Some(old) if *old != line => Err(RowsError::Conflict(row.number)),
+            Some(_) => Ok(()),
+            None => {
+                self.lines.insert(row.number, line);
+                Ok(())
+            }
+        }
+    }
+
+    /// Takes in the rows of another part.
+    ///
+    /// # Errors
+    ///
+    /// If it is of another sweep, or a row has two contents.
+    pub fn merge(&mut self, other: Rows) -> Result<(), RowsError> {
+        let hashes = [self.sweep.hash(), other.sweep.hash()];
+        if hashes[0] != hashes[1] {
+            return Err(RowsError::OtherSweep(hashes[0].short().to_owned(), hashes[1].short().to_owned()));
+        }
+        for (number, line) in other.lines {
+            match self.lines.get(&number) {
+                Some(old) if *old != line => return Err(RowsError::Conflict(number)),
+                Some(_) => {}
+                None => {
+                    self.lines.insert(number, line);
+                }
+            }
+        }
+        self.numerics.extend(other.numerics);
+        Ok(())
+    }
+
+    /// The rows that belong to the same sweep with another number of draws ([`Sweep::with_draws`]); `None` without random axes.
+    pub fn with_draws(&self, count: u64) -> Option<Self> {
+        let sweep = self.sweep.with_draws(count)?;
+        let lines = self.lines.range(..sweep.rows()).map(|(number, line)| (*number, line.clone())).collect();
+        Some(Self { sweep, numerics: self.numerics.clone(), lines })
+    }
+
+    /// How often each outcome occurred.
+    pub fn counts(&self) -> BTreeMap<String, u64> {
+        let mut counts = BTreeMap::new();
+        for row in self.iter() {
+            *counts.entry(row.outcome().to_owned()).or_default() += 1;
+        }
+        counts
+    }
+
+    fn columns(&self) -> Vec<Column> {
+        self.sweep.over.iter().map(super::Axis::column).chain(found_columns()).collect()
+    }
+
+    /// The rows as a table, in order: a column for each axis, then what was found. Blank where there is nothing to say; `key` holds the
+    /// leading 60 bits of the question's digest.
+    pub fn table(&self) -> Table {
+        let mut table = Table::new("sweep", self.columns());
+        for row in self.iter() {
+            table.push(row.cells);
+        }
+        table
+    }
+
+    /// What files say about the rows.
+    pub fn about(&self) -> Value {
+        let mut about = self.heading();
+        about["rows"] = json!(self.sweep.rows());
+        about["data"] = json!(Hash::of(&encode::bits(&[self.table()])));
+        about
+    }
+
+    fn heading(&self) -> Value {
+        json!({
+            "format": FORMAT,
+            "version": VERSION,
+            "sweep": self.sweep.hash(),
+            "spec": self.sweep,
+            "numerics": self.numerics,
+        })
+    }
+
+    /// The rows as CSV.
+    pub fn csv(&self) -> Vec<u8> {
+        encode::csv(&self.table(), &self.about())
+    }
+
+    /// The rows as Parquet.
+    #[cfg(feature = "parquet")]
+    pub fn parquet(&self) -> Vec<u8> {
+        crate::parquet::parquet(&self.table(), &self.about())
+    }
+
+    /// The rows as lines of a journal, a heading first.
+    pub fn journal(&self) -> Vec<String> {
+        std::iter::once(self.journal_heading()).chain(self.lines.values().cloned()).collect()
+    }
+
+    /// The first line of a journal of these rows.
+    pub fn journal_heading(&self) -> String {
+        String::from_utf8_lossy(&canonical_json(&self.heading())).into_owned()
+    }
+
+    /// The rows of a CSV file.
+    ///
+    /// # Errors
+    ///
+    /// If it is anything else, or was changed.
+    pub fn from_csv(bytes: &[u8]) -> Result<Self, RowsError> {
+        Self::of_table(encode::from_csv(bytes)?)
+    }
+
+    /// The rows of a Parquet file.
+    ///
+    /// # Errors
+    ///
+    /// If it is anything else, or was changed.
+    #[cfg(feature = "parquet")]
+    pub fn from_parquet(bytes: &[u8]) -> Result<Self, RowsError> {
+        Self::of_table(crate::parquet::from_parquet(bytes)?)
+    }
+
+    fn of_table((heading, table): (Heading, Table)) -> Result<Self, RowsError> {
+        let mut rows = Self::of_heading(&heading.about)?;
+        let columns = rows.columns();
+        let fits = columns.len() == table.columns.len()
+            && columns.iter().zip(&table.columns).all(|(a, b)| a.name == b.name && a.kind() == b.kind());
+        if !fits {
+            return Err(Malformed("its columns are not those of a sweep of this version".into()).into());
+        }
+        for cells in table.rows() {
+            rows.insert(Row::of_cells(cells)?)?;
+        }
+        if heading.about["data"] != json!(Hash::of(&encode::bits(&[rows.table()]))) {
+            return Err(Malformed("its rows are not those that it was written with".into()).into());
+        }
+        Ok(rows)
+    }
+
+    /// The rows of a journal's lines.
+    ///
+    /// # Errors
+    ///
+    /// If they are anything else.
+    pub fn from_journal(lines: &[String]) -> Result<Self, RowsError> {
+        let Some((heading, rest)) = lines.split_first() else {
+            return Err(Malformed("the journal has no heading".into()).into());
+        };
+        let heading = serde_json::from_str(heading).map_err(|e| Malformed(format!("its heading: {e}")))?;
+        let mut rows = Self::of_heading(&heading)?;
+        let columns = rows.columns();
+        for line in rest {
+            // Whoever goes on with a journal by another version of the program says so.
+            if line.starts_with('{') {
+                let heading = serde_json::from_str(line).map_err(|e| Malformed(format!("its heading: {e}")))?;
+                rows.merge(Self::of_heading(&heading)?)?;
+            } else {
+                rows.insert(Row::of_line(line, &columns)?)?;
+            }
+        }
+        Ok(rows)
+    }
+
+    fn of_heading(about: &Value) -> Result<Self, RowsError> {
+        let wrong = |what: String| RowsError::from(Malformed(what));
+        if about["format"] != FORMAT || about["version"] != VERSION {
+            return Err(wrong(format!("it does not say that it is a {FORMAT} of version {VERSION}")));
+        }
+        let sweep: Sweep =
+            serde_json::from_value(about["spec"].clone()).map_err(|e| wrong(format!("its spec: {e}")))?;
+        let numerics: BTreeSet<String> =
+            serde_json::from_value(about["numerics"].clone()).map_err(|e| wrong(format!("its numerics: {e}")))?;
+        if about["sweep"] != json!(sweep.hash()) {
+            return Err(wrong("its spec is not the one that it was made with".into()));
+        }
+        Ok(Self { sweep, numerics, lines: BTreeMap::new() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spec::*;
+    use twofold_system::Caricature;
+
+    fn sweep(axes: &[&str], draws: Option<u64>) -> Sweep {
+        let section = Observation::Section { coordinate: 1, value: 0.0 };
+        let run =
+            crate::cases::run(Caricature::with_reinjection(1e-1, 1e-5).into(), SwitchSpec::tanh(1e-3), 60.0, section);
+        let axes = axes.iter().map(|a| a.parse().unwrap()).collect();
+        Sweep::new(run, axes, draws.map(|count| crate::sweep::Draws { count, seed: 1 })).unwrap()
+    }
+
+    fn failed(sweep: &Sweep, number: u64) -> Row {
+        Row::failed(number, sweep.settings(number), None, format!("why {number}\nindeed"))
+    }
+
+    /// Every cell of a row that was found and of one that failed stands in its column.
+    #[test]
+    fn rows_say_what_was_found() {
+        let sweep = sweep(&["eps=1e-2,1e-3"], None);
+        let key = Hash::of(b"a question");
+        let outcome = Outcome {
+            word: "period-3".into(),
+            period: 3,
+            captured_at: Some(1.0),
+            settled_at: Some(2.0),
+            radius: Some(3.0),
+            rate: Some(4.0),
+            rate_error: Some(5.0),
+            turn: Some(6.0),
+            exponent: Some(7.0),
+            exponent_error: None,
+            crossings: 8,
+            end: 9.0,
+            steps: 10,
+        };
+        let mut rows = Rows::of(sweep.clone());
+        assert!(rows.is_empty() && rows.get(0).is_none() && !rows.has(0));
+        let found = Row::found(0, sweep.settings(0), &key, outcome);
+        assert_eq!((found.number(), found.outcome(), found.reason()), (0, "period-3", None));
+        assert_eq!(format!("{:015x}", found.key()), key.as_str()[..15]);
+        assert_eq!((failed(&sweep, 1).reason(), failed(&sweep, 1).key()), (Some("why 1 indeed"), 0));
+        rows.insert(found.clone()).unwrap();
+        rows.insert(failed(&sweep, 1)).unwrap();
+        assert!(!rows.is_empty() && rows.len() == 2 && rows.has(1));
+        assert_eq!(rows.get(0).unwrap().line(), found.line());
+        let table = rows.table();
+        for (name, value) in [
+            ("eps", 1e-2),
+            ("captured_at", 1.0),
+            ("settled_at", 2.0),
+            ("radius", 3.0),
+            ("rate", 4.0),
+            ("rate_error", 5.0),
+            ("turn", 6.0),
+            ("exponent", 7.0),
+            ("end", 9.0),
+        ] {
+            assert_eq!(table.numbers(name)[0], value, "{name}");
+            assert!(name == "eps" || table.numbers(name)[1].is_nan(), "{name}");
+        }
+        assert!(table.numbers("exponent_error").iter().all(|v| v.is_nan()));
+        for (name, values) in [("period", [3, 0]), ("crossings", [8, 0]), ("steps", [10, 0]), ("row", [0, 1])] {
+            assert_eq!(table.integers(name), values, "{name}");
+        }
+        assert_eq!(table.words("outcome").collect::<Vec<_>>(), ["period-3", "failed"]);
+        assert_eq!(table.words("reason").collect::<Vec<_>>(), ["", "why 1 indeed"]);
+        assert_eq!(rows.counts(), [("failed".to_owned(), 1), ("period-3".to_owned(), 1)].into());
+    }
+
+    /// Fewer draws keep the first rows, more keep all; and both are the rows of the other sweep.
+    #[test]
+    fn rows_of_other_draws_are_kept() {
+        let axes = ["shift.x=0..1", "eps=1e-2,1e-3"];
+        let mut rows = Rows::of(sweep(&axes, Some(3)));
+        (0..6).filter(|n| *n != 2).for_each(|n| rows.insert(failed(&sweep(&axes, Some(3)), n)).unwrap());
+        for (draws, kept) in [(1, vec![0, 1]), (2, vec![0, 1, 3]), (5, vec![0, 1, 3, 4, 5])] {
+            let other = rows.with_draws(draws).unwrap();
+            assert_eq!(other.sweep(), &sweep(&axes, Some(draws)));
+            assert_eq!(other.iter().map(|row| row.number()).collect::<Vec<_>>(), kept);
+        }
+        assert!(Rows::of(sweep(&["eps=1e-2"], None)).with_draws(5).is_none());
+    }
+
+    /// A file whose columns, rows, heading or order of cells were changed is not one of ours.
+    #[test]
+    fn a_changed_file_is_refused() {
+        let sweep = sweep(&["eps=1e-2,1e-3"], None);
+        let mut rows = Rows::of(sweep.clone());
+        (0..2).for_each(|n| rows.insert(failed(&sweep, n)).unwrap());
+        let file = String::from_utf8(rows.csv()).unwrap();
+        assert_eq!(Rows::from_csv(file.as_bytes()).unwrap().csv(), rows.csv());
+        let integer = "{\"kind\":\"integer\",\"name\":\"period\"";
+        for (from, to, word) in [
+            ("captured_at", "captivated", "columns"),
+            (integer, &*integer.replace("integer", "number"), "columns"),
+            ("why 1", "why 7", "not those that it was written with"),
+            ("\n0.001,", "\n0.002,", "not those that it was written with"),
+            ("twofold-sweep", "twofold-sweet", "does not say"),
+            ("\"version\":1", "\"version\":2", "does not say"),
+            ("\"t_end\":60", "\"t_end\":61", "its spec is not the one"),
+            (",1\n", ",-1\n", "no number"),
+        ] {
+            assert!(file.contains(from), "{from}: {file}");
+            let error = Rows::from_csv(file.replace(from, to).as_bytes()).unwrap_err().to_string();
+            assert!(error.contains(word), "{from} {to}: {error}");
+        }
+        // A journal's rows are as long as their heading says, and of its kinds.
+        let journal = rows.journal();
+        let with = |line: &str| Rows::from_journal(&[journal[0].clone(), line.to_owned()]);
+        assert_eq!(with(&journal[2]).unwrap().len(), 1);
+        for (from, to, word) in [
+            (",1]", "]", "another length"),
+            (",1]", ",-1]", "no number"),
+            (",1]", ",0.5]", "kinds"),
+            ("[", "", "not a list"),
+        ] {
+            assert!(journal[2].contains(from), "{}", journal[2]);
+            let error = with(&journal[2].replacen(from, to, 1)).unwrap_err().to_string();
+            assert!(error.contains(word), "{from} {to}: {error}");
+        }
+        assert!(Rows::from_journal(&[]).unwrap_err().to_string().contains("no heading"));
+        // Parts of two sweeps.
+        let error = rows.merge(Rows::of(self::sweep(&["eps=1e-2"], None))).unwrap_err().to_string();
+        assert!(error.contains("different sweeps"), "{error}");
+        assert_eq!(rows.journal(), journal);
+    }
+
+    /// A part that another version computed says so in the whole.
+    #[test]
+    fn versions_are_kept_side_by_side() {
+        let sweep = sweep(&["eps=1e-2,1e-3"], None);
+        let mut rows = Rows::of(sweep.clone());
+        rows.insert(failed(&sweep, 0)).unwrap();
+        let other = rows.journal_heading().replace(NUMERICS, "another");
+        let mut whole = Rows::from_journal(&[other, failed(&sweep, 1).line()]).unwrap();
+        assert_eq!(whole.numerics().collect::<Vec<_>>(), ["another"]);
+        whole.merge(rows.clone()).unwrap();
+        assert_eq!((whole.len(), whole.numerics().count()), (2, 2));
+        let both = [whole.journal(), rows.journal()].concat();
+        assert_eq!(Rows::from_journal(&both).unwrap().journal(), whole.journal());
+    }
+
+    /// Every way to have some of four rows in three parts: merged in any grouping and order they are the same rows, and one row with two contents is
+    /// refused wherever it stands.
+    #[test]
+    fn every_small_merge_is_a_union() {
+        let run = RunSpec {
+            system: Caricature::with_reinjection(1e-1, 1e-5).into(),
+            switch: SwitchSpec::tanh(1e-3),
+            start: vec![0.2, 0.0, -1.0],
+            t_end: 60.0,
+            method: MethodSpec::ndsolve_defaults(Method::Dopri5),
+            schedule: Default::default(),
+            observe: Observation::Section { coordinate: 1, value: 0.0 },
+        };
+        let sweep = Sweep::new(run, vec!["interval=1,2,3,4".parse().unwrap()], None).unwrap();
+        let row = |number: u64, reason: &str| Row::failed(number, sweep.settings(number), None, reason.to_owned());
+        let part = |set: u32| {
+            let mut rows = Rows::of(sweep.clone());
+            (0..4).filter(|i| set >> i & 1 == 1).for_each(|i| rows.insert(row(i, "why")).unwrap());
+            rows
+        };
+        let union = |parts: [u32; 3]| {
+            let mut rows = part(parts[0]);
+            rows.merge(part(parts[1])).unwrap();
+            rows.merge(part(parts[2])).unwrap();
+            rows.journal()
+        };
+        for parts in 0..16_u32.pow(3) {
+            let [a, b, c] = [parts & 15, parts >> 4 & 15, parts >> 8];
+            let wanted = part(a | b | c).journal();
+            assert_eq!(union([a, b, c]), wanted, "{a:b} {b:b} {c:b}");
+            let mut later = part(b);
+            later.merge(part(c)).unwrap();
+            let mut rows = part(a);
+            rows.merge(later).unwrap();
+            assert_eq!(rows.journal(), wanted, "the other way round: {a:b} {b:b} {c:b}");
+            let missing: Vec<u64> = (0..4).filter(|i| (a | b | c) >> i & 1 == 0).collect();
+            assert_eq!(rows.missing(Shard::WHOLE), missing);
+        }
+        for number in 0..4 {
+            let mut rows = part(15);
+            let mut other = Rows::of(sweep.clone());
+            other.insert(row(number, "another")).unwrap();
+            assert_eq!(rows.merge(other), Err(RowsError::Conflict(number)));
+            assert_eq!(rows.insert(row(number, "another")), Err(RowsError::Conflict(number)));
+            assert_eq!(rows.insert(row(number, "why")), Ok(()));
+        }
+        // Every shard of every number of shards: each row once.
+        for n in 1..=6 {
+            let mut all: Vec<u64> = (1..=n).flat_map(|k| Shard { k, n }.rows(&sweep)).collect();
+            all.sort_unstable();
+            assert_eq!(all, [0, 1, 2, 3], "{n} shards");
+        }
+    }
+}

@@ -1,0 +1,886 @@
+//! Intervals: arithmetic whose results are theorems.
+//!
+//! An [`Interval`] is a closed set of real numbers between two `f64`. The result of every operation contains every value
+//! that the operation takes on its arguments (Moore 1966; Neumaier 1990; IEEE 1788-2015). Rounding outward needs no
+//! directed rounding modes: the error of a rounded sum, product, quotient or root is itself known exactly, from Knuth's
+//! TwoSum and Dekker's product, so that a bound moves to the neighbouring number if, and only if, the rounded result is on
+//! the wrong side of the exact one (Rump, Ogita & Oishi 2005; Kulisch 2013, ch. 7). Bounds are therefore the best
+//! possible ones wherever Dekker's product is exact (results between 2^-900 and 2^1000), and one neighbour wider beyond.
+//!
+//! **Nothing is silent.** There is no empty interval and no NaN. Where an operation is not defined on all of its arguments
+//! (division by an interval that holds 0, the root of one that holds negative numbers, the sign of one that holds both
+//! signs) the result is [`Interval::ENTIRE`]: "nothing is known". Everything computed from it is `ENTIRE` too, even a
+//! product with zero or a tanh, so that no inclusion can be verified by accident. Intersections say when they are empty.
+
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+use super::double_double::{two_product, two_sum};
+use super::interval_extended::Ball;
+use super::{Arithmetic, Decimal, Dual, Elementary, FromDecimal, elementary};
+
+/// All real numbers from `lower` to `upper`.
+///
+/// Neither bound is NaN, `lower <= upper`, `lower < inf`, `upper > -inf`. Equality is that of sets.
+#[derive(Clone, Copy, PartialEq)]
+pub struct Interval {
+    lower: f64,
+    upper: f64,
+}
+
+/// Why there is no such interval.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// The bounds are not bounds.
+    #[error("no interval lies between {lower} and {upper}: give two numbers, the smaller one first")]
+    Bounds {
+        /// The lower bound given.
+        lower: f64,
+        /// The upper bound given.
+        upper: f64,
+    },
+    /// The intervals have no number in common.
+    #[error("{0:?} and {1:?} have no number in common: one of them cannot be an enclosure of the same quantity")]
+    Disjoint(Interval, Interval),
+}
+
+/// Below this, Dekker's product may lose its low part to underflow.
+const SMALL: f64 = f64::from_bits((1023 - 900) << 52);
+/// Above this, it may overflow.
+const LARGE: f64 = f64::from_bits((1023 + 1000) << 52);
+
+/// The largest `f64` not above a + b.
+#[inline]
+fn add_down(a: f64, b: f64) -> f64 {
+    // TwoSum overflows inside only if the sum does or a summand is next to overflow; the error is NaN then
+    // (Boldo, Graillat & Muller 2017).
+    let (s, e) = two_sum(a, b);
+    if e >= 0.0 {
+        s
+    } else if e < 0.0 {
+        s.next_down()
+    } else if s == f64::INFINITY {
+        f64::MAX
+    } else if s.is_nan() {
+        f64::NEG_INFINITY
+    } else {
+        s.next_down()
+    }
+}
+
+/// The smallest `f64` not below a + b.
+#[inline]
+fn add_up(a: f64, b: f64) -> f64 {
+    -add_down(-a, -b)
+}
+
+/// Whether a product or quotient of this size has an exact error.
+#[inline]
+fn exact_range(p: f64) -> bool {
+    let m = p.abs();
+    SMALL < m && m < LARGE
+}
+
+/// A lower bound of what rounds to `p` and lies on `p`'s side of zero or on zero.
+#[inline]
+fn below(p: f64, positive: bool) -> f64 {
+    if p == f64::INFINITY {
+        f64::MAX
+    } else if positive {
+        p.next_down().max(0.0)
+    } else {
+        p.next_down()
+    }
+}
+
+/// A lower bound of a b, with 0 times infinity being 0 (the infinite end of an interval is no member of it).
+#[inline]
+fn mul_down(a: f64, b: f64) -> f64 {
+    if a == 0.0 || b == 0.0 {
+        return 0.0;
+    }
+    let p = a * b;
+    if exact_range(p) {
+        let (_, e) = two_product(a, b);
+        if e >= 0.0 {
+            return p;
+        }
+        if e < 0.0 {
+            return p.next_down();
+        }
+    }
+    below(p, (a > 0.0) == (b > 0.0))
+}
+
+#[inline]
+fn mul_up(a: f64, b: f64) -> f64 {
+    -mul_down(-a, b)
+}
+
+/// A lower bound of a/b, b not zero.
+#[inline]
+fn div_down(a: f64, b: f64) -> f64 {
+    if a == 0.0 {
+        return 0.0;
+    }
+    let q = a / b;
+    if exact_range(q) && exact_range(a) && exact_range(b) {
+        let (p, e) = two_product(q, b);
+        // p is next to a, so that a - p is exact (Sterbenz); the sign of the rounded difference is that of a - q b.
+        let rest = (a - p) - e;
+        if rest == 0.0 || (rest > 0.0) == (b > 0.0) && !rest.is_nan() {
+            return q;
+        }
+        return q.next_down();
+    }
+    below(q, (a > 0.0) == (b > 0.0))
+}
+
+#[inline]
+fn div_up(a: f64, b: f64) -> f64 {
+    -div_down(-a, b)
+}
+
+/// (lower, upper) bound of the root of x >= 0.
+fn sqrt_bounds(x: f64) -> (f64, f64) {
+    let r = elementary::sqrt(x);
+    if exact_range(x) {
+        let (p, e) = two_product(r, r);
+        let rest = (x - p) - e;
+        return (if rest < 0.0 { r.next_down() } else { r }, if rest > 0.0 { r.next_up() } else { r });
+    }
+    if x == 0.0 {
+        return (0.0, 0.0);
+    }
+    (below(r, true), r.next_up())
+}
+
+impl Interval {
+    /// All real numbers: nothing is known.
+    pub const ENTIRE: Self = Self { lower: f64::NEG_INFINITY, upper: f64::INFINITY };
+    /// [-1, 1].
+    pub const UNIT: Self = Self { lower: -1.0, upper: 1.0 };
+
+    /// The numbers from `lower` to `upper`.
+    ///
+    /// # Errors
+    /// [`Error::Bounds`] if a bound is NaN, `lower > upper`, or no real number lies between them.
+    pub fn new(lower: f64, upper: f64) -> Result<Self, Error> {
+        if lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY {
+            Ok(Self { lower, upper })
+        } else {
+            Err(Error::Bounds { lower, upper })
+        }
+    }
+
+    /// From bounds that the caller has ordered; what is not a number becomes "nothing is known".
+    #[inline]
+    pub(super) fn ordered(lower: f64, upper: f64) -> Self {
+        Self::new(lower, upper).unwrap_or(Self::ENTIRE)
+    }
+
+    /// The smallest interval that holds `a` and `b`.
+    pub fn between(a: f64, b: f64) -> Self {
+        Self::ordered(a.min(b), a.max(b))
+    }
+
+    /// The numbers within `radius` of zero; `ENTIRE` if `radius` is NaN or negative.
+    #[inline]
+    pub fn symmetric(radius: f64) -> Self {
+        Self::ordered(-radius, radius)
+    }
+
+    /// The lower bound.
+    #[inline]
+    pub fn lower(self) -> f64 {
+        self.lower
+    }
+
+    /// The upper bound.
+    #[inline]
+    pub fn upper(self) -> f64 {
+        self.upper
+    }
+
+    /// A number in the middle, rounded; 0 for `ENTIRE`, a bound for half-infinite intervals.
+    #[inline]
+    pub fn midpoint(self) -> f64 {
+        if self.lower == f64::NEG_INFINITY {
+            return if self.upper == f64::INFINITY { 0.0 } else { self.upper };
+        }
+        if self.upper == f64::INFINITY {
+            return self.lower;
+        }
+        // Halves first: the sum might overflow. Subnormal bounds may lose a bit, which the clamp makes good.
+        (0.5 * self.lower + 0.5 * self.upper).clamp(self.lower, self.upper)
+    }
+
+    /// upper - lower, rounded up.
+    #[inline]
+    pub fn width(self) -> f64 {
+        add_up(self.upper, -self.lower)
+    }
+
+    /// The largest absolute value of a member.
+    #[inline]
+    pub fn magnitude(self) -> f64 {
+        self.lower.abs().max(self.upper.abs())
+    }
+
+    /// The smallest absolute value of a member.
+    #[inline]
+    pub fn mignitude(self) -> f64 {
+        if self.contains(0.0) { 0.0 } else { self.lower.abs().min(self.upper.abs()) }
+    }
+
+    /// Whether `x` is a member.
+    #[inline]
+    pub fn contains(self, x: f64) -> bool {
+        self.lower <= x && x <= self.upper
+    }
+
+    /// Whether every member of `self` is one of `other`.
+    #[inline]
+    pub fn subset(self, other: Self) -> bool {
+        other.lower <= self.lower && self.upper <= other.upper
+    }
+
+    /// Whether `self` lies in the interior of `other`. (Nothing contains `ENTIRE` in its interior, not even itself.)
+    #[inline]
+    pub fn interior(self, other: Self) -> bool {
+        other.lower < self.lower && self.upper < other.upper
+    }
+
+    /// Whether every member is positive.
+    #[inline]
+    pub fn is_positive(self) -> bool {
+        self.lower > 0.0
+    }
+
+    /// Whether every member is negative.
+    #[inline]
+    pub fn is_negative(self) -> bool {
+        self.upper < 0.0
+    }
+
+    /// Whether nothing is known.
+    #[inline]
+    pub fn is_entire(self) -> bool {
+        self == Self::ENTIRE
+    }
+
+    /// Whether both bounds are finite.
+    #[inline]
+    pub fn is_bounded(self) -> bool {
+        self.lower > f64::NEG_INFINITY && self.upper < f64::INFINITY
+    }
+
+    /// The smallest interval that holds both.
+    #[inline]
+    pub fn hull(self, other: Self) -> Self {
+        Self { lower: self.lower.min(other.lower), upper: self.upper.max(other.upper) }
+    }
+
+    /// What both hold.
+    ///
+    /// # Errors
+    /// [`Error::Disjoint`] if that is nothing.
+    pub fn intersection(self, other: Self) -> Result<Self, Error> {
+        let (lower, upper) = (self.lower.max(other.lower), self.upper.min(other.upper));
+        if lower <= upper { Ok(Self { lower, upper }) } else { Err(Error::Disjoint(self, other)) }
+    }
+
+    /// The exact square's enclosure: never negative.
+    #[inline]
+    fn square(self) -> Self {
+        if self.is_entire() {
+            return Self::ENTIRE;
+        }
+        let (near, far) = (self.mignitude(), self.magnitude());
+        Self { lower: mul_down(near, near), upper: mul_up(far, far) }
+    }
+
+    /// From the bounds of an increasing function, given by enclosures of its values at the ends.
+    fn increasing(self, f: impl Fn(f64) -> Interval) -> Self {
+        if self.is_entire() {
+            return Self::ENTIRE;
+        }
+        let (low, high) = (f(self.lower), f(self.upper));
+        Self { lower: low.lower, upper: high.upper }
+    }
+
+    /// sin(self + quarters pi/2).
+    fn sine(self, quarters: f64) -> Self {
+        if self.is_entire() {
+            return Self::ENTIRE;
+        }
+        // Beyond this the reduction keeps too few digits to tell one wave from the next.
+        if self.magnitude() > 1e9 || self.width() >= 6.5 {
+            return Self::UNIT;
+        }
+        // In quarter waves: maxima at 1 + 4 k, minima at 3 + 4 k. Floors differ if an extremum may lie between the ends.
+        let quarter = Ball::HALF_PI.interval();
+        let place = |x: f64| Self::from_f64(x) / quarter + Self::from_f64(quarters);
+        let (from, to) = (place(self.lower).lower, place(self.upper).upper);
+        let holds = |at: f64| ((to - at) * 0.25).floor() != ((from - at) * 0.25).floor();
+        let value = |x: f64| Ball::from_f64(x).sine(quarters as i64).interval();
+        let ends = value(self.lower).hull(value(self.upper));
+        // A floor is reached exactly at an extremum: the neighbouring case is included by rounding outward first.
+        Self {
+            lower: if holds(3.0) { -1.0 } else { ends.lower.max(-1.0) },
+            upper: if holds(1.0) { 1.0 } else { ends.upper.min(1.0) },
+        }
+    }
+}
+
+impl std::fmt::Debug for Interval {
+    /// The bounds, in the shortest digits that read back as the same numbers.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "[{:?}, {:?}]", self.lower, self.upper)
+    }
+}
+
+impl Add for Interval {
+    type Output = Self;
+    #[inline]
+    fn add(self, other: Self) -> Self {
+        Self { lower: add_down(self.lower, other.lower), upper: add_up(self.upper, other.upper) }
+    }
+}
+
+impl Sub for Interval {
+    type Output = Self;
+    #[inline]
+    fn sub(self, other: Self) -> Self {
+        self + -other
+    }
+}
+
+impl Neg for Interval {
+    type Output = Self;
+    #[inline]
+    fn neg(self) -> Self {
+        Self { lower: -self.upper, upper: -self.lower }
+    }
+}
+
+impl Mul for Interval {
+    type Output = Self;
+    #[inline]
+    fn mul(self, other: Self) -> Self {
+        let (a, b) = (self, other);
+        if a.is_entire() || b.is_entire() {
+            return Self::ENTIRE;
+        }
+        let (lower, upper) = if a.lower >= 0.0 {
+            if b.lower >= 0.0 {
+                (mul_down(a.lower, b.lower), mul_up(a.upper, b.upper))
+            } else if b.upper <= 0.0 {
+                (mul_down(a.upper, b.lower), mul_up(a.lower, b.upper))
+            } else {
+                (mul_down(a.upper, b.lower), mul_up(a.upper, b.upper))
+            }
+        } else if a.upper <= 0.0 {
+            if b.lower >= 0.0 {
+                (mul_down(a.lower, b.upper), mul_up(a.upper, b.lower))
+            } else if b.upper <= 0.0 {
+                (mul_down(a.upper, b.upper), mul_up(a.lower, b.lower))
+            } else {
+                (mul_down(a.lower, b.upper), mul_up(a.lower, b.lower))
+            }
+        } else if b.lower >= 0.0 {
+            (mul_down(a.lower, b.upper), mul_up(a.upper, b.upper))
+        } else if b.upper <= 0.0 {
+            (mul_down(a.upper, b.lower), mul_up(a.lower, b.lower))
+        } else {
+            (
+                mul_down(a.lower, b.upper).min(mul_down(a.upper, b.lower)),
+                mul_up(a.lower, b.lower).max(mul_up(a.upper, b.upper)),
+            )
+        };
+        Self { lower, upper }
+    }
+}
+
+impl Div for Interval {
+    type Output = Self;
+    #[inline]
+    fn div(self, other: Self) -> Self {
+        let (a, b) = (self, other);
+        if a.is_entire() || b.contains(0.0) {
+            return Self::ENTIRE;
+        }
+        if b.upper < 0.0 {
+            return -a / -b;
+        }
+        // The numerator's end, and the end of the positive denominator that makes the quotient extreme.
+        let lower = div_down(a.lower, if a.lower >= 0.0 { b.upper } else { b.lower });
+        let upper = div_up(a.upper, if a.upper <= 0.0 { b.upper } else { b.lower });
+        Self { lower, upper }
+    }
+}
+
+impl AddAssign for Interval {
+    #[inline]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl SubAssign for Interval {
+    #[inline]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}
+
+impl Arithmetic for Interval {
+    /// The set {value}; `ENTIRE` if `value` is not finite.
+    #[inline]
+    fn from_f64(value: f64) -> Self {
+        Self::ordered(value, value)
+    }
+    #[inline]
+    fn squared(self) -> Self {
+        self.square()
+    }
+}
+
+impl Elementary for Interval {
+    fn tanh(self) -> Self {
+        self.increasing(|x| match x.is_infinite() {
+            true => Self::from_f64(x.signum()),
+            false => Ball::from_f64(x).tanh().interval().intersection(Self::UNIT).unwrap_or(Self::UNIT),
+        })
+    }
+    fn sech_squared(self) -> Option<Self> {
+        if self.is_entire() {
+            return Some(Self::ENTIRE);
+        }
+        // Decreasing in |x|.
+        let at = |x: f64| match x.is_infinite() {
+            true => Self::zero(),
+            false => Ball::from_f64(x).sech_squared_ball().interval(),
+        };
+        let (least, most) = (at(self.magnitude()), at(self.mignitude()));
+        Some(Self { lower: least.lower.max(0.0), upper: most.upper.min(1.0) })
+    }
+    fn exp(self) -> Self {
+        self.increasing(|x| {
+            let e = Ball::from_f64(x).exp().interval();
+            if x == f64::NEG_INFINITY {
+                Self::zero()
+            } else if e.is_entire() {
+                // Beyond the range of the extended numbers.
+                Self { lower: if x > 0.0 { 1e300 } else { 0.0 }, upper: if x > 0.0 { f64::INFINITY } else { 1e-250 } }
+            } else {
+                Self { lower: e.lower.max(0.0), upper: e.upper }
+            }
+        })
+    }
+    fn sin(self) -> Self {
+        self.sine(0.0)
+    }
+    fn cos(self) -> Self {
+        self.sine(1.0)
+    }
+    fn sqrt(self) -> Self {
+        if self.lower < 0.0 {
+            return Self::ENTIRE;
+        }
+        let upper = if self.upper.is_infinite() { self.upper } else { sqrt_bounds(self.upper).1 };
+        Self { lower: sqrt_bounds(self.lower).0, upper }
+    }
+    fn ln(self) -> Self {
+        if self.lower <= 0.0 {
+            return Self::ENTIRE;
+        }
+        self.increasing(|x| match x.is_infinite() {
+            true => Self { lower: 709.0, upper: f64::INFINITY },
+            false => Ball::from_f64(x).ln().interval(),
+        })
+    }
+    fn atan(self) -> Self {
+        self.increasing(|x| match x.is_infinite() {
+            true => Ball::HALF_PI.interval() * Self::from_f64(x.signum()),
+            false => Ball::from_f64(x).atan().interval(),
+        })
+    }
+    fn erf(self) -> Self {
+        self.increasing(|x| match x.is_infinite() {
+            true => Self::from_f64(x.signum()),
+            false => Ball::from_f64(x).erf().interval().intersection(Self::UNIT).unwrap_or(Self::UNIT),
+        })
+    }
+    fn pi() -> Self {
+        Ball::pi().interval()
+    }
+    /// `ENTIRE` if the interval holds numbers of both signs: the sign is not smooth there, and an enclosure by [-1, 1] would
+    /// let a series through that does not exist.
+    fn sign(self) -> Self {
+        if self.lower >= 0.0 {
+            Self::one()
+        } else if self.upper < 0.0 {
+            -Self::one()
+        } else {
+            Self::ENTIRE
+        }
+    }
+}
+
+impl FromDecimal for Interval {
+    /// The best enclosure of a decimal number of up to 17 digits, a very tight one of longer ones.
+    fn from_decimal(number: &Decimal) -> Self {
+        let value = number.value();
+        if *number != Decimal::from(value) {
+            let near = Self::ordered(value.next_down(), value.next_up());
+            return Ball::from_decimal(number).interval().intersection(near).unwrap_or(near);
+        }
+        match side(value) {
+            Side::Exact => Self::from_f64(value),
+            Side::Above => Self::ordered(value, value.next_up()),
+            Side::Below => Self::ordered(value.next_down(), value),
+            Side::Near => Self::ordered(value.next_down(), value.next_up()),
+        }
+    }
+}
+
+/// Where the shortest decimal number that reads as an `f64` lies. It is never farther away than half the spacing to the next.
+enum Side {
+    Exact,
+    Above,
+    Below,
+    /// Within half a spacing; on which side is not known (numbers beyond 1e-22 ... 1e15).
+    Near,
+}
+
+fn side(value: f64) -> Side {
+    if !value.is_finite() {
+        return Side::Near;
+    }
+    if value == 0.0 {
+        return Side::Exact;
+    }
+    let (digits, exponent) = shortest_decimal(value);
+    if exponent >= 0 && value.abs() < 9e15 {
+        return Side::Exact; // an integer below 2^53
+    }
+    if !(-22..0).contains(&exponent) {
+        return Side::Near;
+    }
+    // 10^22 is the largest power of ten that an f64 holds; all up to it are exact.
+    let power = (0..-exponent).fold(1.0_f64, |p, _| p * 10.0);
+    // |value| 10^k = p + e exactly; digits = high + low exactly. All are far from under- and overflow.
+    let (p, e) = two_product(value.abs(), power);
+    let high = digits as f64;
+    let low = (i128::from(digits) - high as i128) as f64;
+    // p and high are neighbours (or equal): their difference is exact, and the rest is small beside its spacing.
+    let (d, rest) = two_sum(high - p, low);
+    let difference = d + (rest - e);
+    match difference.partial_cmp(&0.0) {
+        Some(std::cmp::Ordering::Equal) => Side::Exact,
+        Some(order) if (order == std::cmp::Ordering::Greater) == (value > 0.0) => Side::Above,
+        _ => Side::Below,
+    }
+}
+
+/// |value| = digits 10^exponent in the shortest digits that read back as the same number (at most 17).
+fn shortest_decimal(value: f64) -> (u64, i32) {
+    // Rust prints them the same on every platform.
+    let text = format!("{:e}", value.abs());
+    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    let mut exponent: i32 = exponent.parse().unwrap_or(0);
+    let mut digits: u64 = 0;
+    let mut after_point = false;
+    for c in mantissa.chars() {
+        if let Some(digit) = c.to_digit(10) {
+            digits = digits * 10 + u64::from(digit);
+            exponent -= i32::from(after_point);
+        } else {
+            after_point |= c == '.';
+        }
+    }
+    (digits, exponent)
+}
+
+impl<S: Arithmetic + FromDecimal, const N: usize> FromDecimal for Dual<S, N> {
+    fn from_decimal(number: &Decimal) -> Self {
+        Self::constant(S::from_decimal(number))
+    }
+}
+
+/// A number that stands for a set of reals: what validated integration computes with.
+///
+/// Two precisions: [`Interval`], and [`Ball`] with about 32 digits. Wide sets (remainders, errors, derivatives) are always
+/// held as [`Interval`]s; only the points that they surround need the precision.
+pub trait Enclosure: Elementary + FromDecimal {
+    /// The set of all numbers in an interval.
+    fn from_interval(interval: Interval) -> Self;
+    /// The set's hull in `f64`, rounded outward.
+    fn interval(self) -> Interval;
+    /// A point c near the middle, as a set of one number, and an enclosure of self - c.
+    fn split(self) -> (Self, Interval);
+}
+
+impl Enclosure for Interval {
+    #[inline]
+    fn from_interval(interval: Interval) -> Self {
+        interval
+    }
+    #[inline]
+    fn interval(self) -> Interval {
+        self
+    }
+    #[inline]
+    fn split(self) -> (Self, Interval) {
+        let c = Self::from_f64(self.midpoint());
+        (c, self - c)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::DoubleDouble;
+
+    fn i(lower: f64, upper: f64) -> Interval {
+        Interval::new(lower, upper).unwrap()
+    }
+
+    #[test]
+    fn bounds_move_only_when_inexact() {
+        assert_eq!(i(1.0, 2.0) + i(0.5, 0.25 + 0.5), i(1.5, 2.75));
+        assert_eq!(i(-3.0, 2.0) * i(5.0, 7.0), i(-21.0, 14.0));
+        assert_eq!(i(1.0, 3.0) / i(2.0, 4.0), i(0.25, 1.5));
+        assert_eq!(i(4.0, 9.0).sqrt(), i(2.0, 3.0));
+        let third = Interval::one() / Interval::from_f64(3.0);
+        assert_eq!(third.lower().next_up(), third.upper());
+        assert!(third.lower() == 1.0 / 3.0 || third.upper() == 1.0 / 3.0);
+        assert_eq!(i(-3.0, 2.0).squared(), i(0.0, 9.0));
+    }
+
+    #[test]
+    fn undefined_is_entire_and_stays_so() {
+        let entire = [
+            Interval::one() / i(-1.0, 1.0),
+            Interval::one() / i(0.0, 1.0),
+            Interval::zero() / Interval::zero(),
+            i(-1.0, 4.0).sqrt(),
+            i(-1.0, 1.0).sign(),
+            Interval::from_f64(f64::NAN),
+            Interval::from_f64(f64::INFINITY),
+            Interval::ENTIRE * Interval::zero(),
+            Interval::ENTIRE.tanh(),
+            Interval::ENTIRE.exp(),
+            Interval::ENTIRE.sin(),
+            Interval::ENTIRE.sqrt(),
+            Interval::ENTIRE.squared(),
+            Interval::ENTIRE.sech_squared().unwrap(),
+        ];
+        for (k, e) in entire.into_iter().enumerate() {
+            assert!(e.is_entire(), "{k}: {e:?}");
+            assert!(!e.interior(Interval::ENTIRE));
+        }
+        assert!(matches!(i(0.0, 1.0).intersection(i(2.0, 3.0)), Err(Error::Disjoint(..))));
+        assert!(Interval::new(1.0, 0.0).is_err() && Interval::new(f64::NAN, 1.0).is_err());
+        assert!(Interval::new(f64::INFINITY, f64::INFINITY).is_err());
+    }
+
+    #[test]
+    fn overflow_keeps_a_finite_lower_bound() {
+        let big = Interval::from_f64(f64::MAX);
+        for sum in [big + big, big * big, big / Interval::from_f64(0.5)] {
+            assert_eq!((sum.lower(), sum.upper()), (f64::MAX, f64::INFINITY));
+        }
+        let tiny = Interval::from_f64(5e-324);
+        assert_eq!(tiny * tiny, i(0.0, 5e-324));
+        assert_eq!(-tiny * tiny, i(-5e-324, 0.0));
+        assert_eq!(Interval::from_f64(1000.0).exp().upper(), f64::INFINITY);
+        assert!(Interval::from_f64(1000.0).exp().lower() >= 1e300);
+        assert_eq!(Interval::from_f64(-1e9).exp().lower(), 0.0);
+    }
+
+    #[test]
+    fn decimals_are_enclosed_on_the_right_side() {
+        let from = |x: f64| Interval::from_decimal(&x.into());
+        // 0.1 lies below the f64 written so, 0.3 above; 1e-3 and 1e-5 as in the paper.
+        assert_eq!(from(0.1), i(0.1_f64.next_down(), 0.1));
+        assert_eq!(from(0.3), i(0.3, 0.3_f64.next_up()));
+        assert_eq!(from(-0.3), i((-0.3_f64).next_down(), -0.3));
+        for exact in [0.0, 0.5, -3.0, 1e15, 0.375, -1024.0] {
+            assert_eq!(from(exact), i(exact, exact));
+        }
+        for near in [1e300, 1e-300, 5e-324, 1e22, 1e23] {
+            assert!(from(near).contains(near));
+        }
+    }
+
+    #[test]
+    fn sine_finds_its_extrema() {
+        use std::f64::consts::PI;
+        assert_eq!(i(1.0, 2.0).sin().upper(), 1.0);
+        assert_eq!(i(4.0, 5.0).sin().lower(), -1.0);
+        assert_eq!(i(-0.1, 0.1).cos().upper(), 1.0);
+        assert_eq!(i(3.0, 3.2).cos().lower(), -1.0);
+        assert!(i(0.1, 1.5).sin().upper() < 1.0 && i(2.0, 4.0).sin().lower() > -1.0);
+        assert_eq!(i(0.0, 7.0).sin(), Interval::UNIT);
+        // Far out nothing is said, however thin the argument; nearer it is.
+        assert_eq!((Interval::from_f64(2e9).sin(), Interval::from_f64(-2e9).cos()), (Interval::UNIT, Interval::UNIT));
+        assert!(Interval::from_f64(9e8).sin().width() < 1e-6);
+        assert!(Interval::from_f64(PI).sin().contains(1.2246467991473532e-16));
+        assert!(Interval::from_f64(PI).sin().width() < 1e-30);
+    }
+
+    #[test]
+    fn the_slope_of_tanh_keeps_its_digits() {
+        // 1 - tanh(30)^2 is 3.5e-26: out of reach of 1 - t^2 in f64.
+        let s = Interval::from_f64(30.0).sech_squared().unwrap();
+        assert!(s.lower() > 0.0 && s.width() < 1e-15 * s.upper(), "{s:?}");
+        assert!(s.contains(3.5026074410400614e-26) || (s.midpoint() / 3.5026e-26 - 1.0).abs() < 1e-4, "{s:?}");
+        assert_eq!(i(-1.0, 2.0).sech_squared().unwrap().upper(), 1.0);
+        assert!(i(-1e300, 1e300).sech_squared().unwrap().lower() >= 0.0);
+    }
+
+    #[test]
+    fn places_sizes_and_sides() {
+        let (up, down) = (i(1.0, f64::INFINITY), i(f64::NEG_INFINITY, 2.0));
+        assert_eq!((i(1.0, 3.0).midpoint(), i(-1.0, 4.0).midpoint(), i(-3.0, -1.0).midpoint()), (2.0, 1.5, -2.0));
+        assert_eq!((up.midpoint(), down.midpoint(), Interval::ENTIRE.midpoint()), (1.0, 2.0, 0.0));
+        assert_eq!((i(1.0, 3.0).width(), i(-3.0, -1.5).width(), up.width()), (2.0, 1.5, f64::INFINITY));
+        assert_eq!((i(-3.0, -1.0).magnitude(), i(-3.0, -1.0).mignitude()), (3.0, 1.0));
+        assert_eq!((i(-1.0, 2.0).magnitude(), i(-1.0, 2.0).mignitude()), (2.0, 0.0));
+        assert!(i(1.0, 3.0).is_bounded() && !up.is_bounded() && !down.is_bounded());
+        for (a, positive, negative) in [
+            (i(1.0, 2.0), true, false),
+            (i(0.0, 1.0), false, false),
+            (i(-1.0, 0.0), false, false),
+            (i(-1.0, 1.0), false, false),
+            (i(-2.0, -1.0), false, true),
+        ] {
+            assert_eq!((a.is_positive(), a.is_negative()), (positive, negative), "{a:?}");
+        }
+        for (other, subset, interior) in [
+            (i(0.0, 4.0), true, true),
+            (i(1.0, 4.0), true, false),
+            (i(0.0, 3.0), true, false),
+            (i(1.0, 3.0), true, false),
+            (i(2.0, 4.0), false, false),
+            (i(0.0, 2.0), false, false),
+        ] {
+            assert_eq!((i(1.0, 3.0).subset(other), i(1.0, 3.0).interior(other)), (subset, interior), "{other:?}");
+        }
+        assert_eq!(format!("{:?}", i(-0.5, 1.0)), "[-0.5, 1.0]");
+        let (c, rest) = i(1.0, 4.0).split();
+        assert_eq!((c, rest), (i(2.5, 2.5), i(-1.5, 1.5)));
+    }
+
+    /// Sums, products and quotients of whole numbers: exactly the extremes over the ends.
+    #[test]
+    fn every_case_of_signs() {
+        let ends: Vec<Interval> = (-3..=3).flat_map(|a| (a..=3).map(move |b| i(f64::from(a), f64::from(b)))).collect();
+        for a in &ends {
+            for b in &ends {
+                let all = |f: fn(f64, f64) -> f64| {
+                    let v = [f(a.lower, b.lower), f(a.lower, b.upper), f(a.upper, b.lower), f(a.upper, b.upper)];
+                    i(v.into_iter().fold(f64::INFINITY, f64::min), v.into_iter().fold(f64::NEG_INFINITY, f64::max))
+                };
+                assert_eq!(*a * *b, all(|x, y| x * y), "{a:?} times {b:?}");
+                assert_eq!(*a - *b, all(|x, y| x - y), "{a:?} minus {b:?}");
+                let (mut sum, mut difference) = (*a, *a);
+                sum += *b;
+                difference -= *b;
+                assert_eq!((sum, difference), (*a + *b, *a - *b));
+                // Halves are exact, thirds are between neighbours.
+                let quotient = *a / *b;
+                if b.contains(0.0) {
+                    assert!(quotient.is_entire());
+                } else {
+                    let near = all(|x, y| x / y);
+                    let tight = |bound: f64, rounded: f64, out: f64| bound == rounded || bound == out;
+                    assert!(tight(quotient.lower, near.lower, near.lower.next_down()), "{a:?} by {b:?}: {quotient:?}");
+                    assert!(tight(quotient.upper, near.upper, near.upper.next_up()), "{a:?} by {b:?}: {quotient:?}");
+                    let back = quotient * *b;
+                    assert!(a.subset(back), "{a:?} by {b:?}, and back: {back:?}");
+                }
+            }
+        }
+        let (one, three) = (Interval::one(), Interval::from_f64(3.0));
+        assert_eq!(one / three, i(1.0 / 3.0, (1.0_f64 / 3.0).next_up()));
+        assert_eq!((one + one) / three, i(2.0 / 3.0, (2.0_f64 / 3.0).next_up()));
+        assert_eq!(-one / three, i((-1.0_f64 / 3.0).next_down(), -1.0 / 3.0));
+        assert_eq!(i(-2.0, -1.0).sign(), -one);
+        assert_eq!((i(0.0, 1.0).sign(), i(1.0, 2.0).sign()), (one, one));
+        assert!(i(-1.0, 0.0).sign().is_entire());
+        assert!(i(0.0, 1.0).ln().is_entire() && i(0.0, 4.0).sqrt() == i(0.0, 2.0));
+    }
+
+    /// 0.1 + 0.2 and its like: the bounds are the neighbours of the exact sum, product and root.
+    #[test]
+    fn rounded_bounds_enclose_and_are_neighbours() {
+        let point = Interval::from_f64;
+        for (a, b) in
+            [(0.1, 0.2), (0.1, 0.7), (1.0, 1e-20), (1.0, -1e-20), (-0.1, -0.2), (-0.1, 0.7), (3.3, -1e10), (1e10, 0.3)]
+        {
+            let sum = point(a) + point(b);
+            let exact = DoubleDouble::from_f64(a) + DoubleDouble::from_f64(b);
+            assert!(
+                DoubleDouble::from_f64(sum.lower) <= exact && exact <= DoubleDouble::from_f64(sum.upper),
+                "{a} {b}"
+            );
+            assert_eq!(sum.lower.next_up(), sum.upper, "{a} + {b}");
+            let product = point(a) * point(b);
+            let exact = DoubleDouble::from_f64(a) * DoubleDouble::from_f64(b);
+            assert!(DoubleDouble::from_f64(product.lower) <= exact && exact <= DoubleDouble::from_f64(product.upper));
+            assert!(product.lower == product.upper || product.lower.next_up() == product.upper, "{a} * {b}");
+        }
+        for x in [2.0, 3.0, 0.1, 7.7, 1e10, 0.7] {
+            let root = point(x).sqrt();
+            let square = |r: f64| DoubleDouble::from_f64(r) * DoubleDouble::from_f64(r);
+            assert!(
+                square(root.lower) <= DoubleDouble::from_f64(x) && DoubleDouble::from_f64(x) <= square(root.upper),
+                "{x}"
+            );
+            assert!(root.lower == root.upper || root.lower.next_up() == root.upper, "root of {x}: {root:?}");
+        }
+    }
+
+    /// At points: the double-double value is inside, and the bounds are not far.
+    #[test]
+    fn functions_enclose_tightly() {
+        type Function = (fn(Interval) -> Interval, fn(DoubleDouble) -> DoubleDouble);
+        let functions: [Function; 8] = [
+            (Elementary::tanh, Elementary::tanh),
+            (Elementary::exp, Elementary::exp),
+            (Elementary::sin, Elementary::sin),
+            (Elementary::cos, Elementary::cos),
+            (Elementary::atan, Elementary::atan),
+            (Elementary::erf, Elementary::erf),
+            (|v| v.squared().sqrt(), Elementary::abs),
+            (|v| v.squared().ln(), |v| (v * v).ln()),
+        ];
+        for x in [1e-70, 1e-20, 1e-3, 0.1, 0.3, 0.9, 2.5, 10.0, 36.0, 310.0] {
+            for x in [x, -x] {
+                for (n, (f, extended)) in functions.iter().enumerate() {
+                    let (got, exact) = (f(Interval::from_f64(x)), extended(DoubleDouble::from_f64(x)));
+                    let wide = |v: f64, by: f64| v + by * 1e-29 * v.abs();
+                    let inside = got.lower <= wide(exact.high(), 1.0).next_up()
+                        && got.upper >= wide(exact.high(), -1.0).next_down();
+                    assert!(inside, "function {n} at {x}: {got:?} without {exact:?}");
+                    assert!(
+                        got.width() <= 4.0 * f64::EPSILON * got.magnitude() + 1e-250,
+                        "function {n} at {x}: {got:?}"
+                    );
+                }
+            }
+        }
+        let (most, least) = (i(-f64::MAX, f64::INFINITY), i(f64::NEG_INFINITY, 0.0));
+        assert_eq!((most.tanh(), most.erf(), least.exp().lower), (Interval::UNIT, Interval::UNIT, 0.0));
+        assert_eq!(most.atan().upper, std::f64::consts::FRAC_PI_2.next_up());
+        let log = i(1.0, f64::INFINITY).ln();
+        assert!(log.lower <= 0.0 && log.lower > -1e-29 && log.upper == f64::INFINITY, "{log:?}");
+        assert_eq!(i(1.0, f64::INFINITY).sqrt(), i(1.0, f64::INFINITY));
+        let slope = Dual::<Interval, 1>::variable(Interval::from_f64(0.5), 0).sech_squared().unwrap();
+        let (t, want) = (0.46211715726000973, -0.726_862);
+        assert!(slope.value.contains(1.0 - t * t) || (slope.value.midpoint() - (1.0 - t * t)).abs() < 1e-15);
+        assert!((slope.partials[0].midpoint() - want).abs() < 1e-5, "-2 t (1 - t^2): {:?}", slope.partials[0]);
+    }
+}

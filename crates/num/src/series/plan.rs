@@ -1,0 +1,736 @@
+//! The work of the degrees from 1 on, made lean once an equation.
+//!
+//! A recurrence says how all coefficients of a series come about. From degree 1 on, much of that is idle: a constant summand has no say any more, sums and
+//! products of what is constant are zero, a product with what is constant is a scaling. A [`Plan`] is a list of instructions without that, in which a
+//! number goes from one instruction to the next without a way through memory. Where `tanh` is saturated, its series is constant too; there
+//! is a plan for every set of saturated ones that occurs.
+//!
+//! Nothing is reassociated: every coefficient has the bits that its recurrence gives it (if all are finite; an overflow in a series that drops out of the equation,
+//! as in (1 + a) - (2 + a), drops out with it).
+
+use std::any::Any;
+
+use super::compiled::Compiled;
+use super::table::Table;
+use super::{LayerKind, Mark, Recurrence, Series, Weights};
+use crate::Elementary;
+
+/// What one instruction does at degree k >= 1. The number at hand is the result of the instruction before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Action<S> {
+    /// Zero.
+    Clear,
+    Copy(Series),
+    /// The number at hand.
+    Keep,
+    Neg(Series),
+    NegThis,
+    /// -(a c). As with all that follow which do two things, what lies between has no series of its own.
+    NegScale(Series, S),
+    /// -a - b.
+    NegLess(Series, Series),
+    Add(Series, Series),
+    /// The number at hand + a.
+    ThisPlus(Series),
+    PlusThis(Series),
+    Sub(Series, Series),
+    ThisLess(Series),
+    LessThis(Series),
+    Scale(Series, S),
+    ScaleThis(S),
+    /// a + b c.
+    PlusScale(Series, Series, S),
+    /// a - b c.
+    LessScale(Series, Series, S),
+    Over(Series, S),
+    ThisOver(S),
+    Mul(Series, Series),
+    /// a + b c.
+    PlusMul(Series, Series, Series),
+    /// a - b c.
+    LessMul(Series, Series, Series),
+    /// a b + c.
+    MulPlus(Series, Series, Series),
+    /// a b - c.
+    MulLess(Series, Series, Series),
+    Square(Series),
+    /// a + b^2.
+    PlusSquare(Series, Series),
+    /// a^2 + b^2.
+    Squares(Series, Series),
+    /// (a^2 + b^2) + c^2.
+    ThreeSquares(Series, Series, Series),
+    /// Product of a constant series, the first, with another.
+    Lift(Series, Series),
+    LiftThis(Series),
+    /// A series and the product of a constant series, the second, with another.
+    PlusLift(Series, Series, Series),
+    PlusLiftThis(Series, Series),
+    Div(Series, Series),
+    /// Of the first series, whose weights are the second.
+    Exp(Series, Weights),
+    /// Its weights are the series after it.
+    Ln(Series),
+    Sqrt(Series),
+    /// tanh, and its slope, the series after it.
+    Tanh(Series, Weights),
+    /// Of the number at hand.
+    TanhThis(Weights),
+    /// Sine, and cosine, the series after it.
+    Sin(Series, Weights),
+    /// The series before it is 1 + a^2, its weights are the series after it.
+    Atan(Series),
+    /// The series before it is the argument's slope.
+    Erf(Series, Weights),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Instruction<S> {
+    pub action: Action<S>,
+    /// The series that the result belongs to.
+    pub to: Series,
+}
+
+impl<S: Elementary> Instruction<S> {
+    /// The number in it; zero if there is none.
+    pub fn number(&self) -> S {
+        match self.action {
+            Action::NegScale(_, c)
+            | Action::Scale(_, c)
+            | Action::ScaleThis(c)
+            | Action::PlusScale(_, _, c)
+            | Action::LessScale(_, _, c)
+            | Action::Over(_, c)
+            | Action::ThisOver(c) => c,
+            _ => S::zero(),
+        }
+    }
+}
+
+/// Coefficient k of a^2, each product once.
+#[inline(always)]
+pub(super) fn square<S: Elementary>(table: &impl Table<S>, a: Series) -> S {
+    let k = table.degree();
+    let mut sum = table.products(a, a, 0, k.div_ceil(2));
+    sum += sum;
+    if k.is_multiple_of(2) {
+        sum += table.get(a, k / 2).squared();
+    }
+    sum
+}
+
+/// Coefficient k of a b.
+#[inline(always)]
+fn product<S: Elementary>(table: &impl Table<S>, a: Series, b: Series) -> S {
+    table.products(a, b, 0, table.degree() + 1)
+}
+
+/// Coefficient k of the integral of a' b, from the weights j a_j.
+#[inline(always)]
+fn integral<S: Elementary>(table: &impl Table<S>, weights: Weights, b: Series) -> S {
+    let k = table.degree();
+    table.products(weights, b, 1, k + 1).over(k as f64)
+}
+
+/// The coefficients of degree 0, from those of the state, and those of degree 1 of the state. Returns which tanh are saturated, a bit each.
+#[inline(always)]
+pub(super) fn start<S: Elementary>(equation: &Equation<S>, table: &mut impl Table<S>) -> u64 {
+    let mut saturated = Saturated::default();
+    for (i, recurrence) in equation.recurrences.iter().enumerate() {
+        begin(recurrence, equation.dimension + i, table, &mut saturated);
+    }
+    for (i, output) in equation.outputs.iter().enumerate() {
+        table.set_next(i, table.get(*output, 0).over(1.0));
+    }
+    saturated.bits
+}
+
+/// Which tanh of an equation are saturated, as far as they have been computed.
+#[derive(Default)]
+pub(super) struct Saturated {
+    /// A bit each.
+    pub bits: u64,
+    count: u32,
+}
+
+/// The coefficient of degree 0 of one series, those of its arguments being known.
+#[inline(always)]
+pub(super) fn begin<S: Elementary>(
+    recurrence: &Recurrence<S>,
+    to: Series,
+    table: &mut impl Table<S>,
+    saturated: &mut Saturated,
+) {
+    let value = start_of(recurrence, |series| table.get(series, 0));
+    if matches!(recurrence, Recurrence::TanhSlope(..)) && S::EXACT_ZEROS {
+        saturated.bits |= u64::from(value == S::zero()) << saturated.count;
+        saturated.count += 1;
+    }
+    table.set(to, value);
+}
+
+/// What it is, its arguments being `at` hand.
+#[inline(always)]
+pub(super) fn start_of<S: Elementary>(recurrence: &Recurrence<S>, at: impl Fn(Series) -> S) -> S {
+    match *recurrence {
+        Recurrence::Constant(c) => c,
+        Recurrence::Add(a, b) => at(a) + at(b),
+        Recurrence::Sub(a, b) => at(a) - at(b),
+        Recurrence::Neg(a) => -at(a),
+        Recurrence::Shift(a, c) => at(a) + c,
+        Recurrence::Minus(a, c) => c - at(a),
+        Recurrence::Scale(a, c) => at(a) * c,
+        Recurrence::Over(a, c) => at(a) / c,
+        Recurrence::Mul(a, b) if a == b => S::zero() + S::zero() + at(a).squared(),
+        Recurrence::Mul(a, b) => S::sum_of_products(&[at(a)], &[at(b)]),
+        Recurrence::Div(a, b) => (at(a) - S::zero()) / at(b),
+        Recurrence::Weighted(_) => S::zero(),
+        Recurrence::Exp(a, _) => at(a).exp(),
+        Recurrence::Ln(a) => at(a).ln(),
+        Recurrence::Sqrt(a) => at(a).sqrt(),
+        Recurrence::Sign(a) => at(a).sign(),
+        Recurrence::Tanh(a, _) => at(a).tanh(),
+        // As (1 - u)(1 + u): exactly zero where tanh is saturated, and accurate near it.
+        Recurrence::TanhSlope(u, a) => at(a).sech_squared().unwrap_or_else(|| (S::one() - at(u)) * (S::one() + at(u))),
+        Recurrence::Sin(a, _) => at(a).sin(),
+        Recurrence::Cos(a, _) => at(a).cos(),
+        Recurrence::OnePlusSquare(a) => S::one() + at(a).squared(),
+        Recurrence::Atan(a) => at(a).atan(),
+        Recurrence::Erf(a, _) => at(a).erf(),
+    }
+}
+
+/// Carries the instructions out at one degree.
+#[inline(always)]
+pub(super) fn advance<S: Elementary, T: Table<S>>(plan: &Plan<S>, table: &mut T) {
+    let mut this = S::zero();
+    for &instruction in &plan.instructions {
+        this = carry_out(instruction, this, table);
+    }
+    let next = (table.degree() + 1) as f64;
+    for (i, derivative) in plan.derivatives.iter().enumerate() {
+        table.set_next(i, table.at(*derivative).over(next));
+    }
+}
+
+/// Carries one instruction out, `this` being the number at hand. Returns the next.
+#[inline(always)]
+pub(super) fn carry_out<S: Elementary, T: Table<S>>(instruction: Instruction<S>, this: S, table: &mut T) -> S {
+    let Instruction { action, to } = instruction;
+    let k = table.degree();
+    let degree = k as f64;
+    let this = match action {
+        Action::Clear => S::zero(),
+        Action::Copy(a) => table.at(a),
+        Action::Keep => this,
+        Action::Neg(a) => -table.at(a),
+        Action::NegThis => -this,
+        Action::NegScale(a, c) => -(table.at(a) * c),
+        Action::NegLess(a, b) => -table.at(a) - table.at(b),
+        Action::Add(a, b) => table.at(a) + table.at(b),
+        Action::ThisPlus(a) => this + table.at(a),
+        Action::PlusThis(a) => table.at(a) + this,
+        Action::Sub(a, b) => table.at(a) - table.at(b),
+        Action::ThisLess(a) => this - table.at(a),
+        Action::LessThis(a) => table.at(a) - this,
+        Action::Scale(a, c) => table.at(a) * c,
+        Action::ScaleThis(c) => this * c,
+        Action::PlusScale(a, b, c) => table.at(a) + table.at(b) * c,
+        Action::LessScale(a, b, c) => table.at(a) - table.at(b) * c,
+        Action::Over(a, c) => table.at(a) / c,
+        Action::ThisOver(c) => this / c,
+        Action::Mul(a, b) => product(table, a, b),
+        Action::PlusMul(a, b, c) => table.at(a) + product(table, b, c),
+        Action::LessMul(a, b, c) => table.at(a) - product(table, b, c),
+        Action::MulPlus(a, b, c) => product(table, a, b) + table.at(c),
+        Action::MulLess(a, b, c) => product(table, a, b) - table.at(c),
+        Action::Square(a) => square(table, a),
+        Action::PlusSquare(a, b) => table.at(a) + square(table, b),
+        Action::Squares(a, b) => square(table, a) + square(table, b),
+        Action::ThreeSquares(a, b, c) => (square(table, a) + square(table, b)) + square(table, c),
+        Action::Lift(c, a) => lifted(table.get(c, 0), table.at(a)),
+        Action::PlusLift(a, c, b) => table.at(a) + lifted(table.get(c, 0), table.at(b)),
+        Action::LiftThis(c) => lifted(table.get(c, 0), this),
+        Action::PlusLiftThis(a, c) => table.at(a) + lifted(table.get(c, 0), this),
+        Action::Div(a, b) => (table.at(a) - table.products(b, to, 1, k + 1)) / table.get(b, 0),
+        Action::Exp(a, weights) => {
+            table.set(weights, table.at(a).scale(degree));
+            integral(table, weights, to)
+        }
+        Action::Ln(a) => {
+            // The sum lacks exactly the term of the coefficient asked for.
+            table.set(to + 1, S::zero());
+            let u = (table.at(a) - integral(table, to + 1, a)) / table.get(a, 0);
+            table.set(to + 1, u.scale(degree));
+            u
+        }
+        Action::Sqrt(a) => {
+            // The square's coefficient lacks exactly 2 r_0 r_k.
+            table.set(to, S::zero());
+            (table.at(a) - square(table, to)) / table.get(to, 0).scale(2.0)
+        }
+        Action::Tanh(a, weights) => {
+            let a = table.at(a);
+            tanh(table, a, weights, to)
+        }
+        Action::TanhThis(weights) => tanh(table, this, weights, to),
+        Action::Sin(a, weights) => {
+            table.set(weights, table.at(a).scale(degree));
+            let cosine = -integral(table, weights, to);
+            let sine = integral(table, weights, to + 1);
+            table.set(to + 1, cosine);
+            sine
+        }
+        Action::Atan(a) => {
+            table.set(to + 1, S::zero());
+            let u = (table.at(a) - integral(table, to + 1, to - 1)) / table.get(to - 1, 0);
+            table.set(to + 1, u.scale(degree));
+            u
+        }
+        Action::Erf(a, weights) => {
+            table.set(weights, table.at(a).scale(degree));
+            integral(table, weights, to - 1)
+        }
+    };
+    table.set(to, this);
+    this
+}
+
+/// A constant times a coefficient, as the only term of a product's sum.
+#[inline(always)]
+fn lifted<S: Elementary>(constant: S, coefficient: S) -> S {
+    S::sum_of_products(&[constant], &[coefficient])
+}
+
+/// u = tanh a and its slope: u' = a' (1 - u^2).
+#[inline(always)]
+fn tanh<S: Elementary>(table: &mut impl Table<S>, a: S, weights: Weights, to: Series) -> S {
+    table.set(weights, a.scale(table.degree() as f64));
+    let u = integral(table, weights, to + 1);
+    table.set(to, u);
+    table.set(to + 1, -square(table, to));
+    u
+}
+
+/// What the coefficients of a series are from degree 1 on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Tail {
+    /// Computed.
+    Own,
+    /// Those of a series that is computed.
+    Same(Series),
+    /// Positive zero.
+    Zero,
+}
+
+/// An equation as recurrences, for [`Plan::new`].
+pub(super) struct Equation<'a, S> {
+    pub dimension: usize,
+    pub recurrences: &'a [Recurrence<S>],
+    /// The series of the components' derivatives.
+    pub outputs: &'a [Series],
+    /// Series that others will read.
+    pub layer_arguments: &'a [(LayerKind, Series)],
+    pub marks: &'a [Mark],
+}
+
+/// See the [module](self).
+#[derive(Clone, Debug)]
+pub(super) struct Plan<S> {
+    /// Which `tanh` are saturated, one bit each, in the order of their recurrences.
+    pub saturated: u64,
+    instructions: Vec<Instruction<S>>,
+    /// Where the coefficients of the components' derivatives are.
+    derivatives: Vec<Series>,
+    /// The same compiled, if that is so.
+    pub compiled: Option<Compiled>,
+}
+
+impl<S: Elementary> Plan<S> {
+    /// The plan for an equation with these `tanh` saturated.
+    pub fn new(equation: &Equation<S>, saturated: u64) -> Self {
+        let tails = Tails::new(equation, saturated);
+        let mut planner = Planner { equation, tails: &tails, instructions: Vec::new(), at_hand: None };
+        planner.clear();
+        for (i, recurrence) in equation.recurrences.iter().enumerate() {
+            let this = equation.dimension + i;
+            if tails.uses[this] > 0 {
+                match tails.of[this] {
+                    Tail::Own => planner.compute(*recurrence, this),
+                    Tail::Same(a) => planner.copy(a, this),
+                    // Zero from the start.
+                    Tail::Zero => {}
+                }
+            }
+        }
+        let derivatives: Vec<_> = equation.outputs.iter().map(|output| tails.place(*output)).collect();
+        let instructions = planner.instructions;
+        let compiled = (&instructions as &dyn Any)
+            .downcast_ref::<Vec<Instruction<f64>>>()
+            .and_then(|instructions| Compiled::of(instructions, &derivatives));
+        Self { saturated, instructions, derivatives, compiled }
+    }
+}
+
+/// What is known of all series before anything is computed.
+struct Tails {
+    of: Vec<Tail>,
+    /// Whether coefficients from degree 1 on are sums that began with zero, which are never negative zeros.
+    sums: Vec<bool>,
+    /// By how many the coefficients are read where they belong.
+    uses: Vec<usize>,
+}
+
+impl Tails {
+    fn new<S: Elementary>(equation: &Equation<S>, saturated: u64) -> Self {
+        let states = equation.dimension;
+        let count = states + equation.recurrences.len();
+        let mut tails = Self { of: vec![Tail::Own; states], sums: vec![false; states], uses: vec![0; count] };
+        let mut tanh = 0;
+        for recurrence in equation.recurrences {
+            let flat = match recurrence {
+                Recurrence::Tanh(..) => {
+                    tanh += 1;
+                    tanh <= u64::BITS && saturated >> (tanh - 1) & 1 == 1
+                }
+                _ => false,
+            };
+            let tail = if flat { Tail::Zero } else { tails.tail(recurrence) };
+            let sum = tails.is_sum(recurrence);
+            tails.sums.push(sum);
+            tails.of.push(tail);
+        }
+        tails.count(equation);
+        tails
+    }
+
+    fn is_zero(&self, series: Series) -> bool {
+        self.of[series] == Tail::Zero
+    }
+
+    /// Where coefficients equal to those of a series are, from degree 1 on.
+    fn place(&self, series: Series) -> Series {
+        match self.of[series] {
+            Tail::Same(other) => other,
+            Tail::Own | Tail::Zero => series,
+        }
+    }
+
+    /// The tail of a series that has another's.
+    fn same(&self, a: Series) -> Tail {
+        match self.of[a] {
+            Tail::Own => Tail::Same(a),
+            known => known,
+        }
+    }
+
+    fn tail<S: Elementary>(&self, recurrence: &Recurrence<S>) -> Tail {
+        match *recurrence {
+            Recurrence::Shift(a, _) => return self.same(a),
+            Recurrence::Constant(_) | Recurrence::Sign(_) => return Tail::Zero,
+            _ => {}
+        }
+        if !S::EXACT_ZEROS {
+            return Tail::Own;
+        }
+        // Positive and finite.
+        let keeps_zero = |c: S| c != S::zero() && c * S::zero() == S::zero() && c.sign() == S::one();
+        match *recurrence {
+            Recurrence::Add(a, b) if self.is_zero(b) && (self.is_zero(a) || self.sums[a]) => self.same(a),
+            Recurrence::Add(a, b) if self.is_zero(a) && self.sums[b] => self.same(b),
+            Recurrence::Sub(a, b) if self.is_zero(b) => self.same(a),
+            Recurrence::Sub(a, b) if self.place(a) == self.place(b) => Tail::Zero,
+            Recurrence::Scale(a, c) | Recurrence::Over(a, c) if self.is_zero(a) && keeps_zero(c) => Tail::Zero,
+            Recurrence::Mul(a, b) if self.is_zero(a) && self.is_zero(b) => Tail::Zero,
+            Recurrence::Exp(a, _) | Recurrence::Tanh(a, _) if self.is_zero(a) => Tail::Zero,
+            _ => Tail::Own,
+        }
+    }
+
+    fn is_sum<S>(&self, recurrence: &Recurrence<S>) -> bool {
+        match *recurrence {
+            Recurrence::Mul(..) => true,
+            Recurrence::Add(a, b) => self.sums[a] || self.sums[b],
+            Recurrence::Shift(a, _) => self.sums[a],
+            _ => false,
+        }
+    }
+
+    /// Finds out what is read, from the end to the beginning: what nobody reads, reads nothing.
+    fn count<S: Elementary>(&mut self, equation: &Equation<S>) {
+        for output in equation.outputs {
+            self.read(self.place(*output));
+        }
+        for (_, series) in equation.layer_arguments {
+            self.read(*series);
+        }
+        for mark in equation.marks {
+            self.read(mark.argument);
+        }
+        for (i, recurrence) in equation.recurrences.iter().enumerate().rev() {
+            let this = equation.dimension + i;
+            if self.uses[this] > 0 {
+                match self.of[this] {
+                    Tail::Own => self.count_arguments(recurrence, this),
+                    Tail::Same(a) => self.read(a),
+                    Tail::Zero => {}
+                }
+            }
+        }
+    }
+
+    fn read(&mut self, series: Series) {
+        self.uses[series] += 1;
+    }
+
+    /// Only coefficients of the same degree are read wherever they are.
+    fn count_arguments<S: Elementary>(&mut self, recurrence: &Recurrence<S>, this: Series) {
+        match *recurrence {
+            Recurrence::Mul(a, b) if S::EXACT_ZEROS && self.is_zero(a) => self.read(self.place(b)),
+            Recurrence::Mul(a, b) if S::EXACT_ZEROS && self.is_zero(b) => self.read(self.place(a)),
+            Recurrence::Mul(a, b) => {
+                self.read(a);
+                self.read(b);
+            }
+            Recurrence::Div(a, b) => {
+                self.read(self.place(a));
+                self.read(b);
+            }
+            Recurrence::Add(a, b) | Recurrence::Sub(a, b) => {
+                self.read(self.place(a));
+                self.read(self.place(b));
+            }
+            Recurrence::Neg(a)
+            | Recurrence::Minus(a, _)
+            | Recurrence::Scale(a, _)
+            | Recurrence::Over(a, _)
+            | Recurrence::Sqrt(a)
+            | Recurrence::Exp(a, _)
+            | Recurrence::Tanh(a, _)
+            | Recurrence::Sin(a, _) => self.read(self.place(a)),
+            Recurrence::Ln(a) | Recurrence::OnePlusSquare(a) => self.read(a),
+            Recurrence::Atan(a) | Recurrence::Erf(a, _) => {
+                self.read(self.place(a));
+                self.read(this - 1);
+            }
+            // Computed with the one before.
+            Recurrence::TanhSlope(..) | Recurrence::Cos(..) => self.read(this - 1),
+            Recurrence::Constant(_) | Recurrence::Sign(_) | Recurrence::Shift(..) | Recurrence::Weighted(_) => {}
+        }
+    }
+}
+
+/// Writes the instructions down.
+struct Planner<'a, S> {
+    equation: &'a Equation<'a, S>,
+    tails: &'a Tails,
+    instructions: Vec<Instruction<S>>,
+    /// The series whose coefficient is the number at hand.
+    at_hand: Option<Series>,
+}
+
+impl<S: Elementary> Planner<'_, S> {
+    fn put(&mut self, action: Action<S>, to: Series) {
+        self.instructions.push(Instruction { action, to });
+        self.at_hand = Some(to);
+    }
+
+    /// Constant series that somebody reads. Another plan may have written to them.
+    fn clear(&mut self) {
+        for this in self.equation.dimension..self.tails.of.len() {
+            if self.tails.is_zero(this) && self.tails.uses[this] > 0 {
+                self.put(Action::Clear, this);
+            }
+        }
+    }
+
+    fn copy(&mut self, a: Series, this: Series) {
+        self.put(if self.at_hand == Some(a) { Action::Keep } else { Action::Copy(a) }, this);
+    }
+
+    fn compute(&mut self, recurrence: Recurrence<S>, this: Series) {
+        let place = |a: Series| self.tails.place(a);
+        let at_hand = |a: Series| self.at_hand == Some(self.tails.place(a));
+        let zero = |a: Series| S::EXACT_ZEROS && self.tails.is_zero(a);
+        let action = match recurrence {
+            Recurrence::Neg(a) | Recurrence::Minus(a, _) if at_hand(a) => Action::NegThis,
+            Recurrence::Neg(a) | Recurrence::Minus(a, _) => Action::Neg(place(a)),
+            Recurrence::Add(a, b) if at_hand(a) => Action::ThisPlus(place(b)),
+            Recurrence::Add(a, b) if at_hand(b) => Action::PlusThis(place(a)),
+            Recurrence::Add(a, b) => Action::Add(place(a), place(b)),
+            Recurrence::Sub(a, b) if at_hand(a) => Action::ThisLess(place(b)),
+            Recurrence::Sub(a, b) if at_hand(b) => Action::LessThis(place(a)),
+            Recurrence::Sub(a, b) => Action::Sub(place(a), place(b)),
+            Recurrence::Scale(a, c) if at_hand(a) => Action::ScaleThis(c),
+            Recurrence::Scale(a, c) => Action::Scale(place(a), c),
+            Recurrence::Over(a, c) if at_hand(a) => Action::ThisOver(c),
+            Recurrence::Over(a, c) => Action::Over(place(a), c),
+            Recurrence::Mul(a, b) if zero(a) && at_hand(b) => Action::LiftThis(a),
+            Recurrence::Mul(a, b) if zero(b) && at_hand(a) => Action::LiftThis(b),
+            Recurrence::Mul(a, b) if zero(a) => Action::Lift(a, place(b)),
+            Recurrence::Mul(a, b) if zero(b) => Action::Lift(b, place(a)),
+            Recurrence::Mul(a, b) if a == b => Action::Square(a),
+            Recurrence::Mul(a, b) => Action::Mul(a, b),
+            Recurrence::Div(a, b) => Action::Div(place(a), b),
+            Recurrence::Exp(a, weights) => Action::Exp(place(a), weights),
+            Recurrence::Ln(a) => Action::Ln(a),
+            Recurrence::Sqrt(a) => Action::Sqrt(place(a)),
+            Recurrence::Tanh(a, weights) if at_hand(a) => Action::TanhThis(weights),
+            Recurrence::Tanh(a, weights) => Action::Tanh(place(a), weights),
+            Recurrence::Sin(a, weights) => Action::Sin(place(a), weights),
+            Recurrence::OnePlusSquare(a) => Action::Square(a),
+            Recurrence::Atan(a) => Action::Atan(place(a)),
+            Recurrence::Erf(a, weights) => Action::Erf(place(a), weights),
+            // Computed with the tanh or sine before them, or by those who need weights.
+            Recurrence::TanhSlope(..) | Recurrence::Cos(..) | Recurrence::Weighted(_) => return,
+            Recurrence::Constant(_) | Recurrence::Sign(_) | Recurrence::Shift(..) => {
+                unreachable!("what is constant or a copy is not computed")
+            }
+        };
+        let action = self.fused(action);
+        self.put(action, this);
+    }
+
+    /// The last instruction and this one in one, if they are a common pair and the last one's result is for nobody else; and so on.
+    fn fused(&mut self, action: Action<S>) -> Action<S> {
+        let (last, to) = match self.instructions.last() {
+            Some(last) if self.tails.uses[last.to] == 1 => (last.action, last.to),
+            _ => return action,
+        };
+        let fused = match (last, action) {
+            (Action::Scale(a, c), Action::NegThis) => Action::NegScale(a, c),
+            (Action::Neg(a), Action::ThisLess(b)) => Action::NegLess(a, b),
+            (Action::Scale(b, c), Action::PlusThis(a)) => Action::PlusScale(a, b, c),
+            (Action::Scale(b, c), Action::LessThis(a)) => Action::LessScale(a, b, c),
+            (Action::Mul(b, c), Action::PlusThis(a)) => Action::PlusMul(a, b, c),
+            (Action::Mul(b, c), Action::LessThis(a)) => Action::LessMul(a, b, c),
+            (Action::Mul(a, b), Action::ThisPlus(c)) => Action::MulPlus(a, b, c),
+            (Action::Mul(a, b), Action::ThisLess(c)) => Action::MulLess(a, b, c),
+            (Action::Square(b), Action::PlusThis(a)) => Action::PlusSquare(a, b),
+            (Action::Square(a), Action::PlusSquare(x, b)) if x == to => Action::Squares(a, b),
+            (Action::Squares(a, b), Action::PlusSquare(x, c)) if x == to => Action::ThreeSquares(a, b, c),
+            (Action::Lift(c, b), Action::PlusThis(a)) => Action::PlusLift(a, c, b),
+            (Action::LiftThis(c), Action::PlusThis(a)) => Action::PlusLiftThis(a, c),
+            _ => return action,
+        };
+        self.instructions.pop();
+        self.fused(fused)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::plain::{equation, expanded};
+    use super::super::{Constants, Solution};
+    use super::*;
+    use crate::tape::Recorded;
+    use crate::{Arithmetic, DoubleDouble, Dual, FromDecimal, Interval, MultiFloat, Tape};
+
+    const DEGREE: usize = 13;
+
+    /// What a solution gives away, zeros with their signs; NaN or infinity as `None`.
+    fn shown<S: Elementary + FromDecimal>(solution: &Solution<S>, dimension: usize) -> Option<String> {
+        let components: Vec<_> = (0..dimension).map(|i| solution.component(i)).collect();
+        let text = format!("{components:?} {:?}", solution.layer_arguments().collect::<Vec<_>>());
+        (!text.contains("NaN") && !text.contains("inf")).then_some(text)
+    }
+
+    /// Whether a plan gives the bits of the plain recurrences, at one start after the other; `None` if these are not finite.
+    fn agrees<S: Elementary + FromDecimal>(tape: &Tape, starts: &[[f64; 3]]) -> Option<()> {
+        let mut solution = Solution::<S>::new(DEGREE, tape, Constants::Binary);
+        for start in starts {
+            let x = start.map(S::from_f64);
+            let wanted = shown(&expanded(&solution, &x), 3)?;
+            solution.expand(&x);
+            assert_eq!(shown(&solution, 3), Some(wanted), "{tape:?} from {start:?}");
+        }
+        Some(())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(400))]
+        #[test]
+        fn a_plan_gives_the_bits_of_the_recurrences(
+            operations in prop::collection::vec((0..20_u8, any::<usize>(), any::<usize>(), -2.0..2.0_f64), 3..24),
+            starts in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 3),
+        ) {
+            let tape = equation(3, &operations);
+            agrees::<f64>(&tape, &starts);
+            agrees::<DoubleDouble>(&tape, &starts);
+            agrees::<MultiFloat<3>>(&tape, &starts);
+            agrees::<Interval>(&tape, &starts[..1]);
+            agrees::<Dual<f64, 2>>(&tape, &starts[..1]);
+        }
+    }
+
+    /// x' = tanh(y/0.01) z + 1, y' = (1 + r) - (z + r), z' = -x, r = x z.
+    fn switched() -> Tape {
+        Tape::record(3, |x| {
+            let (one, r) = (Recorded::one(), x[0] * x[2]);
+            vec![(x[1] / Recorded::from_f64(0.01)).tanh() * x[2] + one, (one + r) - (x[2] + r), -x[0]]
+        })
+    }
+
+    #[test]
+    fn every_set_of_saturated_tanh_has_its_plan() {
+        let starts = [[0.3, 0.5, 0.7], [0.3, 0.01, 0.7], [0.3, -0.5, 0.7], [0.2, -0.02, 0.7]];
+        agrees::<f64>(&switched(), &starts).unwrap();
+        let mut solution = Solution::<f64>::new(DEGREE, &switched(), Constants::Binary);
+        let mut lengths = |start: &[f64; 3]| {
+            solution.expand(start);
+            solution.plans.iter().map(|plan| (plan.saturated, plan.instructions.len())).collect::<Vec<_>>()
+        };
+        let (outside, both) = (lengths(&starts[0]), lengths(&starts[1]));
+        assert_eq!((outside.len(), both.len(), outside[0]), (1, 2, both[0]));
+        assert_eq!((both[0].0, both[1].0), (1, 0));
+        // No tanh; and a scaling instead of a product.
+        assert_eq!(both[1].1 - both[0].1, 1);
+        assert_eq!(lengths(&starts[2]), both);
+    }
+
+    #[test]
+    fn what_is_constant_is_not_computed() {
+        // The product, its copies' difference, nothing else.
+        let tape = Tape::record(1, |x| {
+            let (c, r) = (Recorded::from_f64, x[0].squared());
+            vec![((c(3.0) + r) - (c(2.0) + r)) * x[0]]
+        });
+        let mut solution = Solution::<f64>::new(DEGREE, &tape, Constants::Binary);
+        solution.expand(&[0.5]);
+        let kept: Vec<_> = solution.plans[0].instructions.iter().map(|i| i.action).collect();
+        assert!(matches!(kept[..], [Action::Lift(..)]), "{kept:?}");
+    }
+
+    /// One equation for each pair that is done at once.
+    #[test]
+    fn common_pairs_are_one_instruction_of_the_same_bits() {
+        let c = Recorded::from_f64;
+        let derivatives: [fn(&[Recorded]) -> Recorded; 12] = [
+            |x| -(x[1] * Recorded::from_f64(3.0)),
+            |x| -x[1] - x[2],
+            |x| x[1] + x[2] * Recorded::from_f64(0.3),
+            |x| x[1] - x[2] * Recorded::from_f64(0.3),
+            |x| x[1] + x[2] * x[0],
+            |x| x[1] - x[2] * x[0],
+            |x| x[2] * x[0] + x[1],
+            |x| x[2] * x[0] - x[1],
+            |x| x[1] + x[2].squared(),
+            |x| x[1].squared() + x[2].squared(),
+            |x| x[1].squared() + x[2].squared() + x[0].squared(),
+            |x| x[1] + x[2].sign() * x[0],
+        ];
+        for (case, derivative) in derivatives.iter().enumerate() {
+            let tape = Tape::record(3, |x| vec![derivative(x), x[0], c(1.0)]);
+            let starts = [[0.4, -0.7, 0.9], [-0.3, 0.6, -0.2]];
+            agrees::<f64>(&tape, &starts).unwrap();
+            agrees::<DoubleDouble>(&tape, &starts).unwrap();
+            agrees::<Interval>(&tape, &starts).unwrap();
+            let mut solution = Solution::<f64>::new(DEGREE, &tape, Constants::Binary);
+            solution.expand(&starts[0]);
+            // The constant 1 is cleared; all else is the derivative.
+            assert_eq!(solution.plans[0].instructions.len(), 2, "{case}: {:?}", solution.plans[0]);
+        }
+    }
+}

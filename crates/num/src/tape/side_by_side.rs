@@ -1,0 +1,387 @@
+//! A program at many points at once: every instruction once for all lanes of vector registers.
+//!
+//! Looking up what an instruction does takes longer than doing it; here that is paid once for as many points as there are lanes.
+
+// Loops by number over registers: iterators and closures may stay calls, compiled for the wrong instruction set.
+#![allow(clippy::needless_range_loop)]
+
+use pulp::Simd;
+
+use super::super::registers::{Aligned, Registers};
+use super::super::scalar::Elementary;
+use super::choice::Code;
+use super::program::{Output, Program};
+
+/// Numbers in `K` registers.
+type Bundle<S, const K: usize> = [<S as Simd>::f64s; K];
+
+/// Where a program's numbers come from.
+trait Numbers<S: Simd, const K: usize> {
+    /// The number in this place, which in the program itself is `own`.
+    fn at(&self, set: S, place: usize, own: f64) -> Bundle<S, K>;
+}
+
+/// The program's own, in every lane.
+struct Own;
+
+impl<S: Simd, const K: usize> Numbers<S, K> for Own {
+    #[inline(always)]
+    fn at(&self, set: S, _: usize, own: f64) -> Bundle<S, K> {
+        [set.splat_f64s(own); K]
+    }
+}
+
+/// Others in each lane.
+struct OfLanes<'a, S: Simd, const K: usize>(&'a [Aligned<Bundle<S, K>>]);
+
+impl<S: Simd, const K: usize> Numbers<S, K> for OfLanes<'_, S, K> {
+    #[inline(always)]
+    fn at(&self, _: S, place: usize, _: f64) -> Bundle<S, K> {
+        self.0[place].0
+    }
+}
+
+impl Program {
+    /// How many bundles of registers an evaluation wants for its results: a power of two. Whoever evaluates keeps them: to clear them at each evaluation
+    /// was a tenth of an ensemble's time.
+    pub fn room(&self) -> usize {
+        self.registers.max(self.variables).next_power_of_two()
+    }
+
+    /// The function's values at `x`: in every lane the bits of [`Program::evaluate`]. `N` is the number of variables and of values;
+    /// `room` is as long as [`Program::room`] says, and what is in it, before and after, means nothing.
+    ///
+    /// Always inlined, so that it is compiled with the instructions of whoever calls.
+    #[inline(always)]
+    pub fn evaluate_in_registers<S: Simd, const K: usize, const N: usize>(
+        &self,
+        set: S,
+        x: [Bundle<S, K>; N],
+        room: &mut [Aligned<Bundle<S, K>>],
+    ) -> [Bundle<S, K>; N] {
+        self.evaluate_with(set, x, Own, room)
+    }
+
+    /// The same with other numbers in each lane, those of [`Program::numbers`] in their order: in every lane the bits of the program that has them.
+    #[inline(always)]
+    pub fn evaluate_with_numbers<S: Simd, const K: usize, const N: usize>(
+        &self,
+        set: S,
+        x: [Bundle<S, K>; N],
+        numbers: &[Aligned<Bundle<S, K>>],
+        room: &mut [Aligned<Bundle<S, K>>],
+    ) -> [Bundle<S, K>; N] {
+        assert!(numbers.len() == 2 * self.code.len() + N, "two numbers an instruction, one a value");
+        self.evaluate_with(set, x, OfLanes::<S, K>(numbers), room)
+    }
+
+    #[inline(always)]
+    fn evaluate_with<S: Simd, const K: usize, const N: usize>(
+        &self,
+        set: S,
+        x: [Bundle<S, K>; N],
+        numbers: impl Numbers<S, K>,
+        results: &mut [Aligned<Bundle<S, K>>],
+    ) -> [Bundle<S, K>; N] {
+        assert!(N == self.variables && N == self.outputs.len(), "one number a variable and a value");
+        assert!(results.len() == self.room(), "as much room as the program says");
+        // The mask changes nothing and spares the way to a panic.
+        let last = results.len() - 1;
+        for i in 0..N {
+            results[i & last] = Aligned(x[i]);
+        }
+        // Most instructions use the result of the one before: it is at hand sooner than it could be written and read again.
+        let (mut value, mut written) = (x[0], u16::MAX);
+        for (place, i) in self.code.iter().enumerate() {
+            let a = if i.a == written { value } else { results[usize::from(i.a) & last].0 };
+            let number = Registers::<S, K>::new(set, a);
+            macro_rules! each {
+                ($k:ident => $result:expr) => {
+                    for $k in 0..K {
+                        value[$k] = $result;
+                    }
+                };
+                // With the other operand, which is read only here.
+                (b, $k:ident, $b:ident => $result:expr) => {{
+                    let $b = if i.b == written { value } else { results[usize::from(i.b) & last].0 };
+                    each!($k => $result);
+                }};
+                // With three.
+                (b c, $k:ident, $b:ident, $c:ident => $result:expr) => {{
+                    let $b = if i.b == written { value } else { results[usize::from(i.b) & last].0 };
+                    let $c = if i.c == written { value } else { results[usize::from(i.c) & last].0 };
+                    each!($k => $result);
+                }};
+                // With the third.
+                (c, $k:ident, $c:ident => $result:expr) => {{
+                    let $c = if i.c == written { value } else { results[usize::from(i.c) & last].0 };
+                    each!($k => $result);
+                }};
+            }
+            // The instruction's numbers.
+            macro_rules! f {
+                () => {
+                    numbers.at(set, 2 * place, i.f)
+                };
+            }
+            macro_rules! g {
+                () => {
+                    numbers.at(set, 2 * place + 1, i.g)
+                };
+            }
+            match i.code {
+                Code::Add => each!(b, k, b => set.add_f64s(a[k], b[k])),
+                Code::Sub => each!(b, k, b => set.sub_f64s(a[k], b[k])),
+                Code::Mul => each!(b, k, b => set.mul_f64s(a[k], b[k])),
+                Code::Div => each!(b, k, b => set.div_f64s(a[k], b[k])),
+                Code::AddFixed => {
+                    let f = f!();
+                    each!(k => set.add_f64s(a[k], f[k]))
+                }
+                Code::SubFixed => {
+                    let f = f!();
+                    each!(k => set.sub_f64s(a[k], f[k]))
+                }
+                Code::FixedSub => {
+                    let f = f!();
+                    each!(k => set.sub_f64s(f[k], a[k]))
+                }
+                Code::MulFixed => {
+                    let f = f!();
+                    each!(k => set.mul_f64s(a[k], f[k]))
+                }
+                Code::DivFixed => {
+                    let f = f!();
+                    each!(k => set.div_f64s(a[k], f[k]))
+                }
+                Code::FixedDiv => {
+                    let f = f!();
+                    each!(k => set.div_f64s(f[k], a[k]))
+                }
+                Code::Neg => value = (-number).parts(),
+                Code::Tanh => value = number.tanh().parts(),
+                Code::Exp => value = number.exp().parts(),
+                Code::Ln => value = number.ln().parts(),
+                Code::Sin => value = number.sin().parts(),
+                Code::Cos => value = number.cos().parts(),
+                Code::Sqrt => value = number.sqrt().parts(),
+                Code::Atan => value = number.atan().parts(),
+                Code::Erf => value = number.erf().parts(),
+                Code::Sign => value = number.sign().parts(),
+                Code::ProductPlus => each!(b c, k, b, c => set.add_f64s(set.mul_f64s(a[k], b[k]), c[k])),
+                Code::PlusProduct => each!(b c, k, b, c => set.add_f64s(c[k], set.mul_f64s(a[k], b[k]))),
+                Code::ProductMinus => each!(b c, k, b, c => set.sub_f64s(set.mul_f64s(a[k], b[k]), c[k])),
+                Code::MinusProduct => each!(b c, k, b, c => set.sub_f64s(c[k], set.mul_f64s(a[k], b[k]))),
+                Code::SumTimes => each!(b c, k, b, c => set.mul_f64s(set.add_f64s(a[k], b[k]), c[k])),
+                Code::TimesSum => each!(b c, k, b, c => set.mul_f64s(c[k], set.add_f64s(a[k], b[k]))),
+                Code::DifferenceTimes => each!(b c, k, b, c => set.mul_f64s(set.sub_f64s(a[k], b[k]), c[k])),
+                Code::TimesDifference => each!(b c, k, b, c => set.mul_f64s(c[k], set.sub_f64s(a[k], b[k]))),
+                Code::FixedSubTimes => {
+                    let f = f!();
+                    each!(c, k, c => set.mul_f64s(set.sub_f64s(f[k], a[k]), c[k]))
+                }
+                Code::TimesFixedSub => {
+                    let f = f!();
+                    each!(c, k, c => set.mul_f64s(c[k], set.sub_f64s(f[k], a[k])))
+                }
+                Code::ScaledPlus => {
+                    let (f, g) = (f!(), g!());
+                    each!(k => set.add_f64s(set.mul_f64s(a[k], g[k]), f[k]))
+                }
+                Code::MinusScaled => {
+                    let (f, g) = (f!(), g!());
+                    each!(k => set.sub_f64s(f[k], set.mul_f64s(a[k], g[k])))
+                }
+                Code::SumScaled => {
+                    let (f, g) = (f!(), g!());
+                    each!(k => set.mul_f64s(set.add_f64s(a[k], f[k]), g[k]))
+                }
+                Code::LineTimes => {
+                    let (f, g) = (f!(), g!());
+                    each!(c, k, c => set.mul_f64s(set.sub_f64s(f[k], set.mul_f64s(a[k], g[k])), c[k]))
+                }
+                Code::TimesLine => {
+                    let (f, g) = (f!(), g!());
+                    each!(c, k, c => set.mul_f64s(c[k], set.sub_f64s(f[k], set.mul_f64s(a[k], g[k]))))
+                }
+                Code::Squares => each!(b, k, b => set.add_f64s(set.mul_f64s(a[k], a[k]), set.mul_f64s(b[k], b[k]))),
+                Code::ThreeSquares => each!(b c, k, b, c => {
+                    let two = set.add_f64s(set.mul_f64s(a[k], a[k]), set.mul_f64s(b[k], b[k]));
+                    set.add_f64s(two, set.mul_f64s(c[k], c[k]))
+                }),
+                Code::TanhOfQuotient => {
+                    let f = f!();
+                    each!(k => set.div_f64s(a[k], f[k]));
+                    value = Registers::<S, K>::new(set, value).tanh().parts();
+                }
+                Code::Blend => each!(b c, k, b, c => set.add_f64s(b[k], set.mul_f64s(set.sub_f64s(a[k], b[k]), c[k]))),
+                Code::BlendFromFixed => {
+                    let f = f!();
+                    each!(c, k, c => set.add_f64s(f[k], set.mul_f64s(set.sub_f64s(a[k], f[k]), c[k])))
+                }
+                Code::BlendToFixed => {
+                    let f = f!();
+                    each!(b c, k, b, c => set.add_f64s(b[k], set.mul_f64s(set.sub_f64s(f[k], b[k]), c[k])))
+                }
+                Code::BlendOfSums => {
+                    let (f, g) = (f!(), g!());
+                    each!(c, k, c => {
+                        let base = set.add_f64s(a[k], g[k]);
+                        let difference = set.sub_f64s(set.add_f64s(a[k], f[k]), base);
+                        set.add_f64s(base, set.mul_f64s(difference, c[k]))
+                    })
+                }
+            }
+            results[usize::from(i.to) & last] = Aligned(value);
+            written = i.to;
+        }
+        let mut out = [value; N];
+        for i in 0..N {
+            out[i] = match self.outputs[i] {
+                Output::Register(at) => results[usize::from(at) & last].0,
+                Output::Fixed(value) => numbers.at(set, 2 * self.code.len() + i, value),
+            };
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Arithmetic, Tape};
+    use pulp::bytemuck::cast_slice;
+    use pulp::{Arch, Scalar, WithSimd};
+
+    /// Every kind of instruction, with variables and with numbers on either side.
+    fn everything() -> Program {
+        everything_with(0.3)
+    }
+
+    fn everything_with(number: f64) -> Program {
+        Program::new(&Tape::record(2, |v| {
+            let (x, y) = (v[0], v[1]);
+            let c = crate::tape::Recorded::from_f64(number);
+            let a = ((x + y) * (x - y) / (x * x + c) - c) * (c - x) + (c / (y * y + c) + x / c).tanh();
+            let b = (-x).exp() + (x * x + c).ln() - y.sin() * y.cos() + (y * y + c).sqrt();
+            // Pairs of operations that are one instruction, in every order.
+            let a = (a * y + x) - (y + a * x) * (x + a) + (a * x - b) * (b - a * y) + b * (x - a) + (x - b) * y;
+            let b = b + (a - b) * y + (c - a) * x + y * (c - b) + x * (a + b);
+            // With numbers, two of them too, and three operations and more.
+            let d = crate::tape::Recorded::from_f64(1.7);
+            let a = a + (c - b) * y + x * (c - a) + (a * c + d) * (d - b * c) + ((b + c) * d) * ((d - x * c) * y);
+            let b = b + a * (d - y * c) + (x * x + y * y) * (a * a + b * b + y * y) + (x / d).tanh();
+            let (e, g) = (c + (a - c) * x, y + (c - y) * x);
+            let b = b + e * ((a + d) + ((a + c) - (a + d)) * g);
+            vec![a + (x - c).atan(), b + y.erf() * (x * y).sign() + c * (x + c)]
+        }))
+    }
+
+    /// The program on `K` registers of whichever instruction set, against itself on single numbers.
+    struct Compared<'a, const K: usize>(&'a Program);
+
+    impl<const K: usize> WithSimd for Compared<'_, K> {
+        type Output = ();
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, set: S) {
+            let width = K * S::F64_LANES;
+            let value = |lane: usize, i: usize| (lane as f64 - 0.4 * width as f64) * 0.37 + i as f64 * 0.21;
+            let lanes = [0, 1].map(|i| (0..width).map(|lane| value(lane, i)).collect::<Vec<_>>());
+            let x = lanes.each_ref().map(|lanes| Registers::<S, K>::load(set, lanes).parts());
+            // What an earlier evaluation left there must not matter.
+            let mut room = vec![Aligned([set.splat_f64s(f64::NAN); K]); self.0.room()];
+            let found = self.0.evaluate_in_registers(set, x, &mut room);
+            for lane in 0..width {
+                let mut alone = [0.0; 2];
+                self.0.evaluate(&[value(lane, 0), value(lane, 1)], &mut alone);
+                for i in 0..2 {
+                    assert_eq!(cast_slice::<_, f64>(&found[i])[lane].to_bits(), alone[i].to_bits(), "{lane} {i}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn lanes_have_the_bits_of_single_numbers() {
+        let program = everything();
+        Compared::<1>(&program).with_simd(Scalar);
+        Compared::<3>(&program).with_simd(Scalar);
+        Arch::new().dispatch(Compared::<1>(&program));
+        Arch::new().dispatch(Compared::<2>(&program));
+        Arch::new().dispatch(Compared::<4>(&program));
+    }
+
+    /// Programs that differ in a number, one in each lane.
+    struct Differing<const K: usize>;
+
+    impl<const K: usize> WithSimd for Differing<K> {
+        type Output = ();
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, set: S) {
+            let width = K * S::F64_LANES;
+            let programs: Vec<Program> = (0..width).map(|lane| everything_with(0.3 + 0.01 * lane as f64)).collect();
+            assert!(programs.iter().all(|program| program.is_like(&programs[0])));
+            let of_lanes: Vec<Vec<f64>> = programs.iter().map(Program::numbers).collect();
+            let numbers: Vec<Aligned<Bundle<S, K>>> = (0..of_lanes[0].len())
+                .map(|place| {
+                    let lanes: Vec<f64> = of_lanes.iter().map(|numbers| numbers[place]).collect();
+                    Aligned(Registers::<S, K>::load(set, &lanes).parts())
+                })
+                .collect();
+            let x = [0.7, -0.2].map(|x| Registers::<S, K>::splat(set, x).parts());
+            let mut room = vec![Aligned([set.splat_f64s(f64::NAN); K]); programs[0].room()];
+            let found = programs[0].evaluate_with_numbers(set, x, &numbers, &mut room);
+            for lane in 0..width {
+                let mut alone = [0.0; 2];
+                programs[lane].evaluate(&[0.7, -0.2], &mut alone);
+                for i in 0..2 {
+                    assert_eq!(cast_slice::<_, f64>(&found[i])[lane].to_bits(), alone[i].to_bits(), "{lane} {i}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_lane_may_have_numbers_of_its_own() {
+        Differing::<1>.with_simd(Scalar);
+        Differing::<3>.with_simd(Scalar);
+        Arch::new().dispatch(Differing::<1>);
+        Arch::new().dispatch(Differing::<2>);
+        Arch::new().dispatch(Differing::<4>);
+    }
+
+    #[test]
+    fn a_value_may_be_a_number() {
+        let program = Program::new(&Tape::record(2, |v| vec![v[1], crate::tape::Recorded::from_f64(2.5)]));
+        let mut room = [Aligned([f64::NAN]); 2];
+        let found = program.evaluate_in_registers(Scalar, [[1.0], [3.0]], &mut room);
+        assert_eq!(found, [[3.0], [2.5]]);
+        assert_eq!(program.numbers(), [0.0, 2.5], "one number a value; no instruction is needed");
+        let found = program.evaluate_with_numbers(Scalar, [[1.0], [3.0]], &[[0.0], [4.5]].map(Aligned), &mut room);
+        assert_eq!(found, [[3.0], [4.5]]);
+    }
+
+    /// A power of two that holds the variables and the registers: three variables want four, even if nothing is computed.
+    #[test]
+    fn room_holds_variables_and_registers() {
+        let copies = |n: usize| Program::new(&Tape::record(n, |v| v.to_vec()));
+        assert_eq!([1, 2, 3, 4, 5].map(|n| copies(n).room()), [1, 2, 4, 4, 8]);
+        // Of the twenty products each is wanted until the end: at least 21 registers at once.
+        let many = Program::new(&Tape::record(1, |v| {
+            let products: Vec<_> =
+                (1..=20).map(|k| (v[0] * crate::tape::Recorded::from_f64(k as f64)).tanh()).collect();
+            let (mut up, mut down) = (v[0], v[0]);
+            for k in 0..20 {
+                (up, down) = (up * products[k], down * products[19 - k]);
+            }
+            vec![up - down]
+        }));
+        assert_eq!(many.room(), 32);
+    }
+
+    #[test]
+    #[should_panic(expected = "as much room as the program says")]
+    fn less_room_is_refused() {
+        everything().evaluate_in_registers(Scalar, [[1.0], [3.0]], &mut [Aligned([0.0]); 2]);
+    }
+}

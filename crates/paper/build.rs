@@ -1,0 +1,25 @@
+//! Digests the figures' own code and data, on which the answers depend that a figure computes itself (src/study.rs).
+
+use std::path::Path;
+
+fn main() -> std::io::Result<()> {
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rustc-env=TWOFOLD_FIGURES={}", figures()?);
+    Ok(())
+}
+
+fn figures() -> std::io::Result<String> {
+    let root = Path::new("../..");
+    if !root.join("figures/fig1").is_dir() {
+        // A published package: its version names the sources.
+        return Ok(format!("version {}", env!("CARGO_PKG_VERSION")));
+    }
+    let mut sources = twofold_digest::Sources::default();
+    // Pages and comparisons are made of answers; hashes are what answers are compared with.
+    let above = ["crates/paper/src/report/", "crates/paper/src/compare/"];
+    sources.add(root, "crates/paper/src", |file| !above.iter().any(|a| file.starts_with(a)))?;
+    let inputs = [".rs", ".parquet", ".csv", ".toml"];
+    sources.add(root, "figures", |file| inputs.iter().any(|e| file.ends_with(e)) && !file.ends_with("/main.rs"))?;
+    sources.add(root, "tests/data/odepack", |_| true)?;
+    Ok(sources.digest())
+}

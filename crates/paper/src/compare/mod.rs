@@ -1,0 +1,564 @@
+//! Two pictures held against each other: how many pixels differ, how much, and whether the structure is the same.
+//!
+//! Hashes say *whether* two pictures differ; this says *how*. A picture of ours is mostly white, and what matters may be two dots:
+//! means over the whole picture would call a picture with both dots in the wrong place nearly perfect. So every mean is
+//! accompanied by the worst place.
+//!
+//! ```
+//! use twofold_paper::compare::compare;
+//! use twofold_render::Pixels;
+//! let white = Pixels { width: 16, height: 16, rgba: vec![255; 4 * 16 * 16] };
+//! let mut dotted = white.clone();
+//! dotted.rgba[..3].fill(0);
+//! assert_eq!(compare(&white, &white)?.changed_pixels, 0);
+//! assert_eq!(compare(&white, &dotted)?.changed_pixels, 1);
+//! # Ok::<(), twofold_paper::compare::SizesDiffer>(())
+//! ```
+
+use serde::Serialize;
+
+use twofold_num::elementary::{exp, sqrt};
+use twofold_render::Pixels;
+
+/// How two pictures of the same size differ.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Pixels of which any channel differs.
+    pub changed_pixels: u64,
+    /// Their share of all pixels, in [0, 1].
+    pub changed_share: f64,
+    /// The largest difference of a channel, in levels of 0 to 255.
+    pub largest_difference: u8,
+    /// Root mean square difference over all pixels and the three channels, in levels of 0 to 255.
+    pub rms: f64,
+    /// The root mean square difference of the worst block of [`BLOCK`] by [`BLOCK`] pixels.
+    pub worst_block_rms: f64,
+    /// Mean structural similarity of the luminance (Wang, Bovik, Sheikh & Simoncelli 2004), 1 for equal pictures.
+    pub ssim: f64,
+    /// The structural similarity of the worst window.
+    pub worst_ssim: f64,
+}
+
+/// Two pictures that cannot be held against each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("one picture has {} by {} pixels, the other {} by {}", .expected.0, .expected.1, .actual.0, .actual.1)]
+pub struct SizesDiffer {
+    /// Width and height of the first.
+    pub expected: (u32, u32),
+    /// Width and height of the second.
+    pub actual: (u32, u32),
+}
+
+/// Side of the blocks of [`Comparison::worst_block_rms`]: about two dots of a section wide.
+pub const BLOCK: usize = 16;
+
+/// Side of the SSIM window and the standard deviation of its Gaussian weights (Wang et al. 2004, sec. III.C).
+const WINDOW: usize = 11;
+const SIGMA: f64 = 1.5;
+/// (K1 L)^2 and (K2 L)^2 with K1 = 0.01, K2 = 0.03, L = 255 (Wang et al. 2004, eq. (7) and (12)).
+const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
+const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
+
+/// Compares pixel by pixel. Transparent pixels are laid on white first.
+///
+/// # Errors
+///
+/// If the two have different sizes.
+pub fn compare(expected: &Pixels, actual: &Pixels) -> Result<Comparison, SizesDiffer> {
+    same_size(expected, actual)?;
+    let (width, height) = (expected.width as usize, expected.height as usize);
+    let (a, b) = (on_white(expected), on_white(actual));
+    let mut changed = 0_u64;
+    let mut largest = 0;
+    let mut total = 0_u64;
+    let columns = width.div_ceil(BLOCK);
+    let mut blocks = vec![(0_u64, 0_u64); columns * height.div_ceil(BLOCK)];
+    for (i, (p, q)) in a.iter().zip(&b).enumerate() {
+        let block = &mut blocks[(i / width) / BLOCK * columns + (i % width) / BLOCK];
+        block.1 += 3;
+        if p == q {
+            continue;
+        }
+        changed += 1;
+        for (u, v) in p.iter().zip(q) {
+            let d = u.abs_diff(*v);
+            largest = largest.max(d);
+            let square = u64::from(d) * u64::from(d);
+            total += square;
+            block.0 += square;
+        }
+    }
+    let pixels = (width * height).max(1) as f64;
+    let rms = |(sum, count): (u64, u64)| sqrt(sum as f64 / (count as f64).max(1.0));
+    let (ssim, worst_ssim) = if changed == 0 { (1.0, 1.0) } else { similarity(&a, &b, width, height) };
+    Ok(Comparison {
+        width: expected.width,
+        height: expected.height,
+        changed_pixels: changed,
+        changed_share: changed as f64 / pixels,
+        largest_difference: largest,
+        rms: rms((total, 3 * (width * height) as u64)),
+        worst_block_rms: blocks.into_iter().map(rms).fold(0.0, f64::max),
+        ssim,
+        worst_ssim,
+    })
+}
+
+fn same_size(expected: &Pixels, actual: &Pixels) -> Result<(), SizesDiffer> {
+    let sizes = SizesDiffer { expected: (expected.width, expected.height), actual: (actual.width, actual.height) };
+    if sizes.expected == sizes.actual { Ok(()) } else { Err(sizes) }
+}
+
+fn on_white(pixels: &Pixels) -> Vec<[u8; 3]> {
+    pixels
+        .rgba
+        .chunks_exact(4)
+        .map(|p| {
+            let over = |c: u8| ((u32::from(c) * u32::from(p[3]) + 255 * (255 - u32::from(p[3])) + 127) / 255) as u8;
+            [over(p[0]), over(p[1]), over(p[2])]
+        })
+        .collect()
+}
+
+/// Luminance of ITU-R BT.601.
+fn luminance(p: &[u8; 3]) -> f64 {
+    0.299 * f64::from(p[0]) + 0.587 * f64::from(p[1]) + 0.114 * f64::from(p[2])
+}
+
+/// Mean and lowest SSIM over all windows inside the picture, at full resolution. A picture smaller than a window is one window
+/// with equal weights.
+fn similarity(a: &[[u8; 3]], b: &[[u8; 3]], width: usize, height: usize) -> (f64, f64) {
+    let a: Vec<f64> = a.iter().map(luminance).collect();
+    let b: Vec<f64> = b.iter().map(luminance).collect();
+    if width < WINDOW || height < WINDOW {
+        let mean = |f: &dyn Fn(usize) -> f64| (0..a.len()).map(f).sum::<f64>() / a.len().max(1) as f64;
+        let s = ssim([
+            mean(&|i| a[i]),
+            mean(&|i| b[i]),
+            mean(&|i| a[i] * a[i]),
+            mean(&|i| b[i] * b[i]),
+            mean(&|i| a[i] * b[i]),
+        ]);
+        return (s, s);
+    }
+    let weights = gaussian();
+    let (wide, high) = (width - WINDOW + 1, height - WINDOW + 1);
+    // A ring of WINDOW rows already averaged along x, then averaged along y: five moments at once.
+    let mut ring = vec![[0.0; 5]; WINDOW * wide];
+    let (mut sum, mut lowest) = (0.0, f64::INFINITY);
+    for y in 0..height {
+        let row = y * width;
+        for x in 0..wide {
+            let mut m = [0.0; 5];
+            for (k, w) in weights.iter().enumerate() {
+                let (p, q) = (a[row + x + k], b[row + x + k]);
+                m[0] += w * p;
+                m[1] += w * q;
+                m[2] += w * p * p;
+                m[3] += w * q * q;
+                m[4] += w * p * q;
+            }
+            ring[(y % WINDOW) * wide + x] = m;
+        }
+        if y + 1 < WINDOW {
+            continue;
+        }
+        for x in 0..wide {
+            let mut m = [0.0; 5];
+            for (k, w) in weights.iter().enumerate() {
+                let line = &ring[((y + 1 - WINDOW + k) % WINDOW) * wide + x];
+                m.iter_mut().zip(line).for_each(|(m, v)| *m += w * v);
+            }
+            let s = ssim(m);
+            sum += s;
+            lowest = f64::min(lowest, s);
+        }
+    }
+    (sum / (wide * high) as f64, lowest)
+}
+
+/// Eq. (13) of Wang et al. (2004) from the means of a, b, a^2, b^2 and ab.
+fn ssim([mean_a, mean_b, aa, bb, ab]: [f64; 5]) -> f64 {
+    let (variance_a, variance_b) = ((aa - mean_a * mean_a).max(0.0), (bb - mean_b * mean_b).max(0.0));
+    let covariance = ab - mean_a * mean_b;
+    (2.0 * mean_a * mean_b + C1) * (2.0 * covariance + C2)
+        / ((mean_a * mean_a + mean_b * mean_b + C1) * (variance_a + variance_b + C2))
+}
+
+fn gaussian() -> [f64; WINDOW] {
+    let weights: [f64; WINDOW] = std::array::from_fn(|i| {
+        let d = i as f64 - (WINDOW / 2) as f64;
+        exp(-d * d / (2.0 * SIGMA * SIGMA))
+    });
+    let total: f64 = weights.iter().sum();
+    weights.map(|w| w / total)
+}
+
+/// Colour of what only the expected picture shows, and of what only the actual one shows: told apart with any colour vision.
+const ONLY_EXPECTED: [u8; 3] = [213, 94, 0];
+const ONLY_ACTUAL: [u8; 3] = [0, 114, 178];
+/// Changed pixels are few when they are fewer than one in so many.
+const FEW: usize = 1000;
+/// Width at which a picture is shown small.
+const SMALL: usize = 350;
+
+/// The difference as a picture: what both share faintly in grey, ink that only `expected` has in orange, ink that only `actual` has in
+/// blue. Changed pixels are drawn wider on each side, by one pixel or, where they are few, by so many that a single one is
+/// seen when the picture is shown small.
+///
+/// # Errors
+///
+/// If the two have different sizes.
+pub fn difference_image(expected: &Pixels, actual: &Pixels) -> Result<Pixels, SizesDiffer> {
+    same_size(expected, actual)?;
+    let (width, height) = (expected.width as usize, expected.height as usize);
+    let (a, b) = (on_white(expected), on_white(actual));
+    let mut rgba: Vec<u8> = a
+        .iter()
+        .flat_map(|p| {
+            let faint = 255 - ((255.0 - luminance(p)) * 0.22) as u8;
+            [faint, faint, faint, 255]
+        })
+        .collect();
+    let changed = a.iter().zip(&b).filter(|(p, q)| p != q).count();
+    let wider = if changed * FEW < width * height { (width / SMALL).max(1) } else { 1 };
+    for (i, (p, q)) in a.iter().zip(&b).enumerate().filter(|(_, (p, q))| p != q) {
+        let colour = if luminance(p) < luminance(q) { ONLY_EXPECTED } else { ONLY_ACTUAL };
+        let (x, y) = (i % width, i / width);
+        for v in y.saturating_sub(wider)..(y + wider + 1).min(height) {
+            for u in x.saturating_sub(wider)..(x + wider + 1).min(width) {
+                rgba[4 * (v * width + u)..][..3].copy_from_slice(&colour);
+            }
+        }
+    }
+    Ok(Pixels { width: expected.width, height: expected.height, rgba })
+}
+
+/// A rung of the tolerance ladder, the strictest first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rung {
+    /// The file is byte for byte the same.
+    File,
+    /// Every pixel is the same; only the file's encoding or its metadata differ.
+    Pixels,
+    /// Few pixels differ and none by much: another rasteriser's rounding.
+    ChangedPixels,
+    /// Many pixels differ, none by much: another colour depth, a careful lossy copy.
+    Rms,
+    /// The structure is the same everywhere: a lossy copy.
+    Ssim,
+}
+
+/// The limits of the ladder's inexact rungs. Each bounds the whole picture and its worst place.
+///
+/// Measured on two pictures of dense sections: a palette of 64 colours, jitter of up to 6 levels on all edges and JPEG of quality 95 hold by changed
+/// pixels or RMS; JPEG of quality 85 and scaling to nine tenths and back by SSIM at the least; JPEG of quality 75, half size and back, a shift
+/// by one pixel, and a black dot of three by three pixels on white (RMS 0.5, SSIM 0.99995 over the whole picture) hold nowhere. What the ladder
+/// cannot see is a dot of that size in the middle of a grey cloud of dots: only the hashes do.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Limits {
+    /// Largest share of changed pixels.
+    pub changed_share: f64,
+    /// Largest difference of a channel that goes with it, in levels.
+    pub largest_difference: u8,
+    /// Largest root mean square difference, in levels.
+    pub rms: f64,
+    /// Largest such difference in any block.
+    pub worst_block_rms: f64,
+    /// Smallest mean structural similarity.
+    pub ssim: f64,
+    /// Smallest structural similarity of any window.
+    pub worst_ssim: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            changed_share: 0.01,
+            largest_difference: 32,
+            rms: 2.0,
+            worst_block_rms: 8.0,
+            ssim: 0.98,
+            worst_ssim: 0.5,
+        }
+    }
+}
+
+impl Limits {
+    /// The limits in words.
+    pub fn describe(&self, rung: Rung) -> String {
+        match rung {
+            Rung::File => "file: SHA-256 equal".into(),
+            Rung::Pixels => "pixels: SHA-256 of the decoded pixels equal".into(),
+            Rung::ChangedPixels => format!(
+                "changed pixels: at most {} % changed, none by more than {} levels of 255",
+                100.0 * self.changed_share,
+                self.largest_difference
+            ),
+            Rung::Rms => format!(
+                "RMS: at most {} levels of 255, at most {} in any block of {BLOCK} by {BLOCK} pixels",
+                self.rms, self.worst_block_rms
+            ),
+            Rung::Ssim => format!("SSIM: at least {}, at least {} in any window", self.ssim, self.worst_ssim),
+        }
+    }
+
+    /// The strictest inexact rung that holds, if any does. Exact rungs are decided by hashes.
+    pub fn rung(&self, c: &Comparison) -> Option<Rung> {
+        if c.changed_share <= self.changed_share && c.largest_difference <= self.largest_difference {
+            Some(Rung::ChangedPixels)
+        } else if c.rms <= self.rms && c.worst_block_rms <= self.worst_block_rms {
+            Some(Rung::Rms)
+        } else if c.ssim >= self.ssim && c.worst_ssim >= self.worst_ssim {
+            Some(Rung::Ssim)
+        } else {
+            None
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grey(width: u32, height: u32, value: impl Fn(usize) -> u8) -> Pixels {
+        let rgba = (0..(width * height) as usize).flat_map(|i| [value(i), value(i), value(i), 255]).collect();
+        Pixels { width, height, rgba }
+    }
+
+    /// Noise from a generator that the reference program shares.
+    fn noise(width: u32, height: u32, seed: u64) -> Pixels {
+        let mut state = seed;
+        let values: Vec<u8> = (0..width * height)
+            .map(|_| {
+                state = (state * 1_103_515_245 + 12_345) % (1 << 31);
+                (state >> 16 & 255) as u8
+            })
+            .collect();
+        grey(width, height, |i| values[i])
+    }
+
+    fn close(a: f64, b: f64) {
+        assert!((a - b).abs() < 1e-9, "{a} is not {b}");
+    }
+
+    #[test]
+    fn a_picture_is_like_itself() {
+        let a = noise(40, 30, 1);
+        let c = compare(&a, &a).unwrap();
+        assert_eq!((c.changed_pixels, c.changed_share, c.largest_difference), (0, 0.0, 0));
+        assert_eq!((c.rms, c.worst_block_rms, c.ssim, c.worst_ssim), (0.0, 0.0, 1.0, 1.0));
+        // Not only by the short cut for equal pictures.
+        let (mean, worst) = similarity(&on_white(&a), &on_white(&a), 40, 30);
+        close(mean, 1.0);
+        close(worst, 1.0);
+    }
+
+    #[test]
+    fn flat_pictures_have_the_similarity_of_their_means() {
+        let c = compare(&grey(20, 20, |_| 100), &grey(20, 20, |_| 120)).unwrap();
+        let expected = (2.0 * 100.0 * 120.0 + C1) / (100.0 * 100.0 + 120.0 * 120.0 + C1);
+        close(c.ssim, expected);
+        close(c.worst_ssim, expected);
+        assert_eq!((c.changed_pixels, c.changed_share, c.largest_difference), (400, 1.0, 20));
+        close(c.rms, 20.0);
+        close(c.worst_block_rms, 20.0);
+    }
+
+    /// (mean, lowest) for each pair of the test below.
+    const SKIMAGE: [(f64, f64); 3] = [
+        (0.014254053047902684, -0.40541424866284276),
+        (0.9525019610369865, 0.9483863728798687),
+        (-0.04043872541475178, -0.565134386108423),
+    ];
+
+    #[test]
+    fn similarity_is_that_of_another_program() {
+        // scikit-image 0.26: structural_similarity(gaussian_weights=True, sigma=1.5, use_sample_covariance=False, data_range=255).
+        let a = noise(40, 30, 1);
+        let pixel = |i: usize| a.rgba[4 * i];
+        let paler = grey(40, 30, |i| (f64::from(pixel(i)) * 0.75 + 16.0) as u8);
+        let shifted = grey(40, 30, |i| pixel(i / 40 * 40 + (i % 40 + 39) % 40));
+        for (other, mean, worst) in [
+            (noise(40, 30, 2), SKIMAGE[0].0, SKIMAGE[0].1),
+            (paler, SKIMAGE[1].0, SKIMAGE[1].1),
+            (shifted, SKIMAGE[2].0, SKIMAGE[2].1),
+        ] {
+            let c = compare(&a, &other).unwrap();
+            close(c.ssim, mean);
+            close(c.worst_ssim, worst);
+        }
+    }
+
+    #[test]
+    fn one_wrong_dot_is_found_where_the_means_are_blind() {
+        let white = grey(400, 300, |_| 255);
+        let dotted =
+            grey(
+                400,
+                300,
+                |i| if (100..105).contains(&(i % 400)) && (100..105).contains(&(i / 400)) { 20 } else { 255 },
+            );
+        let c = compare(&white, &dotted).unwrap();
+        assert_eq!(c.changed_pixels, 25);
+        let limits = Limits::default();
+        assert!(c.rms > limits.rms && c.ssim > limits.ssim && c.changed_share < limits.changed_share);
+        assert!(c.worst_ssim < 0.1 && c.worst_block_rms > 50.0);
+        assert_eq!(limits.rung(&c), None);
+    }
+
+    #[test]
+    fn the_ladder_goes_from_strict_to_loose() {
+        let limits = Limits::default();
+        let same = compare(&noise(40, 30, 1), &noise(40, 30, 1)).unwrap();
+        assert_eq!(limits.rung(&same), Some(Rung::ChangedPixels));
+        let many = Comparison { changed_share: 0.5, rms: 1.0, worst_block_rms: 3.0, largest_difference: 9, ..same };
+        assert_eq!(limits.rung(&many), Some(Rung::Rms));
+        let lossy = Comparison { rms: 3.0, ssim: 0.99, worst_ssim: 0.8, ..many };
+        assert_eq!(limits.rung(&lossy), Some(Rung::Ssim));
+        assert_eq!(limits.rung(&Comparison { worst_ssim: 0.1, ..lossy }), None);
+        // A number that is not one holds nowhere.
+        let nan = Comparison { changed_share: f64::NAN, rms: f64::NAN, ssim: f64::NAN, ..same };
+        assert_eq!(limits.rung(&nan), None);
+        assert!(Rung::File < Rung::Pixels && Rung::Pixels < Rung::ChangedPixels && Rung::Rms < Rung::Ssim);
+    }
+
+    #[test]
+    fn other_sizes_are_refused_and_small_ones_compared() {
+        let error = compare(&grey(3, 2, |_| 0), &grey(2, 3, |_| 0)).unwrap_err();
+        assert_eq!(error.to_string(), "one picture has 3 by 2 pixels, the other 2 by 3");
+        let c = compare(&grey(2, 2, |_| 0), &grey(2, 2, |i| 255 * u8::from(i == 0))).unwrap();
+        assert_eq!(c.changed_pixels, 1);
+        assert!(c.ssim < 0.5);
+        assert_eq!(compare(&grey(0, 0, |_| 0), &grey(0, 0, |_| 0)).unwrap().changed_pixels, 0);
+    }
+
+    #[test]
+    fn transparency_is_laid_on_white() {
+        let clear = Pixels { width: 1, height: 1, rgba: vec![0, 0, 0, 0] };
+        assert_eq!(compare(&clear, &grey(1, 1, |_| 255)).unwrap().changed_pixels, 0);
+    }
+
+    #[test]
+    fn the_difference_shows_who_has_the_ink() {
+        let dot = |at: usize| grey(20, 5, move |i| if i == at { 0 } else { 255 });
+        let d = difference_image(&dot(42), &dot(52)).unwrap();
+        let pixel = |i: usize| [d.rgba[4 * i], d.rgba[4 * i + 1], d.rgba[4 * i + 2]];
+        assert_eq!((pixel(42), pixel(52), pixel(47)), (ONLY_EXPECTED, ONLY_ACTUAL, [255; 3]));
+        assert_eq!(pixel(21), ONLY_EXPECTED);
+        let shared = difference_image(&dot(42), &dot(42)).unwrap();
+        assert!(shared.rgba[4 * 42] < 255 && shared.rgba[4 * 42] > 150);
+        // One pixel among very many is drawn large enough to be seen.
+        let (white, speck) = (grey(1050, 100, |_| 255), grey(1050, 100, |i| if i == 50_500 { 0 } else { 255 }));
+        let d = difference_image(&white, &speck).unwrap();
+        let blue = d.rgba.chunks_exact(4).filter(|p| p[..3] == ONLY_ACTUAL).count();
+        assert_eq!(blue, 49);
+    }
+
+    /// One pixel of colour among many: every mean counts three channels, and the worst block is the small one in the corner.
+    #[test]
+    fn means_are_over_channels_and_blocks() {
+        let white = grey(20, 20, |_| 255);
+        let mut pinker = white.clone();
+        pinker.rgba[4 * (20 * 3 + 17) + 1] -= 30;
+        let c = compare(&white, &pinker).unwrap();
+        assert_eq!((c.changed_pixels, c.largest_difference), (1, 30));
+        close(c.changed_share, 1.0 / 400.0);
+        close(c.rms, (900.0_f64 / 1200.0).sqrt());
+        // Columns 16 to 19, rows 0 to 15.
+        close(c.worst_block_rms, (900.0_f64 / 192.0).sqrt());
+    }
+
+    #[test]
+    fn a_small_picture_is_one_window() {
+        let (a, b) = ([10, 20, 30, 40], [12, 18, 33, 47]);
+        let c = compare(&grey(2, 2, |i| a[i]), &grey(2, 2, |i| b[i])).unwrap();
+        // Means 25 and 27.5, variances 125 and 185.25, covariance 150.
+        let (c1, c2) = (6.5025, 58.5225);
+        close(c.ssim, (1375.0 + c1) * (300.0 + c2) / ((625.0 + 756.25 + c1) * (310.25 + c2)));
+        assert_eq!(c.ssim, c.worst_ssim);
+        // Too low for a window, though wide enough; and the other way round.
+        for (w, h) in [(40, 10), (10, 40)] {
+            let c = compare(&noise(w, h, 1), &noise(w, h, 2)).unwrap();
+            assert_eq!(c.ssim, c.worst_ssim);
+        }
+        for (w, h) in [(11, 12), (12, 11)] {
+            let c = compare(&noise(w, h, 1), &noise(w, h, 2)).unwrap();
+            assert!(c.worst_ssim < c.ssim, "two windows of their own");
+        }
+    }
+
+    /// Colours have the luminance of ITU-R BT.601.
+    #[test]
+    fn colours_are_as_light_as_they_look() {
+        let flat = |c: [u8; 3]| Pixels { width: 12, height: 12, rgba: [c[0], c[1], c[2], 255].repeat(144) };
+        for (colour, luminance) in [([200, 0, 0], 59.8), ([0, 200, 0], 117.4), ([0, 0, 200], 22.8)] {
+            let c = compare(&flat(colour), &flat([90; 3])).unwrap();
+            close(c.ssim, (2.0 * 90.0 * luminance + C1) / (8100.0 + luminance * luminance + C1));
+        }
+    }
+
+    #[test]
+    fn half_transparent_colours_are_mixed_with_white() {
+        let half = Pixels { width: 1, height: 1, rgba: vec![100, 200, 0, 128] };
+        // 255 + (c - 255) 128/255, rounded.
+        assert_eq!(on_white(&half), [[177, 227, 127]]);
+        let opaque = Pixels { width: 1, height: 1, rgba: vec![100, 200, 0, 255] };
+        assert_eq!(on_white(&opaque), [[100, 200, 0]]);
+    }
+
+    #[test]
+    fn the_difference_is_drawn_inside_the_picture_and_the_rest_faintly() {
+        let (black, lighter) = (grey(6, 4, |_| 0), grey(6, 4, |i| if i == 0 || i == 23 { 9 } else { 0 }));
+        let d = difference_image(&black, &lighter).unwrap();
+        let orange: Vec<usize> = (0..24).filter(|i| d.rgba[4 * i..][..3] == ONLY_EXPECTED).collect();
+        // Two corners and what touches them.
+        assert_eq!(orange, [0, 1, 6, 7, 16, 17, 22, 23]);
+        // Shared black: a tenth and a fifth of ink are seen and do not shout.
+        assert_eq!(d.rgba[4 * 3], 255 - 56);
+        let d = difference_image(&grey(1, 1, |_| 155), &grey(1, 1, |_| 155)).unwrap();
+        assert_eq!(d.rgba, [233, 233, 233, 255]);
+    }
+
+    #[test]
+    fn limits_are_said_in_words() {
+        let limits = Limits::default();
+        assert_eq!(
+            limits.describe(Rung::ChangedPixels),
+            "changed pixels: at most 1 % changed, none by more than 32 levels of 255"
+        );
+        assert_eq!(limits.describe(Rung::Ssim), "SSIM: at least 0.98, at least 0.5 in any window");
+        // At the limit is inside it.
+        let c = compare(&grey(2, 2, |_| 0), &grey(2, 2, |_| 0)).unwrap();
+        let just = Comparison { changed_share: 0.01, largest_difference: 32, ..c };
+        assert_eq!(limits.rung(&just), Some(Rung::ChangedPixels));
+        assert_eq!(
+            limits.rung(&Comparison { largest_difference: 33, rms: 2.0, worst_block_rms: 8.0, ..just }),
+            Some(Rung::Rms)
+        );
+        let blurred = Comparison { largest_difference: 33, rms: 2.1, ssim: 0.98, worst_ssim: 0.5, ..just };
+        assert_eq!(limits.rung(&blurred), Some(Rung::Ssim));
+        assert_eq!(limits.rung(&Comparison { ssim: 0.97, ..blurred }), None);
+    }
+
+    /// Few changed pixels are drawn wide, many are not: one in a thousand is the border.
+    #[test]
+    fn as_wide_as_they_are_few() {
+        let white = grey(1050, 100, |_| 255);
+        let blue = |changed: usize| {
+            let specked = grey(1050, 100, |i| if i % 1000 == 500 && i / 1000 < changed { 0 } else { 255 });
+            let d = difference_image(&white, &specked).unwrap();
+            d.rgba.chunks_exact(4).filter(|p| p[..3] == ONLY_ACTUAL).count() as f64 / changed as f64
+        };
+        assert!(blue(104) > 40.0, "seven by seven, some of them cut at an edge");
+        assert!(blue(105) < 10.0, "three by three");
+        let dense = grey(1050, 100, |i| if i % 100 == 50 { 0 } else { 255 });
+        let d = difference_image(&white, &dense).unwrap();
+        assert!(d.rgba.chunks_exact(4).filter(|p| p[..3] == ONLY_ACTUAL).count() < 9 * 1051);
+    }
+}

@@ -1,0 +1,504 @@
+//! A picture of any run: its states against time, a phase plane, a path in space, or a Poincaré section. Labels, axes and the switching
+//! surface come from the system.
+
+use twofold_job::answer::Answer;
+use twofold_job::spec::{Observation, RunSpec};
+use twofold_job::table::Table;
+use twofold_render::markup;
+use twofold_render::number::number;
+use twofold_render::sheet::{
+    Axis, ColumnWidth, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle, PlanePanel, Sheet,
+    SpacePanel,
+};
+use twofold_render::style;
+use twofold_system::System;
+use twofold_system::filippov::Region;
+
+use super::level::Level;
+use super::surface;
+
+/// What a picture of a run shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// States against time, a panel for each.
+    Series,
+    /// One state against another.
+    Plane,
+    /// Three states.
+    Space,
+    /// Passages through a plane.
+    Section,
+}
+
+impl Kind {
+    /// The word for it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Kind::Series => "series",
+            Kind::Plane => "plane",
+            Kind::Space => "space",
+            Kind::Section => "section",
+        }
+    }
+
+    /// What suits a run: a section if passages were recorded, else by the number of axes that the system suggests, or of its states.
+    pub fn suiting(run: &RunSpec) -> Self {
+        if let Observation::Section { .. } = run.observe {
+            return Kind::Section;
+        }
+        let suggested = run.system.definition().axes().len();
+        match if suggested > 0 { suggested } else { run.system.dimension() } {
+            1 => Kind::Series,
+            2 => Kind::Plane,
+            _ => Kind::Space,
+        }
+    }
+}
+
+/// How a run is drawn.
+#[derive(Clone, Debug)]
+pub struct Look {
+    /// What is shown.
+    pub kind: Kind,
+    /// The states on the axes (of a series: the panels); empty for the ones that suit.
+    pub axes: Vec<usize>,
+    /// Azimuth and elevation of the camera in degrees, of a picture in space.
+    pub camera: Option<(f64, f64)>,
+    /// The heading as plain text; the system's title if there is none.
+    pub title: Option<String>,
+}
+
+/// Why a run cannot be drawn in this way.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PlotError {
+    /// Too few or too many axes.
+    #[error("a picture of kind {kind} has {wanted}; {given} given")]
+    Axes {
+        /// The kind.
+        kind: &'static str,
+        /// What it needs.
+        wanted: &'static str,
+        /// How many were given.
+        given: usize,
+    },
+    /// Too few states.
+    #[error("a picture of kind {kind} shows {wanted} states, and the system has {states}; choose another kind")]
+    States {
+        /// The kind.
+        kind: &'static str,
+        /// How many it shows.
+        wanted: usize,
+        /// How many there are.
+        states: usize,
+    },
+    /// A path where passages are needed, or the reverse.
+    #[error("{0}")]
+    Recording(&'static str),
+    /// The run has no table of points.
+    #[error("there is no table of points in this run")]
+    NoPoints,
+}
+
+/// The states that a kind of picture shows of a run, in the order of its axes.
+///
+/// # Errors
+/// If the number of axes does not suit the kind.
+pub fn axes(run: &RunSpec, kind: Kind, given: &[usize]) -> Result<Vec<usize>, PlotError> {
+    let n = run.system.dimension();
+    let wrong = |wanted| Err(PlotError::Axes { kind: kind.word(), wanted, given: given.len() });
+    let few = |wanted| PlotError::States { kind: kind.word(), wanted, states: n };
+    let suggested = run.system.definition().axes();
+    let others: Vec<usize> = suggested.iter().copied().chain((0..n).filter(|i| !suggested.contains(i))).collect();
+    match (kind, given.len()) {
+        // A system's axes are horizontal, depth, vertical; of two panels in the plane the first and the last of them.
+        (Kind::Series, 0) => Ok((0..n.min(MOST_PANELS)).collect()),
+        (Kind::Series, count) if count > MOST_PANELS => wrong("at most eight panels"),
+        (Kind::Plane, 0) if n < 2 => Err(few(2)),
+        (Kind::Plane, 0) => Ok(if suggested.len() == 2 { suggested.to_vec() } else { vec![others[0], others[1]] }),
+        (Kind::Space, 0) if n < 3 => Err(few(3)),
+        (Kind::Space, 0) => Ok(others[..3].to_vec()),
+        (Kind::Section, 0) => {
+            let Observation::Section { coordinate, .. } = run.observe else { return Err(SECTION_NEEDED) };
+            Ok(others.into_iter().filter(|i| *i != coordinate).take(2).collect())
+        }
+        (Kind::Plane | Kind::Section, 2) | (Kind::Space, 3) | (Kind::Series, _) => Ok(given.to_vec()),
+        (Kind::Plane, _) => wrong("two axes"),
+        (Kind::Space, _) => wrong("three axes"),
+        (Kind::Section, 1) => Ok(given.to_vec()),
+        (Kind::Section, _) => wrong("two axes, or one against time"),
+    }
+}
+
+const SECTION_NEEDED: PlotError =
+    PlotError::Recording("a section shows passages through a plane: record them, such as by --section y=0");
+const PATH_NEEDED: PlotError = PlotError::Recording(
+    "passages through a plane were recorded, and this picture needs the path: leave out --section",
+);
+
+/// The drawing of a run; `small_print` stands at its foot.
+///
+/// # Errors
+/// [`PlotError`] if the run cannot be drawn in this way.
+pub fn sheet(run: &RunSpec, answer: &Answer, look: &Look, small_print: Vec<String>) -> Result<Sheet, PlotError> {
+    let shown = axes(run, look.kind, &look.axes)?;
+    let title = look.title.clone().unwrap_or_else(|| run.system.definition().title().to_owned());
+    let said = if title.is_empty() { "a system of its own".to_owned() } else { title.clone() };
+    let width = match look.kind {
+        Kind::Series | Kind::Space => ColumnWidth::Double,
+        Kind::Plane | Kind::Section => ColumnWidth::Single,
+    };
+    let mut sheet = Sheet::new(width, 1, format!("{}: {said}", describe(&run.system, look.kind, &shown)));
+    sheet.title = (!title.is_empty()).then(|| markup::literal(&title));
+    sheet.footer = small_print;
+    match look.kind {
+        Kind::Section => section(sheet, run, answer, &shown),
+        kind => {
+            let lines = lines(answer, &run.system)?;
+            Ok(match kind {
+                Kind::Series => series(sheet, run, &lines, &shown),
+                Kind::Plane => plane(sheet, run, &lines, &shown),
+                _ => space(sheet, run, answer, &lines, &shown, look.camera),
+            })
+        }
+    }
+}
+
+/// For readers who cannot see it.
+fn describe(system: &System, kind: Kind, shown: &[usize]) -> String {
+    let names = system.coordinates();
+    let listed = shown.iter().map(|i| names[*i]).collect::<Vec<_>>().join(", ");
+    match kind {
+        Kind::Series => format!("{listed} against time"),
+        Kind::Plane => format!("phase plane of {listed}"),
+        Kind::Space => format!("path in the space of {listed}"),
+        Kind::Section => format!("Poincaré section, {listed}"),
+    }
+}
+
+/// What moves along a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Stroke {
+    Smooth,
+    Flight,
+    Sliding,
+    ToPlus,
+    ToMinus,
+    Approach,
+}
+
+/// A piece of a path in one style.
+struct Line {
+    look: Stroke,
+    t: Vec<f64>,
+    /// Per state.
+    x: Vec<Vec<f64>>,
+}
+
+impl Line {
+    fn points<const K: usize>(&self, axes: [usize; K]) -> Vec<[f64; K]> {
+        (0..self.t.len()).map(|i| axes.map(|a| self.x[a][i])).collect()
+    }
+}
+
+/// The lines of a recorded path or motion.
+fn lines(answer: &Answer, system: &System) -> Result<Vec<Line>, PlotError> {
+    let names = system.coordinates();
+    if answer.table("section").is_some() {
+        return Err(PATH_NEEDED);
+    }
+    let columns = |table: &Table, rows: std::ops::Range<usize>| -> Vec<Vec<f64>> {
+        names.iter().map(|n| table.numbers(n).get(rows.clone()).unwrap_or(&[]).to_vec()).collect()
+    };
+    let sound = |table: &&Table| names.iter().all(|n| table.numbers(n).len() == table.numbers("t").len());
+    if let Some(path) = answer.table("path").filter(sound) {
+        return Ok(vec![Line { look: Stroke::Smooth, t: path.numbers("t").to_vec(), x: columns(path, 0..path.len()) }]);
+    }
+    let motion = answer.table("motion").filter(sound).ok_or(PlotError::NoPoints)?;
+    let funnel = motion.integers("future").iter().any(|f| *f > 0);
+    let (modes, pieces, futures) = (motion.words("mode"), motion.integers("piece"), motion.integers("future"));
+    let looks: Vec<(Stroke, i64, i64)> = modes
+        .zip(pieces.iter().zip(futures))
+        .zip(motion.words("exit_side"))
+        .map(|((mode, (piece, future)), side)| {
+            let look = match (funnel, *future, side) {
+                (true, 0, _) => Stroke::Approach,
+                (true, _, "plus") => Stroke::ToPlus,
+                (true, _, _) => Stroke::ToMinus,
+                _ if mode.starts_with("sliding") => Stroke::Sliding,
+                _ => Stroke::Flight,
+            };
+            (look, *future, *piece)
+        })
+        .collect();
+    let mut found = Vec::new();
+    let mut from = 0;
+    for row in 1..=looks.len() {
+        if row == looks.len() || looks[row] != looks[from] {
+            let t = motion.numbers("t")[from..row].to_vec();
+            found.push(Line { look: looks[from].0, t, x: columns(motion, from..row) });
+            from = row;
+        }
+    }
+    // Sliding above flight, the way in above the ways out.
+    found.sort_by_key(|line| line.look);
+    Ok(found)
+}
+
+fn line_style(look: Stroke, points: usize) -> LineStyle {
+    match look {
+        // A long path is drawn thinner than a curve, so that windings stay apart.
+        Stroke::Smooth => LineStyle::new(style::INK, if points > 4000 { 0.5 } else { style::CURVE_PT }),
+        Stroke::Flight => LineStyle::new(style::INK, 0.7),
+        Stroke::Sliding => LineStyle::new(style::GREEN, 1.6),
+        Stroke::ToPlus => LineStyle::new(style::BLUE, 0.5),
+        Stroke::ToMinus => LineStyle::new(style::VERMILLION, 0.5),
+        Stroke::Approach => LineStyle::new(style::INK, 1.4),
+    }
+}
+
+/// Entries for the kinds of lines that occur, unless there is only one.
+fn line_legend(mut sheet: Sheet, lines: &[Line]) -> Sheet {
+    let mut looks: Vec<Stroke> = lines.iter().map(|l| l.look).collect();
+    looks.sort();
+    looks.dedup();
+    for look in looks {
+        let text = match look {
+            Stroke::Smooth => continue,
+            Stroke::Flight => "flight",
+            Stroke::Sliding => "sliding",
+            Stroke::ToPlus => "ways out to *h* > 0",
+            Stroke::ToMinus => "ways out to *h* < 0",
+            Stroke::Approach => "the way in",
+        };
+        sheet = sheet.legend(LegendEntry::new(LegendKey::Line(line_style(look, 0)), text));
+    }
+    sheet
+}
+
+/// A state's name and unit.
+fn title(system: &System, state: usize) -> String {
+    let state = &system.definition().states()[state];
+    let name = markup::name(&state.name);
+    if state.about.unit.is_empty() { name } else { format!("{name} ({})", markup::literal(&state.about.unit)) }
+}
+
+fn range(lines: &[Line], state: usize) -> (f64, f64) {
+    let axis = Axis::covering("", lines.iter().flat_map(|l| l.x[state].iter().copied()));
+    if axis.upper > axis.lower {
+        return (axis.lower, axis.upper);
+    }
+    // A state that stays what it is: as wide as such an axis is drawn.
+    let half = (0.05 * axis.lower.abs()).max(0.5);
+    (axis.lower - half, axis.lower + half)
+}
+
+fn series(mut sheet: Sheet, run: &RunSpec, lines: &[Line], shown: &[usize]) -> Sheet {
+    sheet = sheet.panel_aspect(if shown.len() == 1 { 0.4 } else { 0.22 });
+    let end = lines.iter().filter_map(|l| l.t.last()).fold(0.0_f64, |a, b| a.max(*b));
+    let mut surface_shown = false;
+    for (i, state) in shown.iter().enumerate() {
+        let (low, high) = range(lines, *state);
+        let time = if i + 1 == shown.len() { "*t*" } else { "" };
+        let mut panel =
+            PlanePanel::new(Axis::linear(time, 0.0, end), Axis::linear(title(&run.system, *state), low, high));
+        for zero in Level::all(&run.system, &[*state], &[]).iter().flat_map(|l| l.points((low, high))) {
+            surface_shown = true;
+            panel = panel.line(vec![[0.0, zero], [end, zero]], SURFACE_LEVEL);
+        }
+        for line in lines {
+            let points = line.t.iter().zip(&line.x[*state]).map(|(t, x)| [*t, *x]).collect();
+            panel = panel.line(points, line_style(line.look, line.t.len()));
+        }
+        sheet = sheet.panel("", "", panel);
+    }
+    sheet = line_legend(sheet, lines);
+    if surface_shown {
+        sheet = sheet.legend(LegendEntry::new(LegendKey::Line(SURFACE_LEVEL), "*h* = 0"));
+    }
+    sheet
+}
+
+/// The curve h = 0 in a panel, under everything else; adds to `seen` what of it is there.
+fn surface_curve(
+    mut panel: PlanePanel,
+    level: &Level<'_>,
+    ranges: [(f64, f64); 2],
+    seen: &mut Vec<CurveLook>,
+) -> PlanePanel {
+    for (region, points) in level.curves(ranges) {
+        let look = curve_look(region);
+        panel = panel.line(points, look.0);
+        if !seen.contains(&look) {
+            seen.push(look);
+        }
+    }
+    panel
+}
+
+type CurveLook = (LineStyle, &'static str);
+
+fn curve_look(region: Option<Region>) -> CurveLook {
+    match region {
+        Some(Region::Attracting) => (LineStyle::new(style::ATTRACTING, 2.2), "*h* = 0, attracting"),
+        Some(Region::Repelling) => (LineStyle::new(style::REPELLING, 2.2), "*h* = 0, repelling"),
+        Some(_) => (LineStyle::new(style::FAINT, 1.4), "*h* = 0, crossing"),
+        None => (LineStyle::new(style::FAINT, 1.4), "*h* = 0"),
+    }
+}
+
+fn curve_legend(mut sheet: Sheet, looks: Vec<CurveLook>) -> Sheet {
+    for (line, text) in looks {
+        sheet = sheet.legend(LegendEntry::new(LegendKey::Line(line), text));
+    }
+    sheet
+}
+
+fn plane(sheet: Sheet, run: &RunSpec, lines: &[Line], shown: &[usize]) -> Sheet {
+    let [u, v] = [shown[0], shown[1]];
+    let ranges = [range(lines, u), range(lines, v)];
+    let axis = |k: usize| Axis::linear(title(&run.system, shown[k]), ranges[k].0, ranges[k].1);
+    let mut panel = PlanePanel::new(axis(0), axis(1));
+    let mut looks = Vec::new();
+    for level in Level::all(&run.system, shown, &[]) {
+        panel = surface_curve(panel, &level, ranges, &mut looks);
+    }
+    for line in lines {
+        panel = panel.line(line.points([u, v]), line_style(line.look, line.t.len()));
+    }
+    let start = lines.iter().filter(|l| l.t.first() == Some(&0.0)).map(|l| [l.x[u][0], l.x[v][0]]).take(1).collect();
+    panel = panel.markers(start, START);
+    let sheet = sheet.panel_aspect(0.8).panel("", "", panel);
+    curve_legend(line_legend(sheet, lines), looks).legend(LegendEntry::new(LegendKey::Marker(START), "start"))
+}
+
+fn space(
+    mut sheet: Sheet,
+    run: &RunSpec,
+    answer: &Answer,
+    lines: &[Line],
+    shown: &[usize],
+    camera: Option<(f64, f64)>,
+) -> Sheet {
+    let order = [shown[0], shown[1], shown[2]];
+    let ranges = order.map(|i| range(lines, i));
+    let axis = |k: usize| Axis::linear(title(&run.system, order[k]), ranges[k].0, ranges[k].1);
+    let mut panel = SpacePanel::new(axis(0), axis(1), axis(2));
+    if let Some((azimuth, elevation)) = camera {
+        panel = panel.camera(azimuth, elevation);
+    }
+    let (mut regions, mut seen) = (false, Vec::new());
+    let mut patches = Vec::new();
+    for level in Level::all(&run.system, &order, &[]) {
+        regions |= level.has_regions();
+        patches.extend(level.patches(&ranges));
+    }
+    if !patches.is_empty() {
+        for colour in [style::ATTRACTING, style::REPELLING, style::CROSSING] {
+            if patches.iter().any(|p| p.colour == colour) {
+                seen.push(colour);
+            }
+        }
+        panel = panel.surface(patches);
+    }
+    for line in lines {
+        panel = panel.line(line.points(order), line_style(line.look, line.t.len()));
+    }
+    let exits: Vec<[f64; 3]> = exits(answer, &run.system).into_iter().map(|x| order.map(|i| x[i])).collect();
+    let any_exits = !exits.is_empty();
+    if any_exits {
+        panel = panel.markers(exits, EXIT);
+    }
+    let mut box_of_states = [(0.0, 0.0); 3];
+    let singular = if run.system.dimension() == 3 {
+        order.iter().zip(ranges).for_each(|(i, r)| box_of_states[*i] = r);
+        surface::singularity(&run.system, &box_of_states)
+    } else {
+        None
+    };
+    if let Some(point) = singular {
+        panel = panel.markers(vec![order.map(|i| point[i])], SINGULARITY);
+    }
+    sheet = line_legend(sheet.panel("", "", panel), lines);
+    for colour in seen {
+        let text = match colour {
+            _ if !regions => "*h* = 0",
+            style::ATTRACTING => "attracting",
+            style::REPELLING => "repelling",
+            _ => "crossing",
+        };
+        sheet = sheet.legend(LegendEntry::new(LegendKey::Area(colour, style::SURFACE_OPACITY), text));
+    }
+    if any_exits {
+        sheet = sheet.legend(LegendEntry::new(LegendKey::Marker(EXIT), "exit"));
+    }
+    if singular.is_some() {
+        sheet = sheet.legend(LegendEntry::new(LegendKey::Marker(SINGULARITY), "two-fold"));
+    }
+    sheet
+}
+
+fn section(sheet: Sheet, run: &RunSpec, answer: &Answer, shown: &[usize]) -> Result<Sheet, PlotError> {
+    let table = answer.table("section").ok_or(SECTION_NEEDED)?;
+    let Observation::Section { coordinate, value } = run.observe else { return Err(SECTION_NEEDED) };
+    let names = run.system.coordinates();
+    let t = table.numbers("t");
+    let half = 0.5 * run.t_end;
+    // One state left: against time.
+    let (horizontal, vertical) = match shown {
+        [u, v, ..] => (Some(*u), Some(*v)),
+        [u] => (None, Some(*u)),
+        [] => return Err(PlotError::States { kind: "section", wanted: 2, states: names.len() }),
+    };
+    let column = |state: Option<usize>| state.map_or(t, |i| table.numbers(names[i]));
+    let (xs, ys) = (column(horizontal), column(vertical));
+    if xs.len() != t.len() || ys.len() != t.len() {
+        return Err(PlotError::NoPoints);
+    }
+    let axis = |state: Option<usize>, values: &[f64]| match state {
+        Some(i) => Axis::covering(title(&run.system, i), values.iter().copied()),
+        None => Axis::linear("*t*", 0.0, run.t_end),
+    };
+    let (x, y) = (axis(horizontal, xs), axis(vertical, ys));
+    let ranges = [(x.lower, x.upper), (y.lower, y.upper)];
+    let mut panel = PlanePanel::new(x, y);
+    let mut looks = Vec::new();
+    if let (Some(u), Some(v)) = (horizontal, vertical) {
+        for level in Level::all(&run.system, &[u, v], &[(coordinate, value)]) {
+            panel = surface_curve(panel, &level, ranges, &mut looks);
+        }
+    }
+    let points =
+        |late: bool| (0..t.len()).filter(|i| (t[*i] > half) == late).map(|i| [xs[i], ys[i]]).collect::<Vec<_>>();
+    panel = panel.dots(points(false), DotStyle::early()).dots(points(true), DotStyle::late());
+    let plane = format!("{} = {}", markup::name(names[coordinate]), number(value));
+    let sheet = sheet.subtitle(format!("passages through {plane}")).panel_aspect(0.9).panel("", "", panel);
+    let half = number(half);
+    let sheet = sheet
+        .legend(LegendEntry::new(LegendKey::Dots(DotStyle::early()), format!("*t* ≤ {half}")))
+        .legend(LegendEntry::new(LegendKey::Dots(DotStyle::late()), format!("*t* > {half}")));
+    Ok(curve_legend(sheet, looks))
+}
+
+/// Where a motion leaves repelling sliding.
+fn exits(answer: &Answer, system: &System) -> Vec<Vec<f64>> {
+    let Some(events) = answer.table("events") else { return Vec::new() };
+    let columns: Vec<&[f64]> = system.coordinates().iter().map(|n| events.numbers(n)).collect();
+    let single = |row: usize| events.integers("future").get(row) == Some(&0);
+    events
+        .words("event")
+        .enumerate()
+        .filter(|(row, word)| word.starts_with("exit") && single(*row))
+        .map(|(row, _)| columns.iter().map(|c| c.get(row).copied().unwrap_or(f64::NAN)).collect())
+        .collect()
+}
+
+/// Most panels of a series.
+const MOST_PANELS: usize = 8;
+/// h = 0 as a level in a series.
+const SURFACE_LEVEL: LineStyle = LineStyle::new(style::SOFT_INK, 0.6).dashed();
+/// The start of a path.
+const START: MarkerStyle = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::INK, size: 3.6 };
+/// The end of repelling sliding.
+const EXIT: MarkerStyle = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::GREEN, size: 3.6 };
+/// A two-fold.
+const SINGULARITY: MarkerStyle = MarkerStyle::new(MarkerShape::Dot, style::MAGENTA);

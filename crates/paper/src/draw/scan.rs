@@ -1,0 +1,154 @@
+//! Pictures of scans: an orbit diagram over one parameter, a map of endings over two.
+
+use twofold_num::elementary::{pow, sqrt};
+use twofold_render::markup;
+use twofold_render::sheet::{Axis, Colour, ColumnWidth, DotStyle, LegendEntry, LegendKey, PlanePanel, Sheet, range_of};
+use twofold_render::style;
+
+/// A setting that a scan varied.
+pub struct Scanned {
+    /// Its name in rich text.
+    pub title: String,
+    /// Its values, in their order.
+    pub values: Vec<f64>,
+    /// Whether they are evenly spaced in the logarithm, and so are shown so.
+    pub logarithmic: bool,
+}
+
+impl Scanned {
+    fn axis(&self, (lower, upper): (f64, f64)) -> Axis {
+        if self.logarithmic { Axis::log(&self.title, lower, upper) } else { Axis::linear(&self.title, lower, upper) }
+    }
+
+    /// All values, with a margin of four per cent. Where no run has a passage the diagram is empty; it does not end there.
+    fn covered(&self) -> Axis {
+        if !self.logarithmic {
+            return Axis::covering(&self.title, self.values.iter().copied());
+        }
+        let (lower, upper) = range_of(self.values.iter().copied());
+        let margin = pow(upper / lower, 0.04);
+        self.axis((lower / margin, upper * margin))
+    }
+
+    /// The edges of cells around the values.
+    fn edges(&self) -> Vec<f64> {
+        let (c, n) = (&self.values, self.values.len());
+        let between = |w: &[f64]| if self.logarithmic { sqrt(w[0] * w[1]) } else { 0.5 * (w[0] + w[1]) };
+        // As far beyond the value on the other side.
+        let beyond = |value: f64, edge: f64| {
+            if self.logarithmic { value * (value / edge) } else { value + (value - edge) }
+        };
+        let inner: Vec<f64> = c.windows(2).map(between).collect();
+        match (inner.first(), inner.last()) {
+            (Some(first), Some(last)) => {
+                let ends = (beyond(c[0], *first), beyond(c[n - 1], *last));
+                std::iter::once(ends.0).chain(inner).chain([ends.1]).collect()
+            }
+            _ if self.logarithmic => vec![c[0] / 2.0, c[0] * 2.0],
+            _ => vec![c[0] - 0.5, c[0] + 0.5],
+        }
+    }
+}
+
+/// An orbit diagram: the late passages of each run above its parameter's value.
+pub fn diagram(title: &str, over: &Scanned, ordinate: &str, points: Vec<[f64; 2]>) -> Sheet {
+    let x = over.covered();
+    let y = Axis::covering(ordinate, points.iter().map(|p| p[1]));
+    let panel = PlanePanel::new(x, y).dots(points, DotStyle { density: false, ..DotStyle::late() });
+    Sheet::new(ColumnWidth::Double, 1, "orbit diagram")
+        .title(markup::literal(title))
+        .panel_aspect(0.55)
+        .panel("", "", panel)
+}
+
+/// An ending's place in the legend, and where it occurs (row, column).
+pub struct Basin {
+    /// Its name as plain text.
+    pub name: String,
+    /// Whether it is an attractor; else it is drawn in grey.
+    pub attracts: bool,
+    /// Its cells, as (column, row).
+    pub cells: Vec<(usize, usize)>,
+}
+
+/// A map of endings over a grid of two settings.
+pub fn map(title: &str, over: [&Scanned; 2], basins: &[Basin]) -> Sheet {
+    let [x_edges, y_edges] = over.map(Scanned::edges);
+    let ends = |e: &[f64]| (e[0], e[e.len() - 1]);
+    let mut panel = PlanePanel::new(over[0].axis(ends(&x_edges)), over[1].axis(ends(&y_edges)));
+    let mut sheet =
+        Sheet::new(ColumnWidth::Single, 1, "map of endings").title(markup::literal(title)).panel_aspect(0.9);
+    let mut next = 0;
+    for basin in basins {
+        let colour = if basin.attracts {
+            next += 1;
+            palette(next - 1)
+        } else {
+            style::CROSSING
+        };
+        for (i, j, length) in rows_of(&basin.cells) {
+            let (a, b) = (x_edges[i], x_edges[i + length]);
+            let (c, d) = (y_edges[j], y_edges[j + 1]);
+            panel = panel.solid(vec![[a, c], [b, c], [b, d], [a, d]], colour);
+        }
+        let text = format!("{} ({})", markup::literal(&basin.name), basin.cells.len());
+        sheet = sheet.legend(LegendEntry::new(LegendKey::Area(colour, 100), text));
+    }
+    sheet.panel("", "", panel)
+}
+
+/// Neighbouring cells of one row as one rectangle: (column, row, how many).
+fn rows_of(cells: &[(usize, usize)]) -> Vec<(usize, usize, usize)> {
+    let mut sorted: Vec<(usize, usize)> = cells.iter().map(|(i, j)| (*j, *i)).collect();
+    sorted.sort_unstable();
+    let mut found: Vec<(usize, usize, usize)> = Vec::new();
+    for (j, i) in sorted {
+        match found.last_mut() {
+            Some((first, row, length)) if *row == j && *first + *length == i => *length += 1,
+            _ => found.push((i, j, 1)),
+        }
+    }
+    found
+}
+
+/// Colours of attractors: the series', then paler ones.
+fn palette(k: usize) -> Colour {
+    let base = style::SERIES[k % style::SERIES.len()];
+    (0..k / style::SERIES.len()).fold(base, |c, _| c.lighten(0.35))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use twofold_render::sheet::Content;
+
+    #[test]
+    fn cells_become_rectangles() {
+        assert_eq!(rows_of(&[(0, 0), (2, 0), (1, 0), (4, 0), (0, 1)]), [(0, 0, 3), (4, 0, 1), (0, 1, 1)]);
+    }
+
+    fn scanned(values: &[f64], logarithmic: bool) -> Scanned {
+        Scanned { title: String::new(), values: values.to_vec(), logarithmic }
+    }
+
+    #[test]
+    fn cells_meet_between_their_values() {
+        assert_eq!(scanned(&[1.0, 2.0, 4.0], false).edges(), [0.5, 1.5, 3.0, 5.0]);
+        assert_eq!(scanned(&[4.0, 16.0, 64.0], true).edges(), [2.0, 8.0, 32.0, 128.0]);
+        assert_eq!(scanned(&[3.0], false).edges(), [2.5, 3.5]);
+        assert_eq!(scanned(&[3.0], true).edges(), [1.5, 6.0]);
+    }
+
+    #[test]
+    fn a_diagram_shows_all_that_was_scanned() {
+        let x = |over: &Scanned| {
+            let sheet = diagram("", over, "", vec![[10.0, 1.0], [10.0, 2.0]]);
+            let Content::Plane(panel) = &sheet.panels[0].content else { panic!("no plane") };
+            panel.x.clone()
+        };
+        let linear = x(&scanned(&[0.0, 10.0, 100.0], false));
+        assert_eq!((linear.lower, linear.upper, linear.logarithmic), (-4.0, 104.0, false));
+        let log = x(&scanned(&[1.0, 10.0, 1e25], true));
+        assert!((log.lower - 0.1).abs() < 1e-12 && (log.upper / 1e26 - 1.0).abs() < 1e-12 && log.logarithmic);
+    }
+}

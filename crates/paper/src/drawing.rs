@@ -1,0 +1,322 @@
+//! From recordings to a drawing: which points, lines and surfaces, in which colours and ranges.
+
+use super::{Camera, Panel, Picture, View, wording};
+use crate::draw::surface;
+use twofold_analyse::{Crossing, Motion, Sample};
+use twofold_integrate::filippov::{EventKind, Mode, Side};
+use twofold_job::record::Hash;
+use twofold_job::recording::{Data, Future, Recording};
+use twofold_render::sheet::{
+    Axis, ColumnWidth, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle, PlanePanel, Sheet,
+    SpacePanel, range_of,
+};
+use twofold_render::style;
+use twofold_system::Compiled;
+
+/// The drawing of a picture of runs.
+pub fn sheet(picture: &Picture, recordings: &[Recording], spec: &Hash, data: &Hash) -> Sheet {
+    let runs: Vec<_> = picture.panels.iter().map(|p| &p.run).collect();
+    let mut sheet = dress(Sheet::new(ColumnWidth::Double, columns(picture), ""), picture, spec, data);
+    if picture.panels.iter().any(|p| matches!(p.run.system.compiled(), Some(Compiled::Wheel(_)))) {
+        sheet = sheet.subtitle("reconstruction: the paper gives the form of the equations, not their coefficients");
+    }
+    for line in wording::small_print(picture.reading, &runs) {
+        sheet = sheet.footer(line);
+    }
+    match picture.view {
+        View::Section { horizontal, vertical } => {
+            section_panels(sheet, picture, recordings, [horizontal, vertical], Shown::Whole)
+        }
+        View::LateSection { horizontal, vertical } => {
+            section_panels(sheet, picture, recordings, [horizontal, vertical], Shown::Late)
+        }
+        View::Space { camera } => space_panels(sheet, picture, recordings, &camera),
+        View::Study(_) => sheet,
+    }
+}
+
+/// The drawing of a study: its own sheet, with the picture's heading and provenance.
+pub fn study_sheet(picture: &Picture, sheet: Sheet, spec: &Hash, data: &Hash) -> Sheet {
+    dress(sheet, picture, spec, data)
+}
+
+/// Heading, description, warnings and provenance: what every picture has.
+fn dress(mut sheet: Sheet, picture: &Picture, spec: &Hash, data: &Hash) -> Sheet {
+    sheet.description = wording::plain(&picture.caption);
+    sheet = sheet
+        .title(picture.title)
+        .provenance("Software", concat!("twofold ", env!("CARGO_PKG_VERSION")))
+        .provenance("Picture", &picture.name)
+        .provenance("Reading", picture.reading.map_or("none", |r| r.word()))
+        .provenance("Method", methods(picture))
+        .provenance("Spec-SHA256", spec.as_str())
+        .provenance("Data-SHA256", data.as_str());
+    if let Some(reading) = picture.reading {
+        sheet = sheet.subtitle(wording::reading(reading));
+    }
+    if !picture.alterations.is_empty() {
+        sheet = sheet.banner(format!("NOT THE PUBLISHED PICTURE: {}", picture.alterations.join("; ")));
+    }
+    sheet
+}
+
+/// Up to three panels stand side by side, four in a square.
+fn columns(picture: &Picture) -> usize {
+    match picture.panels.len() {
+        n @ 0..=3 => n.max(1),
+        4 => 2,
+        _ => 3,
+    }
+}
+
+fn methods(picture: &Picture) -> String {
+    let mut names: Vec<&str> = picture.panels.iter().map(|p| p.run.method.name.name()).collect();
+    names.dedup();
+    if names.is_empty() { "study".into() } else { names.join(", ") }
+}
+
+/// "(ii)"; nothing where there is only one panel.
+fn label(picture: &Picture, panel: &Panel) -> String {
+    if picture.panels.len() > 1 { format!("({})", panel.label) } else { String::new() }
+}
+
+/// How much of a section is drawn.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Shown {
+    /// Both halves of the time.
+    Whole,
+    /// The later half.
+    Late,
+}
+
+/// Sections: the same axes in every panel, so that sizes can be compared.
+fn section_panels(
+    mut sheet: Sheet,
+    picture: &Picture,
+    recordings: &[Recording],
+    axes: [usize; 2],
+    shown: Shown,
+) -> Sheet {
+    let half = 0.5 * picture.panels[0].run.t_end;
+    let all = || recordings.iter().flat_map(|r| crossings(&r.data)).filter(|c| shown == Shown::Whole || c.t > half);
+    let names = picture.panels[0].run.system.coordinates();
+    let axis = |i: usize| Axis::covering(format!("*{}*", greek(names[axes[i]])), all().map(|c| c.x[axes[i]]));
+    for (panel, recording) in picture.panels.iter().zip(recordings) {
+        let half = 0.5 * panel.run.t_end;
+        let points = |late: bool| {
+            crossings(&recording.data).iter().filter(|c| (c.t > half) == late).map(|c| axes.map(|i| c.x[i])).collect()
+        };
+        let mut chart = PlanePanel::new(axis(0), axis(1));
+        if shown == Shown::Whole {
+            chart = chart.dots(points(false), DotStyle::early());
+        }
+        sheet = sheet.panel(label(picture, panel), panel.title.as_str(), chart.dots(points(true), DotStyle::late()));
+    }
+    let half = wording::number(half);
+    if shown == Shown::Whole {
+        sheet = sheet.legend(LegendEntry::new(LegendKey::Dots(DotStyle::early()), format!("*t* ≤ {half}")));
+    }
+    sheet.legend(LegendEntry::new(LegendKey::Dots(DotStyle::late()), format!("*t* > {half}")))
+}
+
+/// Paths in space: the same box in every panel.
+fn space_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording], camera: &Camera) -> Sheet {
+    let curves: Vec<Vec<Curve>> = recordings.iter().map(|r| curves(&r.data)).collect();
+    let ranges: [(f64, f64); 3] = std::array::from_fn(|i| {
+        let (low, high) = range_of(curves.iter().flatten().flat_map(|c| &c.points).map(|x| x[i]));
+        let margin = 0.04 * (high - low);
+        (low - margin, high + margin)
+    });
+    let names = picture.panels[0].run.system.coordinates();
+    let order = camera.axes;
+    let axis = |k: usize| {
+        let (low, high) = ranges[order[k]];
+        Axis::linear(format!("*{}*", greek(names[order[k]])), low, high)
+    };
+    let turn = |x: [f64; 3]| order.map(|i| x[i]);
+    for ((panel, recording), curves) in picture.panels.iter().zip(recordings).zip(&curves) {
+        let mut patches = surface::patches(&panel.run.system, &ranges, SURFACE_CELLS);
+        for corner in patches.iter_mut().flat_map(|p| p.corners.iter_mut()) {
+            *corner = turn(*corner);
+        }
+        let mut chart =
+            SpacePanel::new(axis(0), axis(1), axis(2)).camera(camera.azimuth, camera.elevation).surface(patches);
+        for curve in curves {
+            chart = chart.line(curve.points.iter().map(|x| turn(*x)).collect(), curve.style);
+        }
+        let exits: Vec<[f64; 3]> = exits(&recording.data).into_iter().map(turn).collect();
+        if !exits.is_empty() {
+            chart = chart.markers(exits, EXIT);
+        }
+        let singularity = surface::singularity(&panel.run.system, &ranges);
+        if let Some(point) = singularity {
+            chart = chart.markers(vec![turn(point)], SINGULARITY);
+        }
+        sheet = sheet.panel(label(picture, panel), panel.title.as_str(), chart);
+        // At the size of the whole the exits lie under the two-fold's dot.
+        if let (Some(point), [_]) = (singularity, picture.panels.as_slice())
+            && let Some(chart) = passage(panel, recording, curves, point, [order[0], order[1]], &ranges)
+        {
+            sheet.columns = 2;
+            sheet = sheet.panel("", "the passage, nearer, seen along the normal of the surface", chart);
+        }
+    }
+    let sheet = region_legend(sheet);
+    match recordings.first().map(|r| &r.data) {
+        Some(Data::Motion(_)) => sheet
+            .legend(LegendEntry::new(LegendKey::Line(SLIDING), "sliding"))
+            .legend(LegendEntry::new(LegendKey::Marker(EXIT), "exit")),
+        Some(Data::Funnel { futures, .. }) => sheet
+            .footer(returns(futures))
+            .legend(LegendEntry::new(LegendKey::Marker(EXIT), "exit"))
+            .legend(LegendEntry::new(LegendKey::Line(APPROACH), "the one way in"))
+            .legend(LegendEntry::new(LegendKey::Line(TO_PLUS), "ways out to *h* > 0"))
+            .legend(LegendEntry::new(LegendKey::Line(TO_MINUS), "ways out to *h* < 0")),
+        _ => sheet,
+    }
+}
+
+/// The switching surface around the two-fold at `centre`, over the coordinates `axes`: what slides there, where it leaves, and the flights over
+/// it. So wide that half of the exits lie well inside; nothing if there is no exit.
+fn passage(
+    panel: &Panel,
+    recording: &Recording,
+    curves: &[Curve],
+    centre: [f64; 3],
+    axes: [usize; 2],
+    ranges: &[(f64, f64); 3],
+) -> Option<PlanePanel> {
+    let exits: Vec<[f64; 2]> = exits(&recording.data).into_iter().map(|x| axes.map(|i| x[i])).collect();
+    let centre = axes.map(|i| centre[i]);
+    let distance = |p: &[f64; 2]| (p[0] - centre[0]).abs().max((p[1] - centre[1]).abs());
+    let mut distances: Vec<f64> = exits.iter().map(distance).collect();
+    distances.sort_by(f64::total_cmp);
+    let reach = 2.0 * distances.get(distances.len() / 2)?;
+    if reach.is_nan() || reach <= 0.0 {
+        return None;
+    }
+    let mut window = *ranges;
+    for (k, i) in axes.into_iter().enumerate() {
+        window[i] = (centre[k] - reach, centre[k] + reach);
+    }
+    let names = panel.run.system.coordinates();
+    let axis = |k: usize| {
+        let (low, high) = window[axes[k]];
+        Axis::linear(format!("*{}*", greek(names[axes[k]])), low, high)
+    };
+    let mut chart = PlanePanel::new(axis(0), axis(1)).equal();
+    for patch in surface::patches(&panel.run.system, &window, PASSAGE_CELLS) {
+        chart = chart.area(patch.corners.iter().map(|x| axes.map(|i| x[i])).collect(), patch.colour);
+    }
+    for curve in curves {
+        let seen: Vec<[f64; 2]> = curve.points.iter().map(|x| axes.map(|i| x[i])).collect();
+        // Only what lies in the window: long orbits would weigh down the file.
+        for part in seen.split(|p| distance(p) > reach).filter(|part| part.len() > 1) {
+            chart = chart.line(part.to_vec(), curve.style);
+        }
+    }
+    let inside: Vec<[f64; 2]> = exits.into_iter().filter(|p| distance(p) <= reach).collect();
+    Some(chart.markers(inside, EXIT).markers(vec![centre], SINGULARITY))
+}
+
+/// Cells of the switching surface along each side of the nearer view.
+const PASSAGE_CELLS: usize = 12;
+
+/// How many futures came back to the two-fold.
+fn returns(futures: &[Future]) -> String {
+    let comes_back = |f: &&Future| f.motion.events.iter().any(|e| matches!(e.kind, EventKind::TwoFoldReached { .. }));
+    let longest = futures.iter().filter_map(|f| Some(f.motion.samples().last()?.1.t - f.motion.samples().next()?.1.t));
+    format!(
+        "{} of {} futures come back to the two-fold within {} of leaving it",
+        futures.iter().filter(comes_back).count(),
+        futures.len(),
+        wording::number(longest.fold(0.0, f64::max).round())
+    )
+}
+
+/// A curve in space.
+struct Curve {
+    points: Vec<[f64; 3]>,
+    style: LineStyle,
+}
+
+/// What is drawn of a recording in space.
+fn curves(data: &Data) -> Vec<Curve> {
+    let points = |samples: &[Sample]| samples.iter().map(|s| s.x).collect::<Vec<_>>();
+    let motion = |motion: &Motion, flight: LineStyle, sliding: LineStyle| -> Vec<Curve> {
+        let style = |mode: &Mode| if mode.slides() { sliding } else { flight };
+        motion.pieces.iter().map(|(mode, samples)| Curve { points: points(samples), style: style(mode) }).collect()
+    };
+    match data {
+        Data::Section(_) => Vec::new(),
+        Data::Path(samples) => vec![Curve { points: points(samples), style: LineStyle::new(style::INK, PATH_PT) }],
+        Data::Motion(m) => motion(m, FLIGHT, SLIDING),
+        Data::Funnel { approach, futures } => {
+            let mut all = Vec::new();
+            for future in futures {
+                let style = if future.side == Side::Plus { TO_PLUS } else { TO_MINUS };
+                all.extend(motion(&future.motion, style, style));
+            }
+            all.extend(motion(approach, APPROACH, APPROACH));
+            all
+        }
+    }
+}
+
+/// Where a motion leaves repelling sliding.
+fn exits(data: &Data) -> Vec<[f64; 3]> {
+    let of = |motion: &Motion| -> Vec<[f64; 3]> {
+        let leaves = |kind: &EventKind| matches!(kind, EventKind::Exit { .. } | EventKind::ExitAtBoundary { .. });
+        motion.events.iter().filter(|e| leaves(&e.kind)).map(|e| e.state.into()).collect()
+    };
+    match data {
+        Data::Motion(motion) => of(motion),
+        // Of a future the first one: later ones are other visits.
+        Data::Funnel { futures, .. } => futures.iter().filter_map(|f| of(&f.motion).into_iter().next()).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// What the colours of the surface mean.
+fn region_legend(sheet: Sheet) -> Sheet {
+    let area = |colour, text: &str| LegendEntry::new(LegendKey::Area(colour, style::SURFACE_OPACITY), text);
+    sheet
+        .legend(area(style::ATTRACTING, "attracting"))
+        .legend(area(style::REPELLING, "repelling"))
+        .legend(area(style::CROSSING, "crossing"))
+        .legend(LegendEntry::new(LegendKey::Marker(SINGULARITY), "two-fold singularity"))
+}
+
+/// Cells of the switching surface along each side.
+const SURFACE_CELLS: usize = 60;
+/// Width of a long path, in points: thinner than a curve, so that windings stay apart.
+const PATH_PT: f64 = 0.5;
+/// Free flight of a Filippov motion.
+const FLIGHT: LineStyle = LineStyle::new(style::INK, 0.6);
+/// Sliding, drawn apart from flight by width and colour.
+const SLIDING: LineStyle = LineStyle::new(style::GREEN, 1.6);
+/// The motion up to a set-valued point.
+const APPROACH: LineStyle = LineStyle::new(style::INK, 1.4);
+/// Futures on the side h > 0.
+const TO_PLUS: LineStyle = LineStyle::new(style::BLUE, 0.5);
+/// Futures on the side h < 0.
+const TO_MINUS: LineStyle = LineStyle::new(style::VERMILLION, 0.5);
+/// The end of repelling sliding.
+const EXIT: MarkerStyle = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::GREEN, size: 3.6 };
+/// The two-fold.
+const SINGULARITY: MarkerStyle = MarkerStyle::new(MarkerShape::Dot, style::MAGENTA);
+
+fn crossings(data: &Data) -> &[Crossing] {
+    match data {
+        Data::Section(crossings) => crossings,
+        _ => &[],
+    }
+}
+
+/// A coordinate's name as it is printed.
+fn greek(name: &str) -> &str {
+    match name {
+        "omega" => "ω",
+        other => other,
+    }
+}

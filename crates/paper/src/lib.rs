@@ -1,0 +1,291 @@
+//! Figures as data.
+//!
+//! A [`Figure`] is a list of pictures, a picture a list of panels, a panel a question ([`RunSpec`]). The way of every
+//! figure is the same: questions -> [`pipeline`] (asked of a [`Desk`](twofold_job::Desk) side by side, each computed once) -> answers
+//! -> [`drawing`] -> bytes -> files. The figures themselves stand in `figures/NAME/figure.rs`: every number of the
+//! paper's caption, and nothing else.
+//!
+//! ```
+//! use twofold_job::Desk;
+//! use twofold_paper::{figures, pipeline};
+//! let figure = figures::all().into_iter().find(|f| f.id == "fig1").expect("the first figure");
+//! let picture = pipeline::compute(&figure.pictures[0], &Desk::quiet())?;
+//! assert!(picture.rendered.svg.starts_with(b"<?xml") || picture.rendered.svg.starts_with(b"<svg"));
+//! // The committed reference holds the same hashes.
+//! let reference = figures::reference("fig1").expect("every figure has one");
+//! assert!(reference.contains(picture.record.hashes.pixels.as_str()));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
+
+// The figures' files, which stand in figures/, call the library by its public name and paths, as anybody's own figure would.
+extern crate self as twofold;
+use crate as paper;
+#[rustfmt::skip]
+use {
+    twofold_analyse as analyse, twofold_integrate as integrate, twofold_job as job, twofold_job::record, twofold_num as num,
+    twofold_render as render, twofold_system as system,
+};
+
+pub mod audit;
+pub mod census;
+pub mod checkpoints;
+pub mod claim;
+pub mod claims;
+pub mod compare;
+pub mod draw;
+pub mod drawing;
+pub mod figures;
+pub mod pipeline;
+pub mod readme;
+pub mod report;
+pub mod standing;
+pub mod study;
+pub mod verdict;
+pub mod wording;
+
+use serde::{Deserialize, Serialize};
+
+pub use study::Study;
+use twofold_integrate::filippov::ExitRule;
+use twofold_job::spec::{Method, RunSpec, SwitchSpec};
+use twofold_system::Caricature;
+use verdict::Claim;
+
+/// A figure of the paper.
+#[derive(Clone, Debug)]
+pub struct Figure {
+    /// "fig7".
+    pub id: &'static str,
+    /// What it shows, in our own words.
+    pub title: &'static str,
+    /// Its pictures: one per parameter reading, or one.
+    pub pictures: Vec<Picture>,
+}
+
+/// One picture file.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// File name without extension, "fig7-printed".
+    pub name: String,
+    /// The parameter reading, if the figure has readings.
+    pub reading: Option<Reading>,
+    /// The heading.
+    pub title: &'static str,
+    /// The caption, in our own words.
+    pub caption: String,
+    /// How panels are drawn.
+    pub view: View,
+    /// The panels, in the paper's order.
+    pub panels: Vec<Panel>,
+    /// What sets this picture apart from the published one ("t = 500 instead of 200000"), empty for the real thing.
+    pub alterations: Vec<String>,
+}
+
+/// One panel: a label and a question.
+#[derive(Clone, Debug)]
+pub struct Panel {
+    /// "i", "ii", ... as in the paper.
+    pub label: String,
+    /// A few words above the panel.
+    pub title: String,
+    /// The run.
+    pub run: RunSpec,
+    /// What the paper says of it.
+    pub claim: Option<Claim>,
+}
+
+/// How the panels of a picture are drawn.
+#[derive(Clone, Copy, Debug)]
+pub enum View {
+    /// A Poincare section in the plane of two coordinates: early half faint, late half dark.
+    Section {
+        /// Index of the horizontal coordinate.
+        horizontal: usize,
+        /// Index of the vertical coordinate.
+        vertical: usize,
+    },
+    /// The later half of such a section alone, as the paper shows it.
+    LateSection {
+        /// Index of the horizontal coordinate.
+        horizontal: usize,
+        /// Index of the vertical coordinate.
+        vertical: usize,
+    },
+    /// A path in space with the switching surface.
+    Space {
+        /// Camera and axes.
+        camera: Camera,
+    },
+    /// Something other than runs: a sketch computed from the model, a comparison of methods. The picture has no panels of
+    /// runs; the study makes its own.
+    Study(Study),
+}
+
+/// An orthographic view of the state space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Which coordinate runs along each horizontal axis and which one points up.
+    pub axes: [usize; 3],
+    /// Azimuth, degrees.
+    pub azimuth: f64,
+    /// Elevation, degrees.
+    pub elevation: f64,
+}
+
+/// The two readings of the paper's parameters, always shown side by side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reading {
+    /// As printed: alpha = 1e-3, beta = 1e-5. Its late motion is always one stable periodic orbit.
+    Printed,
+    /// One digit changed: alpha = 1e-1, beta = 1e-5. It gives the paper's story.
+    Reconstructed,
+}
+
+impl Reading {
+    /// Both, in the order in which they are shown.
+    pub const ALL: [Reading; 2] = [Reading::Printed, Reading::Reconstructed];
+
+    /// The word used in file names and small print.
+    pub fn word(self) -> &'static str {
+        match self {
+            Reading::Printed => "printed",
+            Reading::Reconstructed => "reconstructed",
+        }
+    }
+
+    /// The caricature with this reading's re-injection.
+    pub fn caricature(self) -> Caricature {
+        match self {
+            Reading::Printed => Caricature::with_reinjection(1e-3, 1e-5),
+            Reading::Reconstructed => Caricature::with_reinjection(1e-1, 1e-5),
+        }
+    }
+}
+
+impl Figure {
+    /// A figure with one study per reading, printed first.
+    pub fn studied_in_both_readings(id: &'static str, title: &'static str, caption: &str, studies: [Study; 2]) -> Self {
+        let pictures = Reading::ALL
+            .into_iter()
+            .zip(studies)
+            .map(|(reading, study)| Picture {
+                name: format!("{id}-{}", reading.word()),
+                reading: Some(reading),
+                title,
+                caption: caption.to_owned(),
+                view: View::Study(study),
+                panels: Vec::new(),
+                alterations: Vec::new(),
+            })
+            .collect();
+        Figure { id, title, pictures }
+    }
+
+    /// A figure with one picture of runs per reading.
+    pub fn in_both_readings(
+        id: &'static str,
+        title: &'static str,
+        view: View,
+        caption: impl Fn(Reading) -> String,
+        panels: impl Fn(Reading) -> Vec<Panel>,
+    ) -> Self {
+        let pictures = Reading::ALL
+            .map(|reading| Picture {
+                name: format!("{id}-{}", reading.word()),
+                reading: Some(reading),
+                title,
+                caption: caption(reading),
+                view,
+                panels: panels(reading),
+                alterations: Vec::new(),
+            })
+            .into();
+        Figure { id, title, pictures }
+    }
+}
+
+impl Panel {
+    /// A panel.
+    pub fn new(label: &str, title: impl Into<String>, run: RunSpec) -> Self {
+        Panel { label: label.to_owned(), title: title.into(), run, claim: None }
+    }
+
+    /// The panel with what the paper says of it.
+    pub fn claimed(self, claim: Claim) -> Self {
+        Panel { claim: Some(claim), ..self }
+    }
+}
+
+/// Changes a user may ask for. A changed picture gets another name and says on its face what was changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Alterations {
+    /// Another seed for kicks and exits.
+    pub seed: Option<u64>,
+    /// A shorter (or longer) run.
+    pub t_end: Option<f64>,
+    /// Another method.
+    pub method: Option<Method>,
+    /// The later half of sections alone.
+    pub late: bool,
+}
+
+impl Picture {
+    /// Applies what the user asked for.
+    pub fn alter(&mut self, alterations: &Alterations) {
+        let mut suffix = String::new();
+        if let Some(seed) = alterations.seed {
+            let mut changed = false;
+            for kick in self.panels.iter_mut().filter_map(|p| p.run.schedule.kick.as_mut()) {
+                changed |= kick.seed != seed;
+                kick.seed = seed;
+            }
+            for panel in &mut self.panels {
+                if let SwitchSpec::Filippov { exit: ExitRule::Random { seed: old, .. }, .. } = &mut panel.run.switch {
+                    changed |= *old != seed;
+                    *old = seed;
+                }
+            }
+            if changed {
+                suffix += &format!("-seed{seed}");
+                self.alterations.push(format!("seed {seed}"));
+            }
+        }
+        if let Some(method) = alterations.method
+            && self.panels.iter().any(|p| p.run.method.name != method)
+        {
+            for panel in &mut self.panels {
+                panel.run.method.name = method;
+            }
+            suffix += &format!("-{}", method.name());
+            self.alterations.push(format!("method {}", method.name()));
+        }
+        if let Some(t_end) = alterations.t_end
+            && let Some(original) = self.panels.iter().map(|p| p.run.t_end).find(|t| *t != t_end)
+        {
+            for panel in &mut self.panels {
+                panel.run.t_end = t_end;
+            }
+            let word = if t_end < original { "shortened" } else { "lengthened" };
+            suffix += &format!("-{word}");
+            self.alterations.push(format!("{word}: t = {t_end} instead of {original}"));
+        }
+        if let (true, View::Section { horizontal, vertical }) = (alterations.late, self.view) {
+            self.view = View::LateSection { horizontal, vertical };
+            suffix += "-late";
+            self.alterations.push("the later half alone".to_owned());
+        }
+        self.name += &suffix;
+    }
+
+    /// Keeps one panel.
+    pub fn keep_only(&mut self, label: &str) {
+        if self.panels.len() > 1 {
+            self.panels.retain(|p| p.label == label);
+            self.name += &format!("-only-{label}");
+            self.alterations.push(format!("panel ({label}) only"));
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! Findings in sentences: those of the folder as it is, from its verdicts, and those of the published figures, from the README that this program
+//! was built with, whose numbers are tested.
+
+use std::fmt::Write as _;
+
+use super::html::escape;
+use super::model::{Report, VerdictReport};
+use crate::Reading;
+
+const README: &str = include_str!("../../../../README.md");
+
+/// What this folder's verdicts say, a paragraph for each reading, as HTML.
+pub fn of_this_folder(report: &Report) -> Vec<String> {
+    let pictures = || {
+        let figures = report.figures.iter().filter(|f| super::assemble::of_the_paper(&f.id));
+        figures.flat_map(|f| &f.pictures).filter(|p| p.alterations.is_empty())
+    };
+    let mut paragraphs = Vec::new();
+    for reading in &report.summary.readings {
+        let of = match reading.reading {
+            Some(r) => format!("In the {} reading", r.word()),
+            None => "In figures that have one reading".to_owned(),
+        };
+        let verdicts: Vec<(String, &VerdictReport)> = pictures()
+            .filter(|p| p.reading == reading.reading)
+            .flat_map(|p| p.verdicts.iter().map(|v| (panel_name(&p.name, p.reading, &v.panel), v)))
+            .collect();
+        let list = |agrees: bool| {
+            let said = |(panel, v): &(String, &VerdictReport)| {
+                if agrees {
+                    format!("{panel} ({})", v.claim)
+                } else {
+                    format!("{panel} (said: {}; found: {})", v.claim, v.found)
+                }
+            };
+            verdicts.iter().filter(|(_, v)| v.agrees == agrees).map(said).collect::<Vec<_>>().join("; ")
+        };
+        let mut text =
+            format!("{of}, {} of {} claims of the paper that were judged here hold", reading.agree, reading.claims);
+        let (hold, fail) = (list(true), list(false));
+        if !hold.is_empty() {
+            let _ = write!(text, ": {hold}");
+        }
+        text.push('.');
+        if !fail.is_empty() {
+            let _ = write!(text, " These do not: {fail}.");
+        }
+        if let Some(alike) = &reading.all_alike {
+            let _ = write!(
+                text,
+                " All {} noise-free sections end alike ({}), so that agreement with a claim of that kind says nothing for this reading.",
+                alike.panels, alike.kind
+            );
+        }
+        paragraphs.push(escape(&text));
+    }
+    paragraphs
+}
+
+/// "fig. 7(ii)".
+fn panel_name(picture: &str, reading: Option<Reading>, panel: &str) -> String {
+    let base = reading.map_or(picture.to_owned(), |r| picture.replace(&format!("-{}", r.word()), ""));
+    match base.strip_prefix("fig") {
+        Some(number) => format!("fig. {number}({panel})"),
+        None => format!("{base} ({panel})"),
+    }
+}
+
+/// What the README says was found: its paragraphs that begin with a finding in bold, and its theorems, as HTML blocks.
+pub fn of_the_project() -> Vec<String> {
+    let section = README.split("\n## ").find(|s| s.starts_with("What was found")).unwrap_or_default();
+    let mut blocks = Vec::new();
+    let mut heading = "";
+    for block in section.split("\n\n").map(str::trim) {
+        if let Some(text) = block.strip_prefix("### ") {
+            heading = text;
+        } else if block.starts_with("**") {
+            blocks.push(format!("<p>{}</p>", inline(block)));
+        } else if heading == "Theorems" && block.starts_with("- ") {
+            let items = format!("\n{block}");
+            let items: Vec<String> = items.split("\n- ").skip(1).map(|i| format!("<li>{}</li>", inline(i))).collect();
+            blocks.push(format!("<p>Proved, for smoothing at ε = 10⁻³:</p>\n<ul>\n{}\n</ul>", items.join("\n")));
+        }
+    }
+    blocks
+}
+
+/// Markdown's emphasis, code and links inside a paragraph. A link's target is a place in the repository: only its text is kept.
+fn inline(markdown: &str) -> String {
+    let mut out = String::new();
+    let mut rest = markdown;
+    let (mut strong, mut emphasis) = (false, false);
+    while let Some(at) = rest.find(['*', '`', '[']) {
+        out.push_str(&escape(&rest[..at]));
+        rest = &rest[at..];
+        if let Some(after) = rest.strip_prefix("**") {
+            out.push_str(if strong { "</strong>" } else { "<strong>" });
+            (strong, rest) = (!strong, after);
+        } else if let Some(after) = rest.strip_prefix('*') {
+            out.push_str(if emphasis { "</em>" } else { "<em>" });
+            (emphasis, rest) = (!emphasis, after);
+        } else if let Some((code, after)) = rest.strip_prefix('`').and_then(|r| r.split_once('`')) {
+            let _ = write!(out, "<code>{}</code>", escape(code));
+            rest = after;
+        } else if let Some((text, after)) = link(rest) {
+            out.push_str(&inline(text));
+            rest = after;
+        } else {
+            out.push_str(&escape(&rest[..1]));
+            rest = &rest[1..];
+        }
+    }
+    out.push_str(&escape(rest));
+    if emphasis {
+        out.push_str("</em>");
+    }
+    if strong {
+        out.push_str("</strong>");
+    }
+    out
+}
+
+/// "[text](target)" at the start: the text, and what follows.
+fn link(from: &str) -> Option<(&str, &str)> {
+    let (text, after) = from.strip_prefix('[')?.split_once("](")?;
+    (!text.contains(']')).then_some(())?;
+    Some((text, after.split_once(')')?.1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn markdown_becomes_html() {
+        assert_eq!(
+            inline("**A & b.** See [`x`](y/z.md), *p*."),
+            "<strong>A &amp; b.</strong> See <code>x</code>, <em>p</em>."
+        );
+        assert_eq!(inline("of runs [7, 22] < 1"), "of runs [7, 22] &lt; 1");
+        assert_eq!(inline("`a*b` and *c"), "<code>a*b</code> and <em>c</em>");
+    }
+
+    #[test]
+    fn the_readme_has_findings() {
+        let blocks = of_the_project();
+        assert!(blocks.len() >= 6, "{blocks:#?}");
+        assert!(blocks.iter().any(|b| b.contains("<strong>The singularity eats digits.</strong>")));
+        assert!(blocks.last().unwrap().contains("<li>"));
+        assert!(blocks.iter().all(|b| !b.contains("](") && !b.contains("**")), "{blocks:#?}");
+    }
+}

@@ -1,0 +1,253 @@
+//! Pictures that stand: what this very program has drawn of the same questions is there already, and is not drawn again.
+//!
+//! That one program makes the same bytes of the same questions is what the whole project promises and tests; here it saves time. Once a picture's files are
+//! written, the digest of its record goes into the store, under what the picture asks, together with the digest of the program's own file. Later a picture
+//! stands if the store knows its record *from a program of the same digest*, the record in the folder has the digest that is known, and every file
+//! that the record names has the digest that the record names. Otherwise - another program, a file that is gone or was changed by one
+//! bit - it is made again.
+//!
+//! Only who has a store comes here: what is checked or blessed, and what is made with `--fresh`, is always computed.
+
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+use super::pipeline::{PictureRecord, compute, parts};
+use super::{Picture, View};
+use twofold_integrate::Watch;
+use twofold_job::question::{key, question_hash};
+use twofold_job::record::{FileError, Hash, files};
+use twofold_job::store::Kept;
+use twofold_job::{Answer, Desk, JobError, Question, Store};
+
+/// Knows which pictures stand.
+#[derive(Debug)]
+pub struct Standing<'a> {
+    store: &'a Store,
+    program: Hash,
+}
+
+/// A picture that need not be made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stands {
+    /// What is known about it.
+    pub record: PictureRecord,
+    /// Its files and their lengths.
+    pub files: Vec<(PathBuf, u64)>,
+}
+
+/// A picture as a question, whose answer is the digest of its record.
+#[derive(Debug)]
+struct Drawn<'a>(&'a Picture);
+
+impl Question for Drawn<'_> {
+    fn kind(&self) -> &'static str {
+        "picture"
+    }
+
+    /// Everything that one program may put differently into two pictures. Colours, sizes and words are the program's, whose digest is part of the
+    /// answer.
+    fn json(&self) -> Value {
+        let Picture { name, reading, title, caption, view, panels, alterations } = self.0;
+        let asked: Vec<_> = parts(self.0).into_iter().map(|(part, q)| (part, question_hash(&*q))).collect();
+        let said: Vec<_> = panels.iter().map(|p| (&p.title, &p.claim)).collect();
+        let view = match view {
+            // Which function draws: how far it lies from another one, since a program is loaded now here, now there.
+            View::Study(study) => {
+                let here = Standing::of as *const () as usize;
+                json!({ "study": (study.draw as *const () as usize).wrapping_sub(here) })
+            }
+            other => json!(format!("{other:?}")),
+        };
+        json!({
+            "name": name, "reading": reading, "title": title, "caption": caption, "alterations": alterations, "view": view,
+            "asked": asked, "said": said,
+        })
+    }
+
+    fn compute(&self, desk: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        let made = compute(self.0, desk).map_err(|error| JobError::Other(error.to_string()))?;
+        Ok(answer(&made.record))
+    }
+}
+
+/// The answer to [`Drawn`].
+fn answer(record: &PictureRecord) -> Answer {
+    Answer::of_tables(Vec::new()).with_fact(RECORD, &Hash::of(&record.to_json()))
+}
+
+/// The digest of a record's file.
+const RECORD: &str = "record_sha256";
+/// The digest of the program that made it.
+const PROGRAM: &str = "program_sha256";
+
+impl<'a> Standing<'a> {
+    /// What `store` knows of pictures by this program. None if the program's own file cannot be read: then nothing is known to stand.
+    pub fn of(store: &'a Store) -> Option<Self> {
+        let (program, _) = files::digest(&std::env::current_exe().ok()?).ok()?;
+        Some(Self { store, program })
+    }
+
+    /// The picture, if it stands in `folder`.
+    pub fn find(&self, picture: &Picture, folder: &Path) -> Option<Stands> {
+        let question = Drawn(picture);
+        let Kept::Answer(known) = self.store.get(&key(&question), &question) else { return None };
+        if known.fact::<Hash>(PROGRAM).ok()? != self.program {
+            return None;
+        }
+        let path = folder.join(format!("{}.json", picture.name));
+        let bytes = files::read(&path).ok()?;
+        if known.fact::<Hash>(RECORD).ok()? != Hash::of(&bytes) {
+            return None;
+        }
+        let record: PictureRecord = serde_json::from_slice(&bytes).ok()?;
+        let mut stands: Vec<(PathBuf, u64)> = record
+            .files()
+            .into_par_iter()
+            .map(|(file, hash)| {
+                let path = folder.join(file);
+                let (found, length) = files::digest(&path).ok()?;
+                (found == *hash).then_some((path, length))
+            })
+            .collect::<Option<_>>()?;
+        stands.push((path, bytes.len() as u64));
+        Some(Stands { record, files: stands })
+    }
+
+    /// Remembers a picture whose files have been written.
+    ///
+    /// # Errors
+    /// If the store cannot be written: the picture will be made again next time.
+    pub fn remember(&self, picture: &Picture, record: &PictureRecord) -> Result<(), FileError> {
+        let question = Drawn(picture);
+        self.store.put(&key(&question), &question, &answer(record).with_fact(PROGRAM, &self.program))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::pipeline::compute_with_tables;
+    use crate::{Reading, Study, figures};
+    use twofold_render::Sheet;
+    use twofold_render::sheet::ColumnWidth;
+
+    /// What panels of runs say is part of what is asked.
+    #[test]
+    fn another_run_title_claim_or_view_is_another_picture() {
+        let picture = figures::fig7::figure().pictures.remove(0);
+        let asked = |p: &Picture| key(&Drawn(p));
+        let changes: [&dyn Fn(&mut Picture); 6] = [
+            &|p| p.panels[1].title.push('.'),
+            &|p| p.panels[1].label.push('.'),
+            &|p| p.panels[1].claim = None,
+            &|p| p.panels[1].run.t_end += 1.0,
+            &|p| p.view = View::Section { horizontal: 2, vertical: 0 },
+            &|p| drop(p.panels.pop()),
+        ];
+        for change in changes {
+            let mut different = picture.clone();
+            change(&mut different);
+            assert_ne!(asked(&different), asked(&picture));
+        }
+        assert_eq!(asked(&picture.clone()), asked(&picture));
+    }
+
+    /// Makes the first figure into `folder` as the command line does, and remembers it.
+    fn made(standing: &Standing<'_>, folder: &Path) -> (Picture, PictureRecord) {
+        let picture = figures::fig1::figure().pictures.remove(0);
+        let put = |file: &str, bytes: &[u8]| twofold_job::record::write(&folder.join(file), bytes);
+        let computed = compute_with_tables(&picture, &Desk::quiet(), &mut |file, bytes| put(file, bytes)).unwrap();
+        let name = &picture.name;
+        put(&format!("{name}.png"), &computed.rendered.png).unwrap();
+        put(&format!("{name}.svg"), &computed.rendered.svg).unwrap();
+        put(&format!("{name}.pdf"), &computed.rendered.pdf).unwrap();
+        put(&format!("{name}.json"), &computed.record.to_json()).unwrap();
+        standing.remember(&picture, &computed.record).unwrap();
+        (picture, computed.record)
+    }
+
+    #[test]
+    fn a_picture_stands_until_anything_of_it_changes() {
+        let place = tempfile::tempdir().unwrap();
+        let store = Store::new(place.path().join("store"));
+        let standing = Standing::of(&store).unwrap();
+        let folder = place.path().join("fig1");
+        let (picture, record) = made(&standing, &folder);
+        let stands = standing.find(&picture, &folder).expect("nothing has changed");
+        assert_eq!(stands.record, record);
+        let mut there: Vec<_> = fs::read_dir(&folder)
+            .unwrap()
+            .map(|e| e.unwrap())
+            .map(|e| (e.path(), e.metadata().unwrap().len()))
+            .collect();
+        let mut found = stands.files.clone();
+        there.sort();
+        found.sort();
+        assert_eq!(found, there, "all of its files and no other");
+        assert!(record.files().len() > 3, "tables too");
+
+        // One bit of any file, one byte more, or no file.
+        for (path, _) in &found {
+            let whole = fs::read(path).unwrap();
+            let mut changed = whole.clone();
+            changed[whole.len() / 2] ^= 1;
+            let longer = [&whole[..], b"\n"].concat();
+            for bytes in [Some(changed), Some(longer), None] {
+                match bytes {
+                    Some(bytes) => fs::write(path, bytes).unwrap(),
+                    None => fs::remove_file(path).unwrap(),
+                }
+                assert_eq!(standing.find(&picture, &folder), None, "{}", path.display());
+            }
+            fs::write(path, whole).unwrap();
+        }
+        assert!(standing.find(&picture, &folder).is_some());
+    }
+
+    #[test]
+    fn nothing_stands_that_another_program_made_or_that_asks_something_else() {
+        let place = tempfile::tempdir().unwrap();
+        let store = Store::new(place.path().join("store"));
+        let folder = place.path().join("fig1");
+        let other = Standing { store: &store, program: Hash::of(b"another program") };
+        let (picture, record) = made(&other, &folder);
+        assert!(other.find(&picture, &folder).is_some());
+        let ours = Standing::of(&store).unwrap();
+        assert_eq!(ours.find(&picture, &folder), None, "by another program");
+        ours.remember(&picture, &record).unwrap();
+        assert!(ours.find(&picture, &folder).is_some());
+        assert_eq!(other.find(&picture, &folder), None, "ours has taken its place");
+
+        let View::Study(study) = picture.view else { panic!("figure 1 is a study") };
+        let changes: [&dyn Fn(&mut Picture); 8] = [
+            &|p| p.alterations.push("seed 2".into()),
+            &|p| p.title = "something else",
+            &|p| p.caption.push('.'),
+            &|p| p.name.push_str("-printed"),
+            &|p| p.reading = Some(Reading::Printed),
+            &|p| p.view = View::Study(Study { draw: |_| Sheet::new(ColumnWidth::Single, 1, ""), ..study }),
+            &|p| p.view = View::Study(Study { questions: Vec::new, ..study }),
+            &|p| p.view = View::Section { horizontal: 0, vertical: 2 },
+        ];
+        for change in changes {
+            let mut different = picture.clone();
+            change(&mut different);
+            assert_eq!(ours.find(&different, &folder), None, "{different:?}");
+        }
+        assert_eq!(ours.find(&picture, place.path()), None, "elsewhere there is nothing");
+    }
+
+    /// What is remembered is what drawing it anew would answer.
+    #[test]
+    fn the_answer_is_that_of_the_question() {
+        let picture = figures::fig1::figure().pictures.remove(0);
+        let desk = Desk::quiet();
+        let drawn = Drawn(&picture).compute(&desk, &()).unwrap();
+        let record = compute(&picture, &desk).unwrap().record;
+        assert_eq!(drawn.fact::<Hash>(RECORD).unwrap(), Hash::of(&record.to_json()));
+    }
+}

@@ -1,0 +1,191 @@
+//! Words and numbers for people: small print, in the renderer's rich-text markup.
+
+use super::Reading;
+use twofold_integrate::filippov::{ExitRule, Side, SlidingLaw};
+use twofold_integrate::{Kick, StepCap};
+use twofold_job::spec::{MethodSpec, RunSpec, SwitchSpec};
+use twofold_render::markup;
+pub use twofold_render::number::number;
+use twofold_system::{Compiled, Relaxation, System, Transition};
+
+/// "reconstructed reading: *α* = 0.1, *β* = 10^{-5}".
+pub fn reading(reading: Reading) -> String {
+    let c = reading.caricature();
+    format!("{} reading: *α* = {}, *β* = {}", reading.word(), number(c.alpha), number(c.beta))
+}
+
+/// The system and its parameters.
+pub fn system(system: &System) -> String {
+    match system.compiled() {
+        Some(Compiled::Caricature(c)) => format!(
+            "*α* = {}, *β* = {}, *v*_{{+}} = {}, *v*_{{−}} = {}",
+            number(c.alpha),
+            number(c.beta),
+            number(c.v_plus),
+            number(c.v_minus)
+        ),
+        Some(Compiled::Wheel(w)) => format!(
+            "wheel (reconstruction): *m* = {}, *J* = {}, *d* = {}, *γ* = {}, *k*_{{w}} = {}, *c*_{{w}} = {}, *c*_{{h}} = {}, \
+             *ω*_{{0}} = {}, *F* = {}, *q* = {}, *V*_{{c}} = {}",
+            number(w.m),
+            number(w.j),
+            number(w.d),
+            angle(w.gamma),
+            number(w.k_w),
+            number(w.c_w),
+            number(w.c_h),
+            number(w.omega0),
+            number(w.side_force),
+            number(w.trail),
+            number(w.v_c)
+        ),
+        None => {
+            let said = |(name, value): (&str, &twofold_num::Decimal)| {
+                format!("{} = {}", markup::name(name), number(value.value()))
+            };
+            let parameters = system.parameters().map(said);
+            let title = system.definition().title();
+            let name = (!title.is_empty()).then(|| markup::literal(title));
+            name.into_iter().chain(parameters).collect::<Vec<_>>().join(", ")
+        }
+    }
+}
+
+/// An angle, where it is a plain fraction of π as that.
+fn angle(radians: f64) -> String {
+    let fraction = [2, 3, 4, 6, 8, 12].into_iter().find(|n| radians == std::f64::consts::PI / f64::from(*n));
+    fraction.map_or_else(|| number(radians), |n| format!("π/{n}"))
+}
+
+/// How the switch is modelled.
+pub fn switch(switch: &SwitchSpec) -> String {
+    match switch {
+        SwitchSpec::Smoothed { eps, transition: Transition::Tanh } => format!("tanh smoothing, *ε* = {}", number(*eps)),
+        SwitchSpec::Smoothed { eps, transition: Transition::PerturbedTanh { sigma } } => {
+            format!("perturbed tanh smoothing, *ε* = {}, *σ* = {}", number(*eps), number(*sigma))
+        }
+        SwitchSpec::Smoothed { eps, transition: Transition::Arctan } => {
+            format!("arctan smoothing, *ε* = {}", number(*eps))
+        }
+        SwitchSpec::Smoothed { eps, transition: Transition::Algebraic } => {
+            format!("algebraic smoothing, *ε* = {}", number(*eps))
+        }
+        SwitchSpec::Smoothed { eps, transition: Transition::Erf } => format!("erf smoothing, *ε* = {}", number(*eps)),
+        SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. } => format!(
+            "hysteresis ({}), *ε* = {}, *ε*′ = {}",
+            match relaxation {
+                Relaxation::Literal => "literal",
+                Relaxation::Single => "single division",
+            },
+            number(*eps),
+            number(*eps_prime)
+        ),
+        SwitchSpec::Filippov { exit, .. } => format!("discontinuous (Filippov), exit {}", exit_rule(exit)),
+    }
+}
+
+/// An exit rule in words.
+pub fn exit_rule(rule: &ExitRule) -> String {
+    let to = |side: Side| match side {
+        Side::Plus => "*h* > 0",
+        Side::Minus => "*h* < 0",
+    };
+    match rule {
+        ExitRule::AtOnce { side } => format!("at once to {}", to(*side)),
+        ExitRule::AfterTime { time, side } => format!("after a time of {} to {}", number(*time), to(*side)),
+        ExitRule::AfterArc { arc, side } => format!("after an arc of {} to {}", number(*arc), to(*side)),
+        ExitRule::Random { law, plus_probability, seed, stream } => {
+            let law = match law {
+                SlidingLaw::Uniform { longest } => format!("uniform up to {}", number(*longest)),
+                SlidingLaw::Exponential { mean } => format!("exponential with mean {}", number(*mean)),
+            };
+            format!(
+                "after a random time ({law}) to a random side (*h* > 0 with probability {}; ChaCha8, seed {seed}, stream {stream})",
+                number(*plus_probability)
+            )
+        }
+        ExitRule::All => "all: the whole funnel".into(),
+    }
+}
+
+/// Error control: tolerances and step cap.
+pub fn control(method: &MethodSpec) -> String {
+    let tolerance = method.tolerance;
+    let tolerances = if tolerance.rtol == tolerance.atol {
+        format!("rtol = atol = {}", number(tolerance.rtol))
+    } else {
+        format!("rtol = {}, atol = {}", number(tolerance.rtol), number(tolerance.atol))
+    };
+    match method.step_cap {
+        StepCap::None => tolerances,
+        StepCap::Absolute(h) => format!("{tolerances}, steps up to {}", number(h)),
+        StepCap::FractionOfSegment(f) => format!("{tolerances}, steps up to {} of the interval", number(f)),
+    }
+}
+
+/// The method's name and its error control.
+pub fn method(method: &MethodSpec) -> String {
+    format!("{}, {}", method.name.name(), control(method))
+}
+
+/// Restarts and kicks of a run; empty if there are none.
+pub fn schedule(run: &RunSpec) -> String {
+    let restarts = run.schedule.restart_every.map(|every| format!("restarted every {}", number(every)));
+    let kicks = run.schedule.kick.map(|k| kicks(&k));
+    restarts.into_iter().chain(kicks).collect::<Vec<_>>().join(", ")
+}
+
+fn kicks(kick: &Kick) -> String {
+    format!("kicks of {} every {} (ChaCha8, seed {})", number(kick.size), number(kick.every), kick.seed)
+}
+
+/// What all runs of a picture have in common and how they differ, one line per subject, for its foot.
+pub fn small_print(reading: Option<Reading>, runs: &[&RunSpec]) -> Vec<String> {
+    let all = |say: &dyn Fn(&RunSpec) -> Option<String>, join: &str| {
+        let mut said: Vec<String> = Vec::new();
+        for text in runs.iter().filter_map(|r| say(r)) {
+            if !said.contains(&text) {
+                said.push(text);
+            }
+        }
+        said.join(join)
+    };
+    let mut lines: Vec<Vec<String>> = vec![
+        vec![
+            reading.map_or(String::new(), |r| format!("{} reading", r.word())),
+            all(&|r| Some(system(&r.system)), "; "),
+            all(&|r| Some(format!("*t* = 0 … {}", number(r.t_end))), "; "),
+        ],
+        vec![all(&|r| Some(switch(&r.switch)), "; ")],
+        vec![all(&|r| Some(r.method.name.name().to_owned()), ", "), all(&|r| Some(control(&r.method)), "; ")],
+        Vec::new(),
+    ];
+    let restarts = all(&|r| r.schedule.restart_every.map(number), ", ");
+    if !restarts.is_empty() {
+        lines[2].push(format!("restarted every {restarts}"));
+    }
+    lines[3].push(all(&|r| r.schedule.kick.map(|k| kicks(&k)), "; "));
+    lines
+        .into_iter()
+        .map(|line| line.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", "))
+        .filter(|line| !line.is_empty())
+        .collect()
+}
+
+/// Rich text without its markup, for readers without typesetting.
+pub fn plain(rich: &str) -> String {
+    twofold_render::markup::plain(rich)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles() {
+        assert_eq!(angle(std::f64::consts::FRAC_PI_4), "π/4");
+        assert_eq!(angle(0.7), "0.7");
+        let wheel = twofold_system::Wheel { gamma: 0.7, ..Default::default() };
+        assert!(system(&wheel.into()).contains("*γ* = 0.7,"));
+    }
+}

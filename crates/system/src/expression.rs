@@ -1,0 +1,797 @@
+//! Expressions as people write them: `(alpha - beta*y)*(x^2 + y^2 + z^2)`.
+//!
+//! ```text
+//! sum      = product { ("+" | "-") product }          from the left: a - b + c = (a - b) + c
+//! product  = unary { ("*" | "/") unary }              from the left: a/b*c = (a/b)*c
+//! unary    = ("-" | "+") unary | power                -x^2 = -(x^2),  -a*b = (-a)*b
+//! power    = atom [ "^" unary ]                       from the right: x^2^3 = x^(2^3); whole-number exponents only
+//! atom     = number | name | "pi" | function "(" sum ")" | "(" sum ")"
+//! ```
+//!
+//! **Order of operations decides bits**, so it is part of the format: exactly the operations that are written are done, in this
+//! order, each rounded once. Powers are products in the order of [`Elementary::power`], `abs(a)` is
+//! a times its sign, `tan(a)` is sin(a)/cos(a). Terms without state variables are computed once, in double precision.
+
+use std::fmt;
+use std::ops::Range;
+
+use super::diagnostic::nearest;
+use twofold_num::{Decimal, Elementary};
+
+/// Longest expression, in bytes.
+pub const MAX_LENGTH: usize = 4096;
+/// Most operations, numbers and names in an expression.
+pub const MAX_TERMS: usize = 1000;
+/// Deepest nesting of parentheses, signs and exponents.
+pub const MAX_DEPTH: usize = 64;
+/// Largest exponent, either way.
+pub const MAX_EXPONENT: i32 = 64;
+
+/// A function of one argument.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Function {
+    /// Hyperbolic tangent.
+    Tanh,
+    /// Exponential.
+    Exp,
+    /// Natural logarithm.
+    Ln,
+    /// Sine of an angle in radians.
+    Sin,
+    /// Cosine of an angle in radians.
+    Cos,
+    /// Tangent of an angle in radians.
+    Tan,
+    /// Square root.
+    Sqrt,
+    /// Arc tangent.
+    Atan,
+    /// Error function.
+    Erf,
+    /// Absolute value.
+    Abs,
+    /// -1 below zero, +1 from zero on.
+    Sign,
+}
+
+impl Function {
+    /// Every function with its name.
+    pub const ALL: [(&'static str, Function); 11] = [
+        ("tanh", Function::Tanh),
+        ("exp", Function::Exp),
+        ("ln", Function::Ln),
+        ("sin", Function::Sin),
+        ("cos", Function::Cos),
+        ("tan", Function::Tan),
+        ("sqrt", Function::Sqrt),
+        ("atan", Function::Atan),
+        ("erf", Function::Erf),
+        ("abs", Function::Abs),
+        ("sign", Function::Sign),
+    ];
+
+    fn named(name: &str) -> Option<Self> {
+        Self::ALL.iter().find(|(n, _)| *n == name).map(|(_, f)| *f)
+    }
+
+    fn name(self) -> &'static str {
+        Self::ALL.iter().find(|(_, f)| *f == self).map_or("", |(n, _)| *n)
+    }
+
+    fn apply<S: Elementary>(self, a: S) -> S {
+        match self {
+            Function::Tanh => a.tanh(),
+            Function::Exp => a.exp(),
+            Function::Ln => a.ln(),
+            Function::Sin => a.sin(),
+            Function::Cos => a.cos(),
+            Function::Tan => a.sin() / a.cos(),
+            Function::Sqrt => a.sqrt(),
+            Function::Atan => a.atan(),
+            Function::Erf => a.erf(),
+            Function::Abs => a.abs(),
+            Function::Sign => a.sign(),
+        }
+    }
+}
+
+const COMMA: &str = "a comma has no meaning here";
+
+/// Functions that other languages have, and how they are written here.
+const INSTEAD: [(&str, &str); 30] = [
+    ("max", "max(a, b) = (a + b + abs(a - b))/2"),
+    ("min", "min(a, b) = (a + b - abs(a - b))/2"),
+    ("mod", PHASE),
+    ("fmod", PHASE),
+    ("rem", PHASE),
+    ("floor", PHASE),
+    ("ceil", PHASE),
+    ("round", PHASE),
+    ("log", "ln(x) is the natural logarithm"),
+    ("log10", "log10(x) = ln(x)/ln(10)"),
+    ("log2", "log2(x) = ln(x)/ln(2)"),
+    ("sinh", "sinh(x) = (exp(x) - exp(-x))/2"),
+    ("cosh", "cosh(x) = (exp(x) + exp(-x))/2"),
+    ("arctan", "write atan(x)"),
+    ("atan2", "atan2(y, x) = 2*atan(y/(sqrt(x^2 + y^2) + x)), away from the negative x axis"),
+    ("asin", "asin(x) = atan(x/sqrt(1 - x^2))"),
+    ("arcsin", "asin(x) = atan(x/sqrt(1 - x^2))"),
+    ("acos", "acos(x) = pi/2 - atan(x/sqrt(1 - x^2))"),
+    ("arccos", "acos(x) = pi/2 - atan(x/sqrt(1 - x^2))"),
+    ("sgn", "write sign(x)"),
+    ("signum", "write sign(x)"),
+    ("fabs", "write abs(x)"),
+    ("pow", "powers are written x^2, or exp(p*ln(x)) where p is no whole number"),
+    ("cbrt", "cbrt(x) = sign(x)*exp(ln(abs(x))/3)"),
+    ("hypot", "hypot(a, b) = sqrt(a^2 + b^2)"),
+    ("heaviside", "heaviside(x) = (1 + sign(x))/2; better: make x the switching function h"),
+    ("step", "step(x) = (1 + sign(x))/2; better: make x the switching function h"),
+    ("if", "expressions do not branch: f+ and f- are given apart, h says which one holds"),
+    ("sat", "the saturation of x at -1 and 1 is (abs(x + 1) - abs(x - 1))/2"),
+    ("clip", "x between a and b: (a + b + abs(x - a) - abs(x - b))/2"),
+];
+const PHASE: &str =
+    "carry a phase as two states, its cosine c and sine s (c' = -w*s, s' = w*c); the angle is 2*atan(s/(1 + c))";
+
+/// Whether `name` means something in every expression.
+pub fn is_reserved(name: &str) -> bool {
+    name == "pi" || Function::named(name).is_some()
+}
+
+/// Whether `name` is a letter followed by letters, digits and underscores.
+pub fn is_name(name: &str) -> bool {
+    name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+}
+
+/// An expression.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Expression {
+    /// A number without a sign.
+    Number(Decimal),
+    /// pi.
+    Pi,
+    /// A state, parameter or intermediate term.
+    Name(String),
+    /// Negative.
+    Neg(Box<Expression>),
+    /// Sum.
+    Add(Box<Expression>, Box<Expression>),
+    /// Difference.
+    Sub(Box<Expression>, Box<Expression>),
+    /// Product.
+    Mul(Box<Expression>, Box<Expression>),
+    /// Quotient.
+    Div(Box<Expression>, Box<Expression>),
+    /// Integer power.
+    Power(Box<Expression>, i32),
+    /// A function's value.
+    Call(Function, Box<Expression>),
+}
+
+/// What is wrong with an expression, and where in its text.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{message}")]
+pub struct ExpressionError {
+    /// What is wrong.
+    pub message: String,
+    /// Where: bytes of the expression's text.
+    pub span: Range<usize>,
+    /// What to do.
+    pub help: Option<String>,
+}
+
+impl Expression {
+    /// Reads an expression in which the given names may appear.
+    ///
+    /// # Errors
+    /// If the text is no expression, names something unknown, or is beyond the bounds of this module.
+    pub fn parse(text: &str, names: &[&str]) -> Result<Self, ExpressionError> {
+        if text.len() > MAX_LENGTH {
+            return Err(ExpressionError {
+                message: format!("an expression of {} bytes; the limit is {MAX_LENGTH}", text.len()),
+                span: 0..1,
+                help: Some("name parts of it in [let]".into()),
+            });
+        }
+        let mut parser = Parser { text, tokens: tokens(text)?, at: 0, depth: 0, terms: 0, names };
+        if parser.peek() == &Token::End {
+            return Err(parser.error("an empty expression", Some("write 0 for a component that vanishes".into())));
+        }
+        let expression = parser.sum()?;
+        match parser.peek() {
+            Token::End => Ok(expression),
+            Token::Close => Err(parser.error("this parenthesis was never opened", None)),
+            Token::Comma => Err(parser.error(COMMA, Some("the decimal sign is a point: 1.5".into()))),
+            _ => Err(parser.error("an operator is missing here", Some(parser.missing_operator()))),
+        }
+    }
+
+    /// The value, given what names and numbers stand for.
+    pub fn evaluate<S: Elementary>(&self, name: &mut dyn FnMut(&str) -> S, number: &dyn Fn(&Decimal) -> S) -> S {
+        match self {
+            Expression::Number(n) => number(n),
+            Expression::Pi => S::pi(),
+            Expression::Name(n) => name(n),
+            Expression::Neg(a) => -a.evaluate(name, number),
+            Expression::Add(a, b) => a.evaluate(name, number) + b.evaluate(name, number),
+            Expression::Sub(a, b) => a.evaluate(name, number) - b.evaluate(name, number),
+            Expression::Mul(a, b) => a.evaluate(name, number) * b.evaluate(name, number),
+            Expression::Div(a, b) => a.evaluate(name, number) / b.evaluate(name, number),
+            Expression::Power(a, n) => a.evaluate(name, number).power(*n),
+            Expression::Call(f, a) => f.apply(a.evaluate(name, number)),
+        }
+    }
+
+    /// The names in the expression, in order of appearance, repeated where they are.
+    pub fn names(&self) -> Vec<&str> {
+        match self {
+            Expression::Number(_) | Expression::Pi => Vec::new(),
+            Expression::Name(name) => vec![name],
+            Expression::Neg(a) | Expression::Power(a, _) | Expression::Call(_, a) => a.names(),
+            Expression::Add(a, b) | Expression::Sub(a, b) | Expression::Mul(a, b) | Expression::Div(a, b) => {
+                let mut names = a.names();
+                names.extend(b.names());
+                names
+            }
+        }
+    }
+
+    /// How tightly the expression holds together: 1 sum, 2 product, 3 sign, 4 power, 5 atom.
+    fn level(&self) -> u8 {
+        match self {
+            Expression::Add(..) | Expression::Sub(..) => 1,
+            Expression::Mul(..) | Expression::Div(..) => 2,
+            Expression::Neg(_) => 3,
+            Expression::Power(..) => 4,
+            _ => 5,
+        }
+    }
+}
+
+impl fmt::Display for Expression {
+    /// The expression with the fewest parentheses. Parsing it gives the expression back.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let part = |f: &mut fmt::Formatter<'_>, e: &Expression, level: u8| {
+            if e.level() < level { write!(f, "({e})") } else { write!(f, "{e}") }
+        };
+        let pair = |f: &mut fmt::Formatter<'_>, a: &Expression, sign: &str, b: &Expression, level: u8| {
+            part(f, a, level)?;
+            f.write_str(sign)?;
+            part(f, b, level + 1)
+        };
+        match self {
+            Expression::Number(n) => write!(f, "{n}"),
+            Expression::Pi => f.write_str("pi"),
+            Expression::Name(name) => f.write_str(name),
+            Expression::Neg(a) => {
+                f.write_str("-")?;
+                part(f, a, 3)
+            }
+            Expression::Add(a, b) => pair(f, a, " + ", b, 1),
+            Expression::Sub(a, b) => pair(f, a, " - ", b, 1),
+            Expression::Mul(a, b) => pair(f, a, "*", b, 2),
+            Expression::Div(a, b) => pair(f, a, "/", b, 2),
+            Expression::Power(a, n) => {
+                part(f, a, 5)?;
+                write!(f, "^{n}")
+            }
+            Expression::Call(function, a) => write!(f, "{}({a})", function.name()),
+        }
+    }
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Token {
+    Number(Decimal),
+    Name,
+    Plus,
+    Minus,
+    Times,
+    Over,
+    Hat,
+    Open,
+    Close,
+    Comma,
+    End,
+}
+
+/// The text cut into tokens, each with its place; an [`Token::End`] closes them.
+fn tokens(text: &str) -> Result<Vec<(Token, Range<usize>)>, ExpressionError> {
+    let mut tokens = Vec::new();
+    let bytes = text.as_bytes();
+    let run =
+        |from: usize, in_run: &dyn Fn(u8) -> bool| from + bytes[from..].iter().take_while(|b| in_run(**b)).count();
+    let digits = |from: usize| run(from, &|b| b.is_ascii_digit());
+    let mut at = 0;
+    while at < bytes.len() {
+        let (token, end) = match bytes[at] {
+            b' ' | b'\t' | b'\n' | b'\r' => {
+                at += 1;
+                continue;
+            }
+            b'+' => (Token::Plus, at + 1),
+            b'-' => (Token::Minus, at + 1),
+            b'*' if bytes.get(at + 1) == Some(&b'*') => {
+                return Err(ExpressionError {
+                    message: "`**` is not an operator".into(),
+                    span: at..at + 2,
+                    help: Some("powers are written x^2".into()),
+                });
+            }
+            b'*' => (Token::Times, at + 1),
+            b'/' => (Token::Over, at + 1),
+            b'^' => (Token::Hat, at + 1),
+            b'(' => (Token::Open, at + 1),
+            b')' => (Token::Close, at + 1),
+            b',' => (Token::Comma, at + 1),
+            b'0'..=b'9' | b'.' => {
+                let mut end = digits(at);
+                if bytes.get(end) == Some(&b'.') {
+                    end = digits(end + 1);
+                }
+                if matches!(bytes.get(end), Some(b'e' | b'E')) {
+                    let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
+                    let exponent = digits(end + 1 + sign);
+                    if exponent > end + 1 + sign {
+                        end = exponent;
+                    } else {
+                        return Err(ExpressionError {
+                            message: "a number without the digits of its exponent".into(),
+                            span: at..end + 1 + sign,
+                            help: Some("write 1e-3 for one thousandth, 2*e for the product with a name e".into()),
+                        });
+                    }
+                }
+                match text[at..end].parse() {
+                    Ok(number) => (Token::Number(number), end),
+                    Err(error) => {
+                        return Err(ExpressionError {
+                            message: error.to_string(),
+                            span: at..end.max(at + 1),
+                            help: None,
+                        });
+                    }
+                }
+            }
+            b if b.is_ascii_alphabetic() || b == b'_' => {
+                (Token::Name, run(at, &|b| b.is_ascii_alphanumeric() || b == b'_'))
+            }
+            _ => {
+                let c = text[at..].chars().next().unwrap_or(' ');
+                let help = match c {
+                    '|' => Some("write abs(x) for |x|"),
+                    '\'' => Some("components are given in the order of the states; write no derivatives"),
+                    '[' | ']' | '{' | '}' => Some("only round parentheses group"),
+                    '<' | '>' | '=' | '?' => {
+                        Some("expressions do not branch: f+ and f- are given apart, h says which one holds")
+                    }
+                    '·' | '×' => Some("products are written a*b"),
+                    '−' => Some("this is a typographic minus; write -"),
+                    'π' => Some("write pi"),
+                    '²' | '³' => Some("write x^2, x^3"),
+                    c if c.is_alphabetic() => Some("names are made of the letters a-z and A-Z, digits and _"),
+                    _ => None,
+                };
+                return Err(ExpressionError {
+                    message: format!("the character {c:?} has no meaning here"),
+                    span: at..at + c.len_utf8(),
+                    help: help.map(Into::into),
+                });
+            }
+        };
+        tokens.push((token, at..end));
+        at = end;
+    }
+    tokens.push((Token::End, text.len()..text.len()));
+    Ok(tokens)
+}
+
+struct Parser<'a> {
+    text: &'a str,
+    tokens: Vec<(Token, Range<usize>)>,
+    at: usize,
+    depth: usize,
+    terms: usize,
+    names: &'a [&'a str],
+}
+
+type Parsed = Result<Expression, ExpressionError>;
+
+impl Parser<'_> {
+    fn peek(&self) -> &Token {
+        &self.tokens[self.at].0
+    }
+
+    fn span(&self) -> Range<usize> {
+        self.tokens[self.at].1.clone()
+    }
+
+    fn advance(&mut self) {
+        self.at = (self.at + 1).min(self.tokens.len() - 1);
+    }
+
+    fn error(&self, message: impl Into<String>, help: Option<String>) -> ExpressionError {
+        ExpressionError { message: message.into(), span: self.span(), help }
+    }
+
+    fn deeper<T>(&mut self, f: impl FnOnce(&mut Self) -> Result<T, ExpressionError>) -> Result<T, ExpressionError> {
+        if self.depth == MAX_DEPTH {
+            let help = Some("name parts of the expression in [let]".into());
+            return Err(self.error(format!("more than {MAX_DEPTH} levels of nesting"), help));
+        }
+        self.depth += 1;
+        let result = f(self);
+        self.depth -= 1;
+        result
+    }
+
+    fn term(&mut self) -> Result<(), ExpressionError> {
+        self.terms += 1;
+        if self.terms > MAX_TERMS {
+            let help = Some("name parts of the expression in [let]".into());
+            return Err(self.error(format!("more than {MAX_TERMS} terms in one expression"), help));
+        }
+        Ok(())
+    }
+
+    fn sum(&mut self) -> Parsed {
+        let mut left = self.product()?;
+        loop {
+            let make = match self.peek() {
+                Token::Plus => Expression::Add,
+                Token::Minus => Expression::Sub,
+                _ => return Ok(left),
+            };
+            self.advance();
+            self.term()?;
+            left = make(Box::new(left), Box::new(self.product()?));
+        }
+    }
+
+    fn product(&mut self) -> Parsed {
+        let mut left = self.unary()?;
+        loop {
+            let make = match self.peek() {
+                Token::Times => Expression::Mul,
+                Token::Over => Expression::Div,
+                _ => return Ok(left),
+            };
+            self.advance();
+            self.term()?;
+            left = make(Box::new(left), Box::new(self.unary()?));
+        }
+    }
+
+    fn unary(&mut self) -> Parsed {
+        match self.peek() {
+            Token::Minus => {
+                self.advance();
+                self.term()?;
+                let inner = self.deeper(Self::unary)?;
+                Ok(Expression::Neg(Box::new(inner)))
+            }
+            Token::Plus => {
+                self.advance();
+                self.deeper(Self::unary)
+            }
+            _ => self.power(),
+        }
+    }
+
+    fn power(&mut self) -> Parsed {
+        let base = self.atom()?;
+        if self.peek() != &Token::Hat {
+            return Ok(base);
+        }
+        self.advance();
+        self.term()?;
+        let start = self.span().start;
+        let exponent = self.deeper(Self::unary)?;
+        let end = self.tokens[self.at.saturating_sub(1)].1.end;
+        match whole(&exponent) {
+            Some(n) if (-i64::from(MAX_EXPONENT)..=i64::from(MAX_EXPONENT)).contains(&n) => {
+                Ok(Expression::Power(Box::new(base), n as i32))
+            }
+            Some(n) => Err(ExpressionError {
+                message: format!("the exponent {n} is too large; the limit is {MAX_EXPONENT}"),
+                span: start..end,
+                help: None,
+            }),
+            None => Err(ExpressionError {
+                message: "an exponent must be a whole number".into(),
+                span: start..end,
+                help: Some("write sqrt(x) for x^(1/2), exp(p*ln(x)) for other powers".into()),
+            }),
+        }
+    }
+
+    fn atom(&mut self) -> Parsed {
+        self.term()?;
+        match self.peek().clone() {
+            Token::Number(number) => {
+                self.advance();
+                Ok(Expression::Number(number))
+            }
+            Token::Name => self.name(),
+            Token::Open => self.parenthesis(),
+            Token::End => {
+                Err(self.error("the expression ends where a number, a name or a parenthesis should follow", None))
+            }
+            Token::Close | Token::Comma => {
+                Err(self.error("a number, a name or a parenthesis is missing before this", None))
+            }
+            _ => {
+                Err(self
+                    .error("two operators in a row; a number, a name or a parenthesis is missing before this", None))
+            }
+        }
+    }
+
+    fn parenthesis(&mut self) -> Parsed {
+        let open = self.span();
+        self.advance();
+        let inner = self.deeper(Self::sum)?;
+        match self.peek() {
+            Token::Close => {
+                self.advance();
+                Ok(inner)
+            }
+            Token::End => Err(ExpressionError {
+                message: "this parenthesis is never closed".into(),
+                span: open,
+                help: Some("add a `)`".into()),
+            }),
+            Token::Comma => Err(self.error(COMMA, Some("the decimal sign is a point: 1.5".into()))),
+            _ => Err(self.error("an operator or a `)` is missing here", Some(self.missing_operator()))),
+        }
+    }
+
+    fn name(&mut self) -> Parsed {
+        let span = self.span();
+        let name = &self.text[span.clone()];
+        self.advance();
+        let error = |message: String, help: Option<String>| Err(ExpressionError { message, span: span.clone(), help });
+        if name == "pi" {
+            return Ok(Expression::Pi);
+        }
+        if let Some(function) = Function::named(name) {
+            if self.peek() != &Token::Open {
+                return error(
+                    format!("the function `{name}` needs its argument in parentheses"),
+                    Some(format!("{name}(...)")),
+                );
+            }
+            if let Some(count) = self.arguments().filter(|count| *count != 1) {
+                let given = if count == 0 { "none".into() } else { count.to_string() };
+                let are = if count > 1 { "are" } else { "is" };
+                return error(
+                    format!("`{name}` has one argument; {given} {are} given"),
+                    Some(format!("write {name}(a), with one expression for a")),
+                );
+            }
+            return Ok(Expression::Call(function, Box::new(self.parenthesis()?)));
+        }
+        if self.names.contains(&name) {
+            return Ok(Expression::Name(name.into()));
+        }
+        if self.peek() == &Token::Open {
+            let functions = Function::ALL.map(|(n, _)| n);
+            let list = format!("supported functions are {}", functions.join(", "));
+            let lower = name.to_ascii_lowercase();
+            let help = match (INSTEAD.iter().find(|(n, _)| *n == lower), nearest(name, &functions)) {
+                (Some((_, instead)), _) => format!("{name} is not supported: {instead}; {list}"),
+                (None, Some(near)) => format!("did you mean `{near}`? {list}"),
+                (None, None) => list,
+            };
+            return error(format!("there is no function `{name}`"), Some(help));
+        }
+        let help = match nearest(name, self.names) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None if name == "t" => {
+                "equations do not see the time; a forced system carries it as a state with derivative 1".into()
+            }
+            None if name == "e" => "write exp(1) for the base of natural logarithms".into(),
+            None => format!("known here: {}", self.names.join(", ")),
+        };
+        error(format!("unknown name `{name}`"), Some(help))
+    }
+
+    /// How many arguments stand in the parentheses that open here; `None` if they are not closed.
+    fn arguments(&self) -> Option<usize> {
+        let (mut depth, mut commas) = (0, 0);
+        for (i, (token, _)) in self.tokens[self.at..].iter().enumerate() {
+            match token {
+                Token::Open => depth += 1,
+                Token::Comma if depth == 1 => commas += 1,
+                Token::Close if depth == 1 => return Some(if i == 1 { 0 } else { commas + 1 }),
+                Token::Close => depth -= 1,
+                Token::End => return None,
+                _ => {}
+            }
+        }
+        None
+    }
+
+    /// Advice for a token that follows another without an operator.
+    fn missing_operator(&self) -> String {
+        let before = self.at.checked_sub(1).map_or("a", |i| &self.text[self.tokens[i].1.clone()]);
+        let here = &self.text[self.span()];
+        match before {
+            ")" => format!("products are written with a star: (...)*{here}"),
+            _ => format!("products are written with a star: {before}*{here}"),
+        }
+    }
+}
+
+/// The whole number that an exponent is made of.
+fn whole(exponent: &Expression) -> Option<i64> {
+    let small = |n: i64| (n.abs() <= 1_000_000).then_some(n);
+    match exponent {
+        Expression::Number(n) => {
+            let value = n.value();
+            (value.fract() == 0.0 && value <= 1e6).then_some(value as i64)
+        }
+        Expression::Neg(a) => whole(a).map(|n| -n),
+        Expression::Add(a, b) => small(whole(a)? + whole(b)?),
+        Expression::Sub(a, b) => small(whole(a)? - whole(b)?),
+        Expression::Mul(a, b) => small(whole(a)? * whole(b)?),
+        Expression::Power(a, n) => {
+            let base = whole(a)?;
+            (0..*n).try_fold(1_i64, |power, _| small(power * base)).filter(|_| *n >= 0)
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use twofold_num::tape::{Program, Recorded, Tape};
+
+    const NAMES: [&str; 3] = ["x", "alpha", "v_plus"];
+
+    fn value(text: &str) -> f64 {
+        let mut name = |n: &str| if n == "x" { 3.0 } else { 0.5 };
+        Expression::parse(text, &NAMES).unwrap_or_else(|e| panic!("{text}: {e}")).evaluate(&mut name, &Decimal::value)
+    }
+
+    #[test]
+    fn precedence_is_that_of_mathematics() {
+        for (text, want) in [
+            ("-x^2", -9.0),
+            ("(-x)^2", 9.0),
+            ("2^3^2", 512.0),
+            ("x^-2", 1.0 / 9.0),
+            ("1 - 2 - 3", -4.0),
+            ("24/4/2", 3.0),
+            ("24/4*2", 12.0),
+            ("2*-x", -6.0),
+            ("--x", 3.0),
+            ("1e-3*x + .5", 1e-3 * 3.0 + 0.5),
+            ("2.*pi", 2.0 * std::f64::consts::PI),
+            ("abs(-x) + sign(x) + tan(0)", 4.0),
+            ("x^(1+1)", 9.0),
+            ("x^0", 1.0),
+        ] {
+            assert_eq!(value(text), want, "{text}");
+        }
+    }
+
+    /// (text, marked part, message, help)
+    const WRONG: [(&str, &str, &str, &str); 34] = [
+        ("max(x, 0)", "max", "no function `max`", "(a + b + abs(a - b))/2"),
+        ("1 + min(x, max(x, 1))", "min", "no function `min`", "(a + b - abs(a - b))/2"),
+        ("mod(x, 1)", "mod", "no function `mod`", "cosine c and sine s"),
+        ("Heaviside(x)", "Heaviside", "no function `Heaviside`", "(1 + sign(x))/2"),
+        ("sin(x, alpha)", "sin", "has one argument; 2 are given", "sin(a)"),
+        ("tanh()", "tanh", "has one argument; none is given", "tanh(a)"),
+        ("exp((x, 1))", ",", "no meaning", "point"),
+        ("1 + aplha*x", "aplha", "unknown name `aplha`", "did you mean `alpha`?"),
+        ("V_plus", "V_plus", "unknown name `V_plus`", "did you mean `v_plus`?"),
+        ("sin(t)", "t", "unknown name `t`", "derivative 1"),
+        ("qqq", "qqq", "unknown name `qqq`", "known here: x, alpha, v_plus"),
+        ("tnah(x)", "tnah", "no function `tnah`", "did you mean `tanh`?"),
+        ("log(x)", "log", "no function `log`", "ln(x)"),
+        ("2x", "x", "operator is missing", "2*x"),
+        ("(x)(x)", "(", "operator is missing", "(...)*("),
+        ("(1 + x", "(", "never closed", "add a `)`"),
+        ("sin(x", "(", "never closed", "add a `)`"),
+        ("1 + x)", ")", "never opened", ""),
+        ("x**2", "**", "not an operator", "x^2"),
+        ("x^alpha", "alpha", "whole number", "exp(p*ln(x))"),
+        ("x^0.5", "0.5", "whole number", "sqrt(x)"),
+        ("x^65", "65", "too large", ""),
+        ("x +", "", "ends where", ""),
+        ("x * / 2", "/", "two operators", ""),
+        ("()", ")", "missing before this", ""),
+        ("", "", "empty", "write 0"),
+        ("|x|", "|", "no meaning", "abs(x)"),
+        ("x > 0", ">", "no meaning", "do not branch"),
+        ("1,5", ",", "no meaning", "point"),
+        ("1e", "1e", "exponent", "1e-3"),
+        ("1e400", "1e400", "outside the range", ""),
+        ("sin + 1", "sin", "needs its argument", "sin(...)"),
+        ("1.2.3", ".3", "operator is missing", ""),
+        ("α*x", "α", "no meaning", "letters a-z"),
+    ];
+
+    #[test]
+    fn errors_point_and_advise() {
+        for (text, marked, message, help) in WRONG {
+            let error = Expression::parse(text, &NAMES).expect_err(text);
+            assert_eq!(&text[error.span.clone()], marked, "{text}: {error:?}");
+            assert!(error.message.contains(message), "{text}: {error:?}");
+            assert!(error.help.clone().unwrap_or_default().contains(help), "{text}: {error:?}");
+        }
+    }
+
+    #[test]
+    fn bounds() {
+        let message = |text: &str| Expression::parse(text, &NAMES).unwrap_err().message;
+        assert!(message(&"(".repeat(100)).contains("64 levels"));
+        assert!(message(&"-".repeat(100)).contains("64 levels"));
+        assert!(message(&format!("x{}", "^2".repeat(100))).contains("64 levels"));
+        assert!(message(&"x+".repeat(1000)).contains("1000 terms"));
+        assert!(message(&" ".repeat(5000)).contains("4096"));
+        // The longest chain that is allowed does not exhaust the stack.
+        let long = vec!["x"; 500].join("+");
+        assert_eq!(value(&long), 1500.0);
+    }
+
+    fn any_expression() -> impl Strategy<Value = Expression> {
+        let leaf = prop_oneof![
+            (0.0..100.0_f64).prop_map(|v| Expression::Number(v.into())),
+            Just(Expression::Number("0.12345678901234567890123".parse().unwrap())),
+            Just(Expression::Number(1e-30.into())),
+            Just(Expression::Pi),
+            Just(Expression::Name("x".into())),
+            Just(Expression::Name("alpha".into())),
+        ];
+        leaf.prop_recursive(6, 40, 2, |inner| {
+            let pair = (inner.clone(), inner.clone()).prop_map(|(a, b)| (Box::new(a), Box::new(b)));
+            prop_oneof![
+                inner.clone().prop_map(|a| Expression::Neg(Box::new(a))),
+                pair.clone().prop_map(|(a, b)| Expression::Add(a, b)),
+                pair.clone().prop_map(|(a, b)| Expression::Sub(a, b)),
+                pair.clone().prop_map(|(a, b)| Expression::Mul(a, b)),
+                pair.prop_map(|(a, b)| Expression::Div(a, b)),
+                (inner.clone(), -5..6).prop_map(|(a, n)| Expression::Power(Box::new(a), n)),
+                (inner, 0..Function::ALL.len()).prop_map(|(a, i)| Expression::Call(Function::ALL[i].1, Box::new(a))),
+            ]
+        })
+    }
+
+    fn tape(expression: &Expression) -> Tape {
+        Tape::record(1, |x| {
+            let mut name = |n: &str| if n == "x" { x[0] } else { Recorded::parameter(n, &0.5.into()) };
+            vec![expression.evaluate(&mut name, &Recorded::constant)]
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn printing_and_parsing_give_the_expression_back(expression in any_expression()) {
+            let text = expression.to_string();
+            let parsed = Expression::parse(&text, &NAMES);
+            prop_assert_eq!(parsed.as_ref(), Ok(&expression), "{}", text);
+            prop_assert_eq!(tape(&parsed.unwrap()), tape(&expression));
+        }
+
+        #[test]
+        fn the_tape_gives_the_bits_of_plain_evaluation(expression in any_expression(), x in -3.0..3.0_f64) {
+            let mut name = |n: &str| if n == "x" { x } else { 0.5 };
+            let want = expression.evaluate(&mut name, &Decimal::value);
+            let mut out = [0.0];
+            Program::new(&tape(&expression)).evaluate(&[x], &mut out);
+            prop_assert!(out[0].to_bits() == want.to_bits() || out[0].is_nan() && want.is_nan(), "{} {}", out[0], want);
+        }
+
+        #[test]
+        fn no_text_panics(text in "[-+*/^()x0-9.e|a-z ]{0,60}|\\PC{0,30}") {
+            if let Err(error) = Expression::parse(&text, &NAMES) {
+                prop_assert!(text.get(error.span).is_some());
+            }
+        }
+    }
+}

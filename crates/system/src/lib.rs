@@ -1,0 +1,112 @@
+//! The equations, and no time stepping.
+//!
+//! Two nouns carry everything. A [`VectorField`] is an ordinary autonomous differential equation x' = f(x). A
+//! [`PiecewiseSmooth`] system is two of them and a switching function h: f+ where h > 0, f- where h < 0. It is not a
+//! vector field: on h = 0 its motion is defined by Filippov's convention ([`filippov`]) and at a two-fold it is
+//! set-valued.
+//!
+//! Both exist as data of any dimension: a [`Definition`] is read from a file, a [`System`] is a definition with values for its
+//! parameters, and a [`Field`] is what becomes of a system by smoothing, hysteresis, reversing time, sliding, or carrying tangent
+//! vectors along. [`library`] holds the built-in ones. Bound to a dimension ([`System::bind`], [`Field::bind`]) they are evaluated over
+//! any number type.
+//!
+//! The paper's own two, [`Caricature`] and [`Wheel`], exist as Rust too, with [`Smoothed`] and [`Hysteretic`] on top: fast paths, tested to
+//! give the bits of the files. Equations in Rust are generic over [`Elementary`], so that each is written once.
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
+
+mod alike;
+pub mod caricature;
+pub mod definition;
+pub mod diagnostic;
+mod document;
+pub mod expression;
+pub mod field;
+pub mod filippov;
+pub mod hysteretic;
+pub mod instance;
+pub mod library;
+pub mod reversed;
+pub mod singular;
+pub mod smoothed;
+pub mod transition;
+pub mod wheel;
+
+use std::sync::Arc;
+
+use nalgebra::{SMatrix, SVector};
+
+use twofold_num::tape::Recorded;
+use twofold_num::{Aligned, Dual, Elementary, Registers, Simd, Tape};
+
+pub use alike::{Alike, Equations};
+pub use caricature::Caricature;
+pub use definition::Definition;
+pub use diagnostic::Diagnostic;
+pub use document::Canonical;
+pub use expression::Expression;
+pub use field::{BoundField, Field};
+pub use hysteretic::{Hysteretic, Relaxation};
+pub use instance::{BindError, Bound, Compiled, ParameterError, System};
+pub use reversed::Reversed;
+pub use smoothed::Smoothed;
+pub use transition::Transition;
+pub use wheel::Wheel;
+
+/// An autonomous ordinary differential equation x' = f(x) in `N` dimensions.
+pub trait VectorField<const N: usize>: Sync {
+    /// The right-hand side f(x).
+    fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
+    /// How many bundles of registers [`VectorField::eval_in_registers`] wants for what lies between: a power of two, or none.
+    #[doc(hidden)]
+    fn room(&self) -> usize {
+        0
+    }
+    /// The right-hand side at several states side by side, in the registers of an instruction set: in every lane the bits of [`VectorField::eval`].
+    #[doc(hidden)]
+    #[inline(always)]
+    fn eval_in_registers<S: Simd, const K: usize>(
+        &self,
+        set: S,
+        x: [[S::f64s; K]; N],
+        _room: &mut [Aligned<[S::f64s; K]>],
+    ) -> [[S::f64s; K]; N] {
+        // Loops by number: closures may stay calls, compiled for the wrong instruction set.
+        let mut state = SVector::<Registers<S, K>, N>::from_element(Registers::splat(set, 0.0));
+        for i in 0..N {
+            state[i] = Registers::new(set, x[i]);
+        }
+        let f = self.eval(&state);
+        let mut parts = x;
+        for i in 0..N {
+            parts[i] = f[i].parts();
+        }
+        parts
+    }
+    /// The right-hand side as data. Made by recording [`VectorField::eval`], unless the equation is data already.
+    fn tape(&self) -> Arc<Tape> {
+        let record = |x: &[Recorded]| self.eval(&SVector::<_, N>::from_column_slice(x)).as_slice().to_vec();
+        Arc::new(Tape::record(N, record))
+    }
+}
+
+/// A system that switches between two smooth vector fields on the surface h = 0 (the paper's eq. 3).
+pub trait PiecewiseSmooth<const N: usize>: Sync {
+    /// The switching function h(x). The surface h = 0 must be regular: grad h not zero on it.
+    fn switching<S: Elementary>(&self, x: &SVector<S, N>) -> S;
+    /// The vector field f+ that holds where h > 0; smooth and defined on both sides.
+    fn plus<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
+    /// The vector field f- that holds where h < 0; smooth and defined on both sides.
+    fn minus<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
+}
+
+/// The point x as independent variables for differentiation.
+pub fn variables<S: Elementary, const N: usize>(x: &SVector<S, N>) -> SVector<Dual<S, N>, N> {
+    SVector::from_fn(|i, _| Dual::variable(x[i], i))
+}
+
+/// The Jacobian matrix df_i/dx_j, exact to rounding (forward differentiation of the equation itself).
+pub fn jacobian<F: VectorField<N>, const N: usize>(field: &F, x: &SVector<f64, N>) -> SMatrix<f64, N, N> {
+    let f = field.eval(&variables(x));
+    SMatrix::from_fn(|i, j| f[i].partials[j])
+}
