@@ -144,7 +144,7 @@ pub fn from_bits(bytes: &[u8]) -> Result<Vec<Table>, Malformed> {
     Ok(tables)
 }
 
-/// What a file says about itself: a CSV file in its first line, a Parquet file in its metadata.
+/// What a file says about itself: a CSV file in its last line, a Parquet file in its metadata.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Heading {
@@ -188,32 +188,40 @@ fn headings(table: &Table) -> Vec<ColumnHeading> {
 /// What starts the line of metadata: a comment to gnuplot, NumPy, R and pandas (`comment="#"`).
 const COMMENT: &str = "# ";
 
-/// CSV: a comment line of metadata as JSON (`about` is whatever its maker wants to say), a line of column names, then a row per line with
-/// shortest round-trip numbers; blanks are empty. A file that was cut short can say so in a last comment line ([`cut_short`]).
+/// CSV: a line of column names, a row per line with shortest round-trip numbers (blanks are empty), and a comment line of metadata as JSON
+/// (`about` is whatever its maker wants to say). The names come first because common readers take the first line for them, even a comment
+/// (`numpy.genfromtxt(names=True)`). A file that was cut short can say so in one more comment line ([`cut_short`]).
 pub fn csv(table: &Table, about: &Value) -> Vec<u8> {
     csv_of_parts(&[table], about)
 }
 
 /// [`csv()`] of tables with the same columns, as if they were one: the rows of the first, then those of the second, and so on. Nothing for no table.
 pub fn csv_of_parts(tables: &[&Table], about: &Value) -> Vec<u8> {
-    let mut bytes = tables.first().map_or_else(Vec::new, |first| csv_head(first, about));
+    let Some(first) = tables.first() else { return Vec::new() };
+    let mut bytes = csv_head(first);
     for table in tables {
         bytes = csv_rows_after(bytes, table);
     }
+    bytes.extend(csv_tail(first, about));
     bytes
 }
 
-/// The first two lines of [`csv()`]: metadata and column names.
-pub fn csv_head(table: &Table, about: &Value) -> Vec<u8> {
-    let mut bytes = COMMENT.as_bytes().to_vec();
-    bytes.extend(canonical_json(&heading(table, about)));
-    bytes.push(b'\n');
-    let mut writer = csv::Writer::from_writer(bytes);
+/// The first line of [`csv()`]: column names.
+pub fn csv_head(table: &Table) -> Vec<u8> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(table.columns.iter().map(|c| &c.name)).expect("memory takes what is written to it");
     writer.into_inner().expect("memory takes what is written to it")
 }
 
-/// The rest of [`csv()`]: a line for each row.
+/// The last line of [`csv()`]: metadata.
+pub fn csv_tail(table: &Table, about: &Value) -> Vec<u8> {
+    let mut bytes = COMMENT.as_bytes().to_vec();
+    bytes.extend(canonical_json(&heading(table, about)));
+    bytes.push(b'\n');
+    bytes
+}
+
+/// What is between them: a line for each row.
 pub fn csv_rows(table: &Table) -> Vec<u8> {
     csv_rows_after(Vec::new(), table)
 }
@@ -288,22 +296,31 @@ pub fn stop_of_csv(bytes: &[u8]) -> Option<Stop> {
     serde_json::from_value(Value::String(String::from_utf8_lossy(word).into_owned())).ok()
 }
 
-/// The table of which [`csv()`] made this file, and what it says about itself.
+/// The table of which [`csv()`] made this file, and what it says about itself. Files of version 0.2, which began with their metadata,
+/// are read, too.
 ///
 /// # Errors
 ///
 /// If the file is anything else.
 pub fn from_csv(bytes: &[u8]) -> Result<(Heading, Table), Malformed> {
-    let Some(end) = bytes.iter().position(|b| *b == b'\n') else { return malformed("there is no line in it") };
-    let Some(text) = bytes[..end].strip_prefix(COMMENT.as_bytes()) else {
-        return malformed("its first line is not a comment with metadata");
-    };
-    let heading: Heading = serde_json::from_slice(text).map_err(|e| Malformed(format!("its metadata: {e}")))?;
-    let mut table = Table::new(&heading.table, heading.columns.iter().map(|c| Column::new(&c.name, &c.unit, c.kind)));
-    let mut body = &bytes[end + 1..];
+    let mut body = bytes;
     if let Some(stop) = stop_of_csv(bytes) {
         body = &body[..body.len().saturating_sub(cut_short(stop).len())];
     }
+    let lines = body.strip_suffix(b"\n").unwrap_or(body);
+    let comment = |line: &'_ [u8]| line.starts_with(COMMENT.as_bytes());
+    let first = lines.iter().position(|b| *b == b'\n').unwrap_or(lines.len());
+    let last = lines.iter().rposition(|b| *b == b'\n').map_or(0, |i| i + 1);
+    let text;
+    (text, body) = if comment(&lines[..first]) {
+        (&lines[COMMENT.len()..first], &body[(first + 1).min(body.len())..])
+    } else if comment(&lines[last..]) {
+        (&lines[last + COMMENT.len()..], &body[..last])
+    } else {
+        return malformed("its last line is not a comment with metadata");
+    };
+    let heading: Heading = serde_json::from_slice(text).map_err(|e| Malformed(format!("its metadata: {e}")))?;
+    let mut table = Table::new(&heading.table, heading.columns.iter().map(|c| Column::new(&c.name, &c.unit, c.kind)));
     let mut reader = csv::Reader::from_reader(body);
     let names = reader.headers().map_err(|e| Malformed(e.to_string()))?;
     if !names.iter().eq(table.columns.iter().map(|c| c.name.as_str())) {
@@ -572,8 +589,9 @@ mod tests {
         let t = table(vec![0.1, f64::NAN, 1e300], vec!["up".into(), String::new(), "a,b".into()]);
         let text = String::from_utf8(csv(&t, &Value::Null)).unwrap();
         let lines: Vec<&str> = text.lines().collect();
-        assert!(lines[0].starts_with("# {") && lines[0].contains("\"made_by\":\"twofold "), "{}", lines[0]);
-        assert_eq!(lines[1..], ["x,word,n", "0.1,up,-3", ",,-2", "1e300,\"a,b\",-1"]);
+        let last = lines[lines.len() - 1];
+        assert!(last.starts_with("# {") && last.contains("\"made_by\":\"twofold "), "{last}");
+        assert_eq!(lines[..lines.len() - 1], ["x,word,n", "0.1,up,-3", ",,-2", "1e300,\"a,b\",-1"]);
     }
 
     #[test]
@@ -605,7 +623,7 @@ mod tests {
     #[test]
     fn other_files_are_refused() {
         assert!(from_csv(b"a,b\n1,2\n").is_err());
-        assert!(from_csv(b"").is_err());
+        assert!(from_csv(b"").is_err() && from_csv(b"# ").is_err() && from_csv(b"# \n").is_err());
         assert!(from_bits(b"").is_err());
         assert!(from_bits(&[255; 64]).is_err());
         let t = table(vec![0.1], vec!["up".into()]);

@@ -46,11 +46,11 @@ pub struct Arguments {
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 enum Format {
-    /// A header line, then a row per point.
+    /// A line of column names, a row per point, and the run's record in a last line that begins with #.
     Csv,
     /// Spec, statistics, columns and rows.
     Json,
-    /// Apache Parquet, with what a CSV file says in its first line as metadata.
+    /// Apache Parquet, with what a CSV file says in its last line as metadata.
     Parquet,
 }
 
@@ -152,13 +152,16 @@ fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, Cl
         None => Rows::Output,
     };
     let about = encode::about_run(run);
-    let (mut begun, mut failed) = (false, None);
+    let (mut tail, mut failed) = (Vec::new(), None);
     let watch = job::Progress::begin(progress, &run.label(), run.extent());
     let found = simulate::stream(
         &run.0,
         &mut |table| {
-            let mut bytes = if begun { Vec::new() } else { encode::csv_head(table, &about) };
-            begun = true;
+            let mut bytes = Vec::new();
+            if tail.is_empty() {
+                bytes = encode::csv_head(table);
+                tail = encode::csv_tail(table, &about);
+            }
             bytes.extend(encode::csv_rows(table));
             failed = rows.append(&bytes).err();
             failed.is_none()
@@ -174,6 +177,7 @@ fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, Cl
         None => {}
     }
     let found = found?;
+    rows.append(&tail)?;
     let stopped = if found.stop == Stop::Interrupted { progress.asked_to_stop() } else { None };
     let Some(exit) = stopped else {
         if let Rows::File(file) = rows {
