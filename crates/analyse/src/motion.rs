@@ -84,7 +84,8 @@ impl<const D: usize> MotionRecorder<D> {
 #[derive(Clone, Debug)]
 pub struct TimedMotion<const D: usize = 3> {
     times: TimesRecorder<D>,
-    /// Mode of each sample, in runs: (mode, how many).
+    /// The pieces: (mode, how many samples). A piece between two samples has none and is counted all the same, so that pieces have the
+    /// numbers that [`MotionRecorder`] gives them.
     modes: Vec<(Mode, usize)>,
     start: bool,
     new_piece: bool,
@@ -98,9 +99,10 @@ impl<const D: usize> TimedMotion<D> {
         Self { times, modes: Vec::new(), start: true, new_piece: true, events: Vec::new() }
     }
 
-    /// Number of points that are kept now.
+    /// Number of points, or pieces without one, that are kept now.
     pub fn kept(&self) -> usize {
-        self.modes.iter().map(|(_, count)| count).sum()
+        let empty = self.modes.iter().rev().skip(1).filter(|(_, count)| *count == 0).count();
+        self.modes.iter().map(|(_, count)| count).sum::<usize>() + empty
     }
 
     /// What was recorded so far, which is forgotten but for the mode of the piece that is not finished.
@@ -112,7 +114,7 @@ impl<const D: usize> TimedMotion<D> {
         Motion { pieces, events: std::mem::take(&mut self.events) }
     }
 
-    /// What was recorded. Pieces between two samples leave nothing.
+    /// What was recorded.
     pub fn into_motion(mut self) -> Motion<D> {
         self.take()
     }
@@ -121,13 +123,11 @@ impl<const D: usize> TimedMotion<D> {
 impl<const D: usize> FilippovObserver<D> for TimedMotion<D> {
     fn step(&mut self, mode: Mode, step: &Step<'_, D>) -> Flow {
         let more = self.times.record(step) + usize::from(std::mem::take(&mut self.start));
-        if more > 0 {
-            match self.modes.last_mut() {
-                Some((last, count)) if *last == mode && !self.new_piece => *count += more,
-                _ => self.modes.push((mode, more)),
-            }
-            self.new_piece = false;
+        match self.modes.last_mut() {
+            Some((last, count)) if *last == mode && !self.new_piece => *count += more,
+            _ => self.modes.push((mode, more)),
         }
+        self.new_piece = false;
         if self.kept() < MOST_POINTS { Flow::Continue } else { Flow::Stop }
     }
 
