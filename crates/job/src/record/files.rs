@@ -397,28 +397,53 @@ pub const LARGEST: u64 = 512 << 20;
 /// The largest text that [`read_text`] reads: a spec has 1 kB, a manifest 10.
 pub const LARGEST_TEXT: u64 = 16 << 20;
 
-/// Reads a whole file of at most [`LARGEST`] bytes.
+/// Opens a file that somebody else may have put there: only a plain file, because reading a pipe, a socket or a device may
+/// wait for ever or never end. Links are followed.
 ///
 /// # Errors
-/// If it cannot be read, or is larger.
+/// If it cannot be opened, or is no plain file.
+pub fn open_plain(path: &Path) -> io::Result<File> {
+    plain(&fs::metadata(path)?)?;
+    let file = File::open(path)?;
+    // Between the two calls another file may have been put there.
+    plain(&file.metadata()?)?;
+    Ok(file)
+}
+
+/// Refuses what is no plain file.
+pub(super) fn plain(what: &Metadata) -> io::Result<()> {
+    match what.file_type() {
+        kind if kind.is_file() => Ok(()),
+        kind if kind.is_dir() => Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder")),
+        _ => {
+            let why = "it is no plain file (a pipe, a socket or a device); give a copy of what is in it";
+            Err(io::Error::new(io::ErrorKind::InvalidInput, why))
+        }
+    }
+}
+
+/// Reads a whole plain file of at most [`LARGEST`] bytes.
+///
+/// # Errors
+/// If it cannot be read, is larger, or is no plain file.
 pub fn read(path: &Path) -> Result<Vec<u8>, FileError> {
-    File::open(path).and_then(|f| at_most(f, LARGEST)).map_err(FileError::new("read", path))
+    open_plain(path).and_then(|f| at_most(f, LARGEST)).map_err(FileError::new("read", path))
 }
 
-/// The digest of a file, however large, and its length.
+/// The digest of a plain file, however large, and its length.
 ///
 /// # Errors
-/// If it cannot be read.
+/// If it cannot be read, or is no plain file.
 pub fn digest(path: &Path) -> Result<(Hash, u64), FileError> {
-    File::open(path).and_then(Hash::of_stream).map_err(FileError::new("read", path))
+    open_plain(path).and_then(Hash::of_stream).map_err(FileError::new("read", path))
 }
 
-/// Reads a whole text file of at most [`LARGEST_TEXT`] bytes.
+/// Reads a whole plain text file of at most [`LARGEST_TEXT`] bytes.
 ///
 /// # Errors
-/// If it cannot be read, is larger, or is not UTF-8.
+/// If it cannot be read, is larger, is no plain file, or is not UTF-8.
 pub fn read_text(path: &Path) -> Result<String, FileError> {
-    File::open(path).and_then(text).map_err(FileError::new("read", path))
+    open_plain(path).and_then(text).map_err(FileError::new("read", path))
 }
 
 /// Reads a whole text of at most [`LARGEST_TEXT`] bytes from a stream; its `name` is for the message.

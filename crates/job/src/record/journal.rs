@@ -8,7 +8,7 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::files::FileError;
+use super::files::{FileError, plain};
 use super::hash::Hash;
 
 /// A journal that is being written.
@@ -30,6 +30,11 @@ impl Journal {
         let failed = |source| FileError { action: "open the journal", path: path.to_path_buf(), source };
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(failed)?;
+        }
+        match fs::metadata(path) {
+            Ok(there) => plain(&there).map_err(failed)?,
+            Err(e) if e.kind() == io::ErrorKind::NotFound => {}
+            Err(e) => return Err(failed(e)),
         }
         let mut file =
             OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
