@@ -2,8 +2,10 @@
 //!
 //! An entry is one file, written to a temporary name and renamed, so that several processes may use one store: who reads sees a whole entry or
 //! none. An entry names its question and carries the digest of its own bytes; one that is damaged, cut short, or belongs to another
-//! question is noticed and computed again. Nothing that is checked or published rests on a store: see `--fresh`.
+//! question is noticed and computed again. No link in a store is followed, and nothing in it is removed that is no entry. Nothing that is checked or published rests on a store: see `--fresh`.
 
+use std::fs::{self, FileType};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -72,12 +74,16 @@ impl Store {
 
     /// Whether something is kept under `key`; whether it is of use, [`Store::get`] says.
     pub fn has(&self, key: &Hash) -> bool {
-        self.path(key).is_file()
+        let path = self.path(key);
+        self.within(&path).is_ok() && path.is_file()
     }
 
     /// What is kept under `key` for `question`.
     pub fn get(&self, key: &Hash, question: &dyn Question) -> Kept {
         let path = self.path(key);
+        if let Err(error) = self.within(&path) {
+            return Kept::Damaged(error.to_string());
+        }
         let bytes = match files::read(&path) {
             Ok(bytes) => bytes,
             Err(error) if error.source.kind() == std::io::ErrorKind::NotFound => return Kept::Nothing,
@@ -117,28 +123,49 @@ impl Store {
         bytes.extend(encode::bits(&answer.tables));
         let digest = Hash::of(&bytes);
         bytes.extend_from_slice(digest.as_str().as_bytes());
-        files::write(&self.path(key), &bytes)
+        let path = self.path(key);
+        self.within(&path)?;
+        files::write(&path, &bytes)
     }
 
-    /// The entries: path inside the store, bytes, and whether this program's numerics made it. Sorted by path.
+    /// Refuses an entry's place if a link leads out of the store there.
+    fn within(&self, path: &Path) -> Result<(), FileError> {
+        for place in [path.parent(), Some(path)].into_iter().flatten() {
+            if fs::symlink_metadata(place).is_ok_and(|m| m.is_symlink()) {
+                let source = io::Error::other("it is a link, and a store follows none; remove it");
+                return Err(FileError { action: "use the store's", path: place.to_path_buf(), source });
+            }
+        }
+        Ok(())
+    }
+
+    /// The entries, sorted by path. Only what the program wrote is one: a plain file at XX/KEY.answer that begins as an answer to
+    /// KEY does. Links are not followed, and everything else is passed over.
     ///
     /// # Errors
     ///
     /// If the folder cannot be read.
     pub fn entries(&self) -> Result<Vec<Entry>, FileError> {
+        let mut entries = Vec::new();
         if !self.folder.exists() {
-            return Ok(Vec::new());
+            return Ok(entries);
         }
-        let found = crate::record::read_tree(&self.folder, &|path| path.ends_with(&format!(".{ENDING}")))?;
-        Ok(found
-            .files
-            .into_iter()
-            .map(|file| Entry {
-                current: read(&file.bytes).is_ok_and(|(h, _)| h.numerics == NUMERICS),
-                bytes: file.bytes.len() as u64,
-                path: file.path,
-            })
-            .collect())
+        for folder in names(&self.folder, |kind| kind.is_dir())? {
+            for file in names(&self.folder.join(&folder), |kind| kind.is_file())? {
+                let Some(key) = file.strip_suffix(ENDING).and_then(|name| name.strip_suffix('.')) else { continue };
+                if key.get(..2) != Some(folder.as_str()) {
+                    continue;
+                }
+                // A file that cannot be read is nobody's to remove.
+                let Ok(bytes) = files::read(&self.folder.join(&folder).join(&file)) else { continue };
+                if is_entry_of(key, &bytes) {
+                    let current = read(&bytes).is_ok_and(|(h, _)| h.numerics == NUMERICS);
+                    entries.push(Entry { path: format!("{folder}/{file}"), bytes: bytes.len() as u64, current });
+                }
+            }
+        }
+        entries.sort_by(|a, b| a.path.cmp(&b.path));
+        Ok(entries)
     }
 
     /// Removes entries; those that `unwanted` says. Gives back how many bytes that freed.
@@ -154,6 +181,26 @@ impl Store {
         }
         Ok(freed)
     }
+}
+
+/// Names in a folder of what is of this kind itself: a link is none.
+fn names(folder: &Path, wanted: impl Fn(&FileType) -> bool) -> Result<Vec<String>, FileError> {
+    let list = |source| FileError { action: "list", path: folder.to_path_buf(), source };
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder).map_err(list)? {
+        let entry = entry.map_err(list)?;
+        if wanted(&entry.file_type().map_err(list)?) {
+            names.extend(entry.file_name().into_string().ok());
+        }
+    }
+    Ok(names)
+}
+
+/// Whether these bytes begin as an answer to `key` does, of any version of the numerics. The rest may be damaged.
+fn is_entry_of(key: &str, bytes: &[u8]) -> bool {
+    header_of(bytes).is_ok_and(|(header, _)| {
+        serde_json::from_slice::<Value>(header).is_ok_and(|header| header["key"].as_str() == Some(key))
+    })
 }
 
 /// An entry of a store, from outside.
@@ -182,16 +229,20 @@ fn read(bytes: &[u8]) -> Result<(Header, Answer), String> {
     if Hash::of(content).as_str().as_bytes() != digest {
         return Err("its digest is not that of its content".into());
     }
-    let content = content.strip_prefix(MAGIC).ok_or("it is not an answer of this version")?;
-    let (length, content) = content.split_at_checked(8).ok_or("it is too short")?;
-    let length = u64::from_le_bytes(length.try_into().map_err(|_| "it is too short")?);
-    let (header, tables) =
-        usize::try_from(length).ok().and_then(|n| content.split_at_checked(n)).ok_or("its header is cut short")?;
+    let (header, tables) = header_of(content)?;
     let header: Header = serde_json::from_slice(header).map_err(|e| e.to_string())?;
     let tables = encode::from_bits(tables).map_err(|e| e.to_string())?;
     let answer =
         Answer { tables, facts: header.facts.clone(), statistics: header.statistics.clone(), stop: header.stop };
     Ok((header, answer))
+}
+
+/// An entry's header, and what follows it.
+fn header_of(bytes: &[u8]) -> Result<(&[u8], &[u8]), &'static str> {
+    let content = bytes.strip_prefix(MAGIC).ok_or("it is not an answer of this version")?;
+    let (length, content) = content.split_first_chunk().ok_or("it is too short")?;
+    let length = usize::try_from(u64::from_le_bytes(*length)).ok();
+    length.and_then(|n| content.split_at_checked(n)).ok_or("its header is cut short")
 }
 
 #[cfg(test)]
@@ -201,7 +252,6 @@ mod tests {
     use crate::question::{JobError, key};
     use crate::table::{Column, Table};
     use serde_json::json;
-    use std::fs;
     use std::sync::atomic::{AtomicUsize, Ordering};
     use twofold_integrate::Watch;
 
