@@ -108,7 +108,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         .map(|figure| match &given {
             Some(manifest) => Ok(manifest.clone()),
             None => match &arguments.expected {
-                Some(folder) => read_manifest(&folder.join(figure.id).join("expected.json")),
+                Some(folder) => manifest_of(figure.id, &folder.join(figure.id).join("expected.json")),
                 None => embedded(figure.id),
             },
         })
@@ -175,6 +175,15 @@ fn compare(manifest: &Manifest, actual: &PictureRecord) -> State {
 fn embedded(id: &str) -> Result<Manifest, CliError> {
     let text = figures::reference(id).ok_or_else(|| CliError::Usage(format!("no reference is committed for {id}")))?;
     Ok(Manifest::parse(text, &format!("the built-in reference of {id}"))?)
+}
+
+/// The manifest at `path`, which must be about this figure.
+fn manifest_of(id: &str, path: &Path) -> Result<Manifest, CliError> {
+    let manifest = read_manifest(path)?;
+    if manifest.figure == id {
+        return Ok(manifest);
+    }
+    Err(CliError::Usage(format!("{} is about \"{}\", and not about {id}", path.display(), manifest.figure)))
 }
 
 fn read_manifest(path: &Path) -> Result<Manifest, CliError> {

@@ -143,6 +143,14 @@ pub enum ManifestError {
         /// What it names so.
         bad: String,
     },
+    /// Two entries for one picture.
+    #[error("{name} lists {picture} twice; make it anew with `twofold bless`")]
+    Twice {
+        /// Where it came from.
+        name: String,
+        /// The picture.
+        picture: String,
+    },
 }
 
 /// The longest name of a figure, picture or panel.
@@ -159,7 +167,7 @@ impl Manifest {
     ///
     /// # Errors
     ///
-    /// If the text is not JSON, of an unknown version, or names a file outside its folder.
+    /// If the text is not JSON, of an unknown version, names a file outside its folder, or lists a picture twice.
     pub fn parse(text: &str, name: &str) -> Result<Self, ManifestError> {
         let syntax = |source| ManifestError::Syntax { name: name.to_owned(), source };
         // The version decides how the rest is read, so it is looked at alone first.
@@ -169,11 +177,17 @@ impl Manifest {
         {
             return Err(ManifestError::Version { name: name.to_owned(), found });
         }
-        let manifest: Self = serde_json::from_value(value).map_err(syntax)?;
+        // Not from `value`, which has kept only the last of two fields of one name.
+        let manifest: Self = serde_json::from_str(text).map_err(syntax)?;
         let pictures = manifest.pictures.iter();
         let names = pictures.flat_map(|p| std::iter::once(&p.name).chain(p.panels.iter().map(|q| &q.label)));
-        match std::iter::once(&manifest.figure).chain(names).find(|n| !is_plain_name(n)) {
-            Some(bad) => Err(ManifestError::Name { name: name.to_owned(), bad: bad.chars().take(200).collect() }),
+        let heads = [&manifest.figure, &manifest.made_by];
+        if let Some(bad) = heads.into_iter().chain(names).find(|n| !is_plain_name(n)) {
+            return Err(ManifestError::Name { name: name.to_owned(), bad: bad.chars().take(200).collect() });
+        }
+        let pictures = manifest.pictures.iter().enumerate();
+        match pictures.skip(1).find(|(i, p)| manifest.pictures[..*i].iter().any(|q| q.name == p.name)) {
+            Some((_, twice)) => Err(ManifestError::Twice { name: name.to_owned(), picture: twice.name.clone() }),
             None => Ok(manifest),
         }
     }
@@ -196,7 +210,7 @@ impl Manifest {
 pub struct Difference {
     /// The first layer that differs.
     pub layer: Layer,
-    /// The panels whose spec or data differ.
+    /// The panels whose spec, data or verdict differ.
     pub panels: Vec<String>,
 }
 
@@ -218,37 +232,40 @@ pub fn listed(panels: &[String]) -> String {
 impl PictureEntry {
     /// The first layer in which `actual` differs from `self`.
     pub fn first_difference(&self, actual: &PictureEntry) -> Option<Difference> {
-        let panels_differing = |hash: fn(&PanelEntry) -> Option<&Hash>| {
-            let mut labels = Vec::new();
-            for (i, panel) in self.panels.iter().enumerate() {
-                // Questions of one kind have one label: the first is held against the first, the second against the second.
-                let before = self.panels[..i].iter().filter(|p| p.label == panel.label).count();
-                let other = actual.panels.iter().filter(|p| p.label == panel.label).nth(before);
-                if other.is_none_or(|o| hash(o) != hash(panel)) {
-                    labels.push(panel.label.clone());
-                }
+        // A picture's hashes and its panels' are two statements: each must be what was computed.
+        let layers: [(Layer, bool); 7] = [
+            (Layer::Spec, self.spec == actual.spec && self.panels.len() == actual.panels.len()),
+            (Layer::Data, self.data == actual.data),
+            (Layer::Verdict, self.verdict == actual.verdict),
+            (Layer::Pixels, self.pixels == actual.pixels),
+            (Layer::Png, self.png == actual.png),
+            (Layer::Svg, self.svg == actual.svg),
+            (Layer::Pdf, self.pdf == actual.pdf),
+        ];
+        layers.into_iter().find_map(|(layer, same)| {
+            let panels = self.panels_differing(actual, layer);
+            (!same || !panels.is_empty()).then_some(Difference { layer, panels })
+        })
+    }
+
+    /// The labels of the panels that are not the same in a layer.
+    fn panels_differing(&self, actual: &PictureEntry, layer: Layer) -> Vec<String> {
+        let same = |a: &PanelEntry, b: &PanelEntry| match layer {
+            Layer::Spec => a.spec == b.spec,
+            Layer::Data => a.data == b.data,
+            Layer::Verdict => a.verdict == b.verdict,
+            Layer::Pixels | Layer::Png | Layer::Svg | Layer::Pdf => true,
+        };
+        let mut labels = Vec::new();
+        for (i, panel) in self.panels.iter().enumerate() {
+            // Questions of one kind have one label: the first is held against the first, the second against the second.
+            let before = self.panels[..i].iter().filter(|p| p.label == panel.label).count();
+            let other = actual.panels.iter().filter(|p| p.label == panel.label).nth(before);
+            if other.is_none_or(|other| !same(panel, other)) {
+                labels.push(panel.label.clone());
             }
-            labels
-        };
-        let layer = [
-            (Layer::Spec, &self.spec, &actual.spec),
-            (Layer::Data, &self.data, &actual.data),
-            (Layer::Verdict, &self.verdict, &actual.verdict),
-            (Layer::Pixels, &self.pixels, &actual.pixels),
-            (Layer::Png, &self.png, &actual.png),
-            (Layer::Svg, &self.svg, &actual.svg),
-            (Layer::Pdf, &self.pdf, &actual.pdf),
-        ]
-        .into_iter()
-        .find(|(_, a, b)| a != b)?
-        .0;
-        let panels = match layer {
-            Layer::Spec => panels_differing(|p| Some(&p.spec)),
-            Layer::Data => panels_differing(|p| Some(&p.data)),
-            Layer::Verdict => panels_differing(|p| p.verdict.as_ref().map(|v| &v.sha256)),
-            _ => Vec::new(),
-        };
-        Some(Difference { layer, panels })
+        }
+        labels
     }
 }
 
@@ -386,10 +403,48 @@ mod tests {
                 assert_eq!(difference.panels, panels);
             }
         }
-        // A panel that is not there differs.
+        // A panel that is not there differs, and one that is there for nothing.
         let mut fewer = expected.clone();
-        (fewer.data, _) = (other, fewer.panels.remove(0));
-        assert_eq!(expected.first_difference(&fewer).unwrap().panels, ["i"]);
+        fewer.panels.remove(0);
+        assert_eq!(expected.first_difference(&fewer).unwrap(), Difference { layer: Layer::Spec, panels: vec!["i".into()] });
+        assert_eq!(fewer.first_difference(&expected).unwrap(), Difference { layer: Layer::Spec, panels: Vec::new() });
+    }
+
+    /// A panel's statements are looked at though the picture's hash of them all is as it was.
+    #[test]
+    fn every_statement_of_a_panel_is_looked_at() {
+        let mut expected = entry();
+        let verdict =
+            VerdictEntry { claim: "c".into(), found: "f".into(), agrees: true, sha256: Hash::of(b"v") };
+        expected.panels[1].verdict = Some(verdict);
+        let verdict = |p: &mut PictureEntry, change: fn(&mut VerdictEntry)| p.panels[1].verdict.iter_mut().for_each(change);
+        type Change<'a> = &'a dyn Fn(&mut PictureEntry);
+        let changes: [(Layer, Change<'_>); 7] = [
+            (Layer::Spec, &|p| p.panels[1].spec = Hash::of(b"other")),
+            (Layer::Data, &|p| p.panels[1].data = Hash::of(b"other")),
+            (Layer::Verdict, &|p| verdict(p, |v| v.claim.push('!'))),
+            (Layer::Verdict, &|p| verdict(p, |v| v.found.push('!'))),
+            (Layer::Verdict, &|p| verdict(p, |v| v.agrees = false)),
+            (Layer::Verdict, &|p| verdict(p, |v| v.sha256 = Hash::of(b"other"))),
+            (Layer::Verdict, &|p| p.panels[1].verdict = None),
+        ];
+        for (layer, change) in changes {
+            let mut forged = expected.clone();
+            change(&mut forged);
+            let found = forged.first_difference(&expected).unwrap();
+            assert_eq!(found, Difference { layer, panels: vec!["ii".into()] });
+        }
+    }
+
+    #[test]
+    fn nothing_is_said_twice() {
+        let m = Manifest { version: VERSION, figure: "fig7".into(), made_by: "0".into(), pictures: vec![entry(), entry()] };
+        let error = Manifest::parse(&String::from_utf8(m.to_json()).unwrap(), "m.json").unwrap_err().to_string();
+        assert!(error.contains("m.json lists fig7-printed twice"), "{error}");
+        let once = Manifest { pictures: vec![entry()], ..m };
+        let text = String::from_utf8(once.to_json()).unwrap();
+        let twice = text.replacen("\"figure\"", "\"figure\": \"fig8\", \"figure\"", 1);
+        assert!(Manifest::parse(&twice, "m.json").unwrap_err().to_string().contains("duplicate field"));
     }
 
     #[test]
