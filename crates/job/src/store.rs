@@ -139,8 +139,8 @@ impl Store {
         Ok(())
     }
 
-    /// The entries, sorted by path. Only what the program wrote is one: a plain file at XX/KEY.answer that begins as an answer to
-    /// KEY does. Links are not followed, and everything else is passed over.
+    /// The entries, sorted by path. Only what the program wrote is one: a plain file at XX/KEY.answer that is an answer with its
+    /// digest, or a damaged one that begins as the answer to KEY does. Links are not followed, and everything else is passed over.
     ///
     /// # Errors
     ///
@@ -158,8 +158,9 @@ impl Store {
                 }
                 // A file that cannot be read is nobody's to remove.
                 let Ok(bytes) = files::read(&self.folder.join(&folder).join(&file)) else { continue };
-                if is_entry_of(key, &bytes) {
-                    let current = read(&bytes).is_ok_and(|(h, _)| h.numerics == NUMERICS);
+                let whole = read(&bytes).ok().map(|(header, _)| header);
+                if whole.is_some() || is_entry_of(key, &bytes) {
+                    let current = whole.is_some_and(|h| h.numerics == NUMERICS && h.key.as_str() == key);
                     entries.push(Entry { path: format!("{folder}/{file}"), bytes: bytes.len() as u64, current });
                 }
             }
@@ -210,7 +211,7 @@ pub struct Entry {
     pub path: String,
     /// Length.
     pub bytes: u64,
-    /// Whether it is whole and was made by this program's numerics: others are never used again.
+    /// Whether it is whole, its name's, and made by this program's numerics: others are never used again.
     pub current: bool,
 }
 
@@ -313,10 +314,50 @@ mod tests {
 
         let entries = store.entries().unwrap();
         assert_eq!(entries.len(), 2);
-        assert!(entries.iter().all(|e| e.current));
-        assert_eq!(store.prune(|e| !e.current).unwrap(), 0);
+        assert_eq!(entries.iter().filter(|e| e.current).count(), 1, "the one under another's name is never used");
+        assert_eq!(store.prune(|e| e.current && !e.current).unwrap(), 0);
         assert!(store.prune(|_| true).unwrap() > 0);
         assert_eq!(store.entries().unwrap(), []);
+    }
+
+    /// What the store did not write stays, whatever it is called; links are followed neither when reading, writing nor removing.
+    #[cfg(unix)]
+    #[test]
+    fn what_is_not_the_stores_is_left_alone() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let (store, elsewhere) = (Store::new(at("store")), Store::new(at("elsewhere")));
+        let (question, answer) = (Square(5.0), Answer::of_tables(Vec::new()).with_fact("of", &5.0));
+        let key = key(&question);
+        let foreign = Hash::of(b"foreign");
+        let foreign_place = store.path(&foreign);
+        let notes =
+            [at("store/notes.answer"), at("store/a/b/notes.answer"), at("store/ab/notes.answer"), foreign_place];
+        for note in &notes {
+            files::write(note, b"work").unwrap();
+        }
+        // An entry of ours, whole and damaged, in a place that is none.
+        store.put(&key, &question, &answer).unwrap();
+        let whole = fs::read(store.path(&key)).unwrap();
+        files::write(&at("store/zz.answer"), &whole).unwrap();
+        // A folder and an entry of another store, through links.
+        elsewhere.put(&key, &question, &answer).unwrap();
+        let shard = Hash::of(b"another").as_str()[..2].to_owned();
+        symlink(at("elsewhere").join(&key.as_str()[..2]), at("store").join(&shard)).unwrap();
+        assert_eq!(store.entries().unwrap().len(), 1);
+        fs::write(store.path(&key), &whole[..whole.len() - 1]).unwrap();
+        assert!(!store.entries().unwrap()[0].current, "damaged, and ours by its header");
+        assert_eq!(store.prune(|_| true).unwrap(), whole.len() as u64 - 1);
+        assert!(notes.iter().all(|note| fs::read(note).unwrap() == b"work"));
+        assert!(at("store/zz.answer").exists());
+        assert_eq!(elsewhere.get(&key, &question), Kept::Answer(answer.clone()));
+        // An entry that is a link is not used, and what it leads to is not written over.
+        fs::write(at("precious"), b"precious").unwrap();
+        symlink(at("precious"), store.path(&key)).unwrap();
+        assert!(matches!(store.get(&key, &question), Kept::Damaged(why) if why.contains("it is a link")));
+        assert!(!store.has(&key) && store.put(&key, &question, &answer).is_err());
+        assert_eq!(fs::read(at("precious")).unwrap(), b"precious");
     }
 
     /// An entry is its question's by its key, its kind, and what is asked: each by itself.
