@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::CliError;
 use super::progress::Progress;
-use super::rows::{compute, journal_of};
+use super::rows::{Pending, compute, journal_of};
 use crate::job::question::NUMERICS;
 use crate::job::sweep::Rows;
 use crate::record::Journal;
@@ -38,7 +38,7 @@ pub fn recompute(data: &[(&str, &[u8])], folder: &Path, threads: usize, progress
         }
         let pending: Vec<u64> = committed.iter().map(|row| row.number()).filter(|n| rows.get(*n).is_none()).collect();
         progress.line(&format!("{name}: {} of {} rows to compute", pending.len(), committed.len()));
-        let rows = compute(rows, &pending, Some(&mut journal), threads, progress)?;
+        let rows = compute(rows, Pending::these(pending), Some(&mut journal), threads, progress)?;
         if let (Some(exit), true) = (progress.asked_to_stop(), rows.len() < committed.len()) {
             let said = format!(
                 "interrupted: {} of {} rows of {name} are finished and kept in {}; the same command goes on with them",

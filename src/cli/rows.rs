@@ -1,5 +1,6 @@
 //! Rows of a sweep, computed side by side and kept as they finish.
 
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -7,7 +8,7 @@ use rayon::prelude::*;
 
 use super::progress::{Progress, Tally};
 use super::{CliError, in_pool};
-use crate::job::sweep::{Row, Rows};
+use crate::job::sweep::{Row, Rows, Shard};
 use crate::record::Journal;
 
 /// Fewest and most rows that a thread takes at once for its lanes, of which there are eight to thirty-two: the last of many rows leave few lanes empty for long.
@@ -21,6 +22,47 @@ pub fn journal_of(file: &Path) -> PathBuf {
     name.into()
 }
 
+/// The numbers of rows to compute, in order; never all of them in memory.
+pub struct Pending {
+    numbers: Box<dyn Iterator<Item = u64> + Send>,
+    /// The next ones, looked at and not taken.
+    ahead: VecDeque<u64>,
+    left: u64,
+}
+
+impl Pending {
+    /// What a shard lacks.
+    pub fn of(rows: &Rows, shard: Shard) -> Self {
+        let numbers = Box::new(rows.missing(shard));
+        Self { numbers, ahead: VecDeque::new(), left: rows.missing_count(shard) }
+    }
+
+    /// These numbers.
+    pub fn these(numbers: Vec<u64>) -> Self {
+        let left = numbers.len() as u64;
+        Self { numbers: Box::new(numbers.into_iter()), ahead: VecDeque::new(), left }
+    }
+
+    /// How many there are.
+    pub fn left(&self) -> u64 {
+        self.left
+    }
+
+    fn first_two(&mut self) -> Option<(u64, u64)> {
+        let missing = 2 - self.ahead.len().min(2);
+        self.ahead.extend(self.numbers.by_ref().take(missing));
+        Some((*self.ahead.front()?, *self.ahead.get(1)?))
+    }
+
+    fn take(&mut self, count: usize) -> Vec<u64> {
+        let ahead = self.ahead.len().min(count);
+        let mut taken: Vec<u64> = self.ahead.drain(..ahead).collect();
+        taken.extend(self.numbers.by_ref().take(count - ahead));
+        self.left = self.left.saturating_sub(taken.len() as u64);
+        taken
+    }
+}
+
 /// Computes the rows of these numbers on so many threads (0: one per core) and adds them to `rows`, and to `journal` as they finish. Whoever
 /// asks to stop gets what is finished.
 ///
@@ -29,14 +71,14 @@ pub fn journal_of(file: &Path) -> PathBuf {
 /// If a row cannot be written to the journal, or threads cannot be had.
 pub fn compute(
     rows: Rows,
-    pending: &[u64],
+    pending: Pending,
     journal: Option<&mut Journal>,
     threads: usize,
     progress: &Progress,
 ) -> Result<Rows, CliError> {
     let sweep = rows.sweep().clone();
     let shared = Mutex::new((rows, journal, None::<CliError>));
-    let tally = Tally::new(progress, pending.len() as u64);
+    let tally = Tally::new(progress, pending.left);
     let next = Mutex::new(pending);
     let keep = |row: Row| {
         let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
@@ -61,11 +103,9 @@ pub fn compute(
         // fewer towards the end, lest one thread be left with many.
         let some = || {
             let mut next = next.lock().unwrap_or_else(PoisonError::into_inner);
-            let alike = matches!(next[..], [a, b, ..] if sweep.share_lanes(a, b));
-            let count = (next.len() / (2 * threads)).clamp(if alike { LEAST } else { 1 }, MOST);
-            let (now, later) = next.split_at(count.min(next.len()));
-            *next = later;
-            now
+            let share = usize::try_from(next.left).unwrap_or(usize::MAX) / (2 * threads);
+            let alike = matches!(next.first_two(), Some((a, b)) if sweep.share_lanes(a, b));
+            next.take(share.clamp(if alike { LEAST } else { 1 }, MOST))
         };
         (0..threads).into_par_iter().with_max_len(1).for_each(|_| {
             loop {
@@ -74,7 +114,7 @@ pub fn compute(
                     break;
                 }
                 let mut more = true;
-                let taken = sweep.rows_together(numbers, &tally, &mut |row| {
+                let taken = sweep.rows_together(&numbers, &tally, &mut |row| {
                     more = keep(row);
                     more
                 });

@@ -115,15 +115,21 @@ fn rows_of_sweeps_are_recomputed() {
     let (code, out, err) = audit(&[path, "--segments", "4"]);
     assert_eq!(code, Some(0), "{out}{err}");
     assert!(out.contains("4 of 6 rows recomputed, all the same; root "), "{out}");
-    // A file, sound as such, whose rows answer another question than it says: each comes out otherwise.
+    // A file, sound as such, whose rows say another end than is computed: each comes out otherwise.
     let rows = Rows::from_csv(&fs::read(&file).unwrap()).unwrap();
-    let run = RunSpec { t_end: 61.0, ..rows.sweep().run().clone() };
-    let mut forged = Rows::of(Sweep::new(run, rows.sweep().axes().to_vec(), None).unwrap());
-    rows.iter().for_each(|row| forged.insert(row).unwrap());
-    fs::write(&file, forged.csv()).unwrap();
+    let journal: Vec<String> = rows.journal().iter().map(|line| line.replace(",60.0,", ",60.5,")).collect();
+    assert_ne!(journal, rows.journal());
+    fs::write(&file, Rows::from_journal(&journal).unwrap().csv()).unwrap();
     let (code, out, err) = audit(&[path, "--segments", "2"]);
     assert_eq!(code, Some(1), "{out}{err}");
     assert_eq!(out.matches("DIFFERS: row ").count(), 2, "{out}");
+    // A file, sound as such, whose rows answer another question than it says.
+    let run = RunSpec { t_end: 61.0, ..rows.sweep().run().clone() };
+    let mut others = Rows::of(Sweep::new(run, rows.sweep().axes().to_vec(), None).unwrap());
+    rows.iter().for_each(|row| others.insert(row).unwrap());
+    fs::write(&file, others.csv()).unwrap();
+    let (code, _, err) = audit(&[path, "--segments", "2"]);
+    assert_eq!((code, err.contains("row 0 has the key of another question")), (Some(2), true), "{err}");
     // A changed digit of a row is not even read: the file has a digest of its rows.
     let text = String::from_utf8(rows.csv()).unwrap();
     fs::write(&file, text.replacen(",60.0,", ",60.5,", 1)).unwrap();

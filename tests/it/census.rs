@@ -212,6 +212,12 @@ fn small(t_end: f64) -> Rows {
     rows
 }
 
+/// A row's line with another end.
+fn planted(line: &str) -> String {
+    assert!(line.contains(",30.0,"), "{line}");
+    line.replace(",30.0,", ",29.0,")
+}
+
 #[test]
 fn rows_that_come_out_the_same_pass_and_others_are_named() {
     let folder = tempfile::tempdir().unwrap();
@@ -223,10 +229,10 @@ fn rows_that_come_out_the_same_pass_and_others_are_named() {
     assert_eq!(std::fs::read(new.join("a.parquet")).unwrap(), committed);
     assert!(!journal_of(&new.join("a.parquet")).exists());
 
-    // The same sweep with one row of another.
-    let (mut forged, other) = (Rows::of(small(30.0).sweep().clone()), small(29.0));
-    forged.insert(small(30.0).get(0).unwrap()).unwrap();
-    forged.insert(other.get(1).unwrap()).unwrap();
+    // The same sweep with one row that ends elsewhere.
+    let mut journal = small(30.0).journal();
+    journal[2] = planted(&journal[2]);
+    let forged = Rows::from_journal(&journal).unwrap();
     let error = recompute(&[("b.parquet", &forged.parquet())], folder.path(), 1, &progress).unwrap_err();
     assert_eq!(error.exit(), Exit::CheckFailed);
     let text = error.to_string();
@@ -239,9 +245,8 @@ fn a_journal_is_gone_on_with() {
     let whole = small(30.0);
     let (mut journal, _) = Journal::open(&journal_of(&folder.path().join("a.parquet"))).unwrap();
     // A row that no computation gives: it stays, so it was not computed again.
-    let planted = small(29.0).get(0).unwrap();
     journal.append(&whole.journal_heading()).unwrap();
-    journal.append(&planted.line()).unwrap();
+    journal.append(&planted(&whole.journal()[1])).unwrap();
     drop(journal);
     let error = recompute(&[("a.parquet", &whole.parquet())], folder.path(), 1, &Progress::new(true)).unwrap_err();
     assert!(error.to_string().contains("row 0 of a.parquet"), "{error}");

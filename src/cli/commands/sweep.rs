@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::cli::ending;
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::progress::Progress;
-use crate::cli::rows::{compute, journal_of};
+use crate::cli::rows::{Pending, compute, journal_of};
 use crate::cli::speak::{complain, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::job::question;
@@ -92,6 +92,8 @@ enum Command {
 }
 
 /// Put the rows of several parts of one sweep together: files that `twofold sweep` wrote, or journals that it left.
+///
+/// Parts of two versions of the numerics are refused. If rows are missing, what is there is written and the exit code is 1.
 #[derive(Debug, clap::Args)]
 struct Merge {
     /// The parts: .parquet, .csv or .journal.
@@ -173,14 +175,14 @@ fn computed(arguments: &Arguments) -> Result<Exit, CliError> {
     } else if arguments.resume {
         return Err(CliError::no_effect("--resume", "there is no file to go on with; give --out FILE"));
     }
-    let pending = rows.missing(arguments.shard);
+    let pending = Pending::of(&rows, arguments.shard);
     let progress = Progress::with_grace(arguments.quiet);
     if arguments.resume {
-        progress.line(&format!("{} rows are there, {} to compute", rows.len(), pending.len()));
+        progress.line(&format!("{} rows are there, {} to compute", rows.len(), pending.left()));
     }
-    let rows = compute(rows, &pending, journal.as_mut(), arguments.threads, &progress)?;
-    let wanted = arguments.shard.rows(&sweep).count();
-    let left = rows.missing(arguments.shard).len();
+    let rows = compute(rows, pending, journal.as_mut(), arguments.threads, &progress)?;
+    let wanted = arguments.shard.count(&sweep);
+    let left = rows.missing_count(arguments.shard);
     if left > 0
         && let Some(exit) = progress.asked_to_stop()
     {
@@ -256,7 +258,7 @@ fn take(arguments: &Arguments, rows: &mut Rows, old: Rows, file: &Path) -> Resul
             }
         }
     }
-    rows.merge(old).map_err(|e| refuse(e.to_string()))
+    rows.merge_rechecked(old).map_err(|e| refuse(e.to_string()))
 }
 
 /// The rows of a file of ours.
@@ -283,7 +285,18 @@ fn merged(arguments: &Merge) -> Result<Exit, CliError> {
     deliver(out, &bytes_of(&rows, format))?;
     let progress = Progress::new(arguments.quiet);
     progress.line(&format!("{} of {} rows", rows.len(), rows.sweep().rows()));
-    summary(&rows, &progress)
+    let ends = summary(&rows, &progress)?;
+    let missing = rows.missing_count(Shard::WHOLE);
+    if missing == 0 {
+        return Ok(ends);
+    }
+    let first = rows.missing(Shard::WHOLE).next().unwrap_or_default();
+    complain(&format!(
+        "error: {missing} of {} rows are in none of the parts, the first of them row {first}; merge their parts, too, or \
+         compute them with --resume",
+        rows.sweep().rows()
+    ));
+    Ok(if ends == Exit::Fine { Exit::CheckFailed } else { ends })
 }
 
 /// What rows are written as.

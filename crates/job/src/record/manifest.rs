@@ -406,7 +406,10 @@ mod tests {
         // A panel that is not there differs, and one that is there for nothing.
         let mut fewer = expected.clone();
         fewer.panels.remove(0);
-        assert_eq!(expected.first_difference(&fewer).unwrap(), Difference { layer: Layer::Spec, panels: vec!["i".into()] });
+        assert_eq!(
+            expected.first_difference(&fewer).unwrap(),
+            Difference { layer: Layer::Spec, panels: vec!["i".into()] }
+        );
         assert_eq!(fewer.first_difference(&expected).unwrap(), Difference { layer: Layer::Spec, panels: Vec::new() });
     }
 
@@ -414,10 +417,10 @@ mod tests {
     #[test]
     fn every_statement_of_a_panel_is_looked_at() {
         let mut expected = entry();
-        let verdict =
-            VerdictEntry { claim: "c".into(), found: "f".into(), agrees: true, sha256: Hash::of(b"v") };
+        let verdict = VerdictEntry { claim: "c".into(), found: "f".into(), agrees: true, sha256: Hash::of(b"v") };
         expected.panels[1].verdict = Some(verdict);
-        let verdict = |p: &mut PictureEntry, change: fn(&mut VerdictEntry)| p.panels[1].verdict.iter_mut().for_each(change);
+        let verdict =
+            |p: &mut PictureEntry, change: fn(&mut VerdictEntry)| p.panels[1].verdict.iter_mut().for_each(change);
         type Change<'a> = &'a dyn Fn(&mut PictureEntry);
         let changes: [(Layer, Change<'_>); 7] = [
             (Layer::Spec, &|p| p.panels[1].spec = Hash::of(b"other")),
@@ -438,7 +441,8 @@ mod tests {
 
     #[test]
     fn nothing_is_said_twice() {
-        let m = Manifest { version: VERSION, figure: "fig7".into(), made_by: "0".into(), pictures: vec![entry(), entry()] };
+        let m =
+            Manifest { version: VERSION, figure: "fig7".into(), made_by: "0".into(), pictures: vec![entry(), entry()] };
         let error = Manifest::parse(&String::from_utf8(m.to_json()).unwrap(), "m.json").unwrap_err().to_string();
         assert!(error.contains("m.json lists fig7-printed twice"), "{error}");
         let once = Manifest { pictures: vec![entry()], ..m };

@@ -132,6 +132,16 @@ impl Shard {
         let step = usize::try_from(self.n.max(1)).unwrap_or(usize::MAX);
         (self.k.saturating_sub(1)..sweep.rows()).step_by(step)
     }
+
+    /// How many there are.
+    pub fn count(self, sweep: &Sweep) -> u64 {
+        sweep.rows().saturating_sub(self.k.saturating_sub(1)).div_ceil(self.n.max(1))
+    }
+
+    /// Whether a row is one of them.
+    pub fn has(self, row: u64) -> bool {
+        row % self.n.max(1) == self.k.saturating_sub(1)
+    }
 }
 
 impl std::str::FromStr for Shard {

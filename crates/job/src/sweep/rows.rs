@@ -6,17 +6,20 @@ use serde_json::{Value, json};
 
 use super::{Outcome, Shard, Sweep};
 use crate::encode::{self, Heading, Malformed};
-use crate::question::NUMERICS;
+use crate::question::{NUMERICS, question_hash};
 use crate::record::Hash;
 use crate::record::hash::canonical_json;
 use crate::table::{Column, Entry, Kind, Table};
 
 /// What files of ours say they are.
 const FORMAT: &str = "twofold-sweep";
-/// The version of that format.
-const VERSION: u64 = 1;
+/// The version of that format. From version 2 on `data` is the digest of the heading, too.
+const VERSION: u64 = 2;
 /// Hexadecimal digits of a question's digest that a row carries: as many as fit a whole number of a table.
 const KEY: usize = 15;
+
+/// The outcome of a row that failed.
+const FAILED: &str = "failed";
 
 /// A finished cell of a sweep.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +37,12 @@ pub enum RowsError {
     /// Two sweeps.
     #[error("they are of different sweeps ({0} and {1}): only parts of one sweep are merged")]
     OtherSweep(String, String),
+    /// Two versions of the numerics.
+    #[error(
+        "its rows were computed by another version of the numerics ({0}) than those before it ({1}): compute one of the parts \
+         anew, or go on with it by `twofold sweep --resume --recheck N`"
+    )]
+    OtherNumerics(String, String),
     /// Two values.
     #[error("row {0} has two different contents: they were computed by different versions, or one is damaged")]
     Conflict(u64),
@@ -91,14 +100,14 @@ impl Row {
     pub(super) fn failed(number: u64, settings: Vec<Entry>, key: Option<&Hash>, reason: String) -> Self {
         let blank = || Entry::Number(f64::NAN);
         let mut cells = settings;
-        cells.extend([key_entry(key), Entry::Word("failed".into()), Entry::Integer(0)]);
+        cells.extend([key_entry(key), Entry::Word(FAILED.into()), Entry::Integer(0)]);
         cells.extend((0..8).map(|_| blank()));
         cells.extend([
             Entry::Integer(0),
             blank(),
             Entry::Integer(0),
-            // One line, whatever the reason says.
-            Entry::Word(reason.replace(['\n', '\r'], " ")),
+            // One line that steers no terminal, whatever the reason says.
+            Entry::Word(reason.replace(char::is_control, " ")),
             Entry::Integer(i64::try_from(number).unwrap_or(i64::MAX)),
         ]);
         Self { number, cells }
@@ -126,6 +135,37 @@ impl Row {
             Entry::Integer(key) => *key,
             _ => 0,
         }
+    }
+
+    /// Whether it is the row of its number in this sweep, as far as that is known without computing it.
+    fn check(&self, sweep: &Sweep) -> Result<(), Malformed> {
+        let wrong = |what: &str| Err(Malformed(format!("row {} {what}", self.number)));
+        if self.number >= sweep.rows() {
+            return wrong(&format!("is not one of the {} rows of its sweep", sweep.rows()));
+        }
+        let same = |(a, b): (&Entry, &Entry)| match (a, b) {
+            (Entry::Number(a), Entry::Number(b)) => a.to_bits() == b.to_bits(),
+            (a, b) => a == b,
+        };
+        if !sweep.settings(self.number).iter().zip(&self.cells).all(same) {
+            return wrong("has other values of what is varied than its number says");
+        }
+        // A cell whose settings make no question has no key.
+        let key = sweep.question(self.number).ok().map(|question| question_hash(&question));
+        if *self.cell_from_last(16) != key_entry(key.as_ref()) {
+            return wrong("has the key of another question");
+        }
+        let plain = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-';
+        if !self.outcome().starts_with(|c: char| c.is_ascii_lowercase()) || !self.outcome().bytes().all(plain) {
+            return wrong("has an outcome that is no word of ours");
+        }
+        if self.reason().is_some_and(|reason| reason.contains(char::is_control)) {
+            return wrong("gives a reason with control characters in it");
+        }
+        if self.reason().is_some() != (self.outcome() == FAILED) {
+            return wrong("gives a reason and has not failed, or the other way round");
+        }
+        Ok(())
     }
 
     fn cell_from_last(&self, i: usize) -> &Entry {
@@ -230,9 +270,15 @@ impl Rows {
         self.lines.values().filter_map(move |line| Row::of_line(line, &columns).ok())
     }
 
-    /// The numbers of a shard that are not there.
-    pub fn missing(&self, shard: Shard) -> Vec<u64> {
-        shard.rows(&self.sweep).filter(|row| !self.has(*row)).collect()
+    /// The numbers of a shard that are not there, one after the other: a sweep may have more of them than fit in memory.
+    pub fn missing(&self, shard: Shard) -> impl Iterator<Item = u64> + use<> {
+        let there: BTreeSet<u64> = self.lines.keys().copied().collect();
+        shard.rows(&self.sweep).filter(move |row| !there.contains(row))
+    }
+
+    /// How many [`Rows::missing`] are.
+    pub fn missing_count(&self, shard: Shard) -> u64 {
+        shard.count(&self.sweep) - self.lines.keys().filter(|row| shard.has(**row)).count() as u64
     }
 
     /// Adds a row.
@@ -256,8 +302,22 @@ impl Rows {
     ///
     /// # Errors
     ///
-    /// If it is of another sweep, or a row has two contents.
+    /// If it is of another sweep, no version of the numerics stands for both, or a row has two contents.
     pub fn merge(&mut self, other: Rows) -> Result<(), RowsError> {
+        // A part that names two versions was rechecked by one of them.
+        if self.numerics.is_disjoint(&other.numerics) {
+            let names = |rows: &Rows| rows.numerics().collect::<Vec<_>>().join(", ");
+            return Err(RowsError::OtherNumerics(names(&other), names(self)));
+        }
+        self.merge_rechecked(other)
+    }
+
+    /// [`Rows::merge`], whatever version of the numerics computed the rows: for those of which some came out the same again.
+    ///
+    /// # Errors
+    ///
+    /// If it is of another sweep, or a row has two contents.
+    pub fn merge_rechecked(&mut self, other: Rows) -> Result<(), RowsError> {
         let hashes = [self.sweep.hash(), other.sweep.hash()];
         if hashes[0] != hashes[1] {
             return Err(RowsError::OtherSweep(hashes[0].short().to_owned(), hashes[1].short().to_owned()));
@@ -309,7 +369,10 @@ impl Rows {
     pub fn about(&self) -> Value {
         let mut about = self.heading();
         about["rows"] = json!(self.sweep.rows());
-        about["data"] = json!(Hash::of(&encode::bits(&[self.table()])));
+        // Which version of the numerics computed the rows is as much a statement as the rows are.
+        let mut said = canonical_json(&about);
+        said.extend(encode::bits(&[self.table()]));
+        about["data"] = json!(Hash::of(&said));
         about
     }
 
@@ -367,17 +430,20 @@ impl Rows {
         let mut rows = Self::of_heading(&heading.about)?;
         let columns = rows.columns();
         let fits = columns.len() == table.columns.len()
-            && columns.iter().zip(&table.columns).all(|(a, b)| a.name == b.name && a.kind() == b.kind());
+            && columns
+                .iter()
+                .zip(&table.columns)
+                .all(|(a, b)| a.name == b.name && a.unit == b.unit && a.kind() == b.kind());
         if !fits {
             return Err(Malformed("its columns are not those of a sweep of this version".into()).into());
         }
         for cells in table.rows() {
             rows.insert(Row::of_cells(cells)?)?;
         }
-        if heading.about["data"] != json!(Hash::of(&encode::bits(&[rows.table()]))) {
-            return Err(Malformed("its rows are not those that it was written with".into()).into());
+        if heading.about != rows.about() {
+            return Err(Malformed("its rows or its heading are not those that it was written with".into()).into());
         }
-        Ok(rows)
+        rows.checked()
     }
 
     /// The rows of a journal's lines.
@@ -396,12 +462,18 @@ impl Rows {
             // Whoever goes on with a journal by another version of the program says so.
             if line.starts_with('{') {
                 let heading = serde_json::from_str(line).map_err(|e| Malformed(format!("its heading: {e}")))?;
-                rows.merge(Self::of_heading(&heading)?)?;
+                rows.merge_rechecked(Self::of_heading(&heading)?)?;
             } else {
                 rows.insert(Row::of_line(line, &columns)?)?;
             }
         }
-        Ok(rows)
+        rows.checked()
+    }
+
+    /// The rows, if each is that of its number: a digest tells damage, and anybody can make one.
+    fn checked(self) -> Result<Self, RowsError> {
+        self.iter().try_for_each(|row| row.check(&self.sweep))?;
+        Ok(self)
     }
 
     fn of_heading(about: &Value) -> Result<Self, RowsError> {
@@ -435,7 +507,8 @@ mod tests {
     }
 
     fn failed(sweep: &Sweep, number: u64) -> Row {
-        Row::failed(number, sweep.settings(number), None, format!("why {number}\nindeed"))
+        let key = question_hash(&sweep.question(number).unwrap());
+        Row::failed(number, sweep.settings(number), Some(&key), format!("why {number}\nindeed"))
     }
 
     /// Every cell of a row that was found and of one that failed stands in its column.
@@ -463,7 +536,8 @@ mod tests {
         let found = Row::found(0, sweep.settings(0), &key, outcome);
         assert_eq!((found.number(), found.outcome(), found.reason()), (0, "period-3", None));
         assert_eq!(format!("{:015x}", found.key()), key.as_str()[..15]);
-        assert_eq!((failed(&sweep, 1).reason(), failed(&sweep, 1).key()), (Some("why 1 indeed"), 0));
+        let unasked = Row::failed(1, sweep.settings(1), None, "why 1\u{1b}indeed".into());
+        assert_eq!((unasked.reason(), unasked.key()), (Some("why 1 indeed"), 0));
         rows.insert(found.clone()).unwrap();
         rows.insert(failed(&sweep, 1)).unwrap();
         assert!(!rows.is_empty() && rows.len() == 2 && rows.has(1));
@@ -521,7 +595,9 @@ mod tests {
             ("why 1", "why 7", "not those that it was written with"),
             ("\n0.001,", "\n0.002,", "not those that it was written with"),
             ("twofold-sweep", "twofold-sweet", "does not say"),
-            ("\"version\":1", "\"version\":2", "does not say"),
+            ("\"version\":2", "\"version\":1", "does not say"),
+            (NUMERICS, "another", "not those that it was written with"),
+            ("\"rows\":2", "\"rows\":3", "not those that it was written with"),
             ("\"t_end\":60", "\"t_end\":61", "its spec is not the one"),
             (",1\n", ",-1\n", "no number"),
         ] {
@@ -550,7 +626,41 @@ mod tests {
         assert_eq!(rows.journal(), journal);
     }
 
-    /// A part that another version computed says so in the whole.
+    /// A row that is not what its number says is refused, though anybody can give it a digest.
+    #[test]
+    fn rows_are_those_of_their_numbers() {
+        let sweep = sweep(&["eps=1e-2,1e-3"], None);
+        let mut rows = Rows::of(sweep.clone());
+        (0..2).for_each(|n| rows.insert(failed(&sweep, n)).unwrap());
+        let journal = rows.journal();
+        let key = rows.get(1).unwrap().key().to_string();
+        for (from, to, word) in [
+            (",1]", ",2]", "not one of the 2 rows"),
+            (",1]", ",9223372036854775807]", "not one of the 2 rows"),
+            ("[0.001,", "[0.002,", "other values of what is varied"),
+            (&*key, "1", "key of another question"),
+            (&*key, "0", "key of another question"),
+            ("\"failed\"", "\"=cmd|calc\"", "no word of ours"),
+            ("\"failed\"", "\"\\u001b[31m\"", "no word of ours"),
+            ("\"failed\"", "\"\"", "no word of ours"),
+            ("\"failed\"", "\"period-1\"", "has not failed"),
+            ("why 1", "why\\u001b[31m", "control characters"),
+            ("\"why 1 indeed\"", "\"\"", "has not failed"),
+        ] {
+            assert!(journal[2].contains(from), "{from}: {}", journal[2]);
+            let forged = [journal[0].clone(), journal[1].clone(), journal[2].replacen(from, to, 1)];
+            let error = Rows::from_journal(&forged).unwrap_err().to_string();
+            assert!(error.contains(word) && !error.contains('\u{1b}'), "{from} {to}: {error}");
+        }
+        // In a table, too: with a digest of its own.
+        let mut forged = rows.clone();
+        let line = journal[2].replacen("[0.001,", "[0.002,", 1);
+        forged.lines.insert(1, line);
+        let error = Rows::from_csv(&forged.csv()).unwrap_err().to_string();
+        assert!(error.contains("other values of what is varied"), "{error}");
+    }
+
+    /// Rows of two versions are not mixed, unless one was rechecked by the other: then the whole names both.
     #[test]
     fn versions_are_kept_side_by_side() {
         let sweep = sweep(&["eps=1e-2,1e-3"], None);
@@ -559,8 +669,12 @@ mod tests {
         let other = rows.journal_heading().replace(NUMERICS, "another");
         let mut whole = Rows::from_journal(&[other, failed(&sweep, 1).line()]).unwrap();
         assert_eq!(whole.numerics().collect::<Vec<_>>(), ["another"]);
-        whole.merge(rows.clone()).unwrap();
+        let error = whole.merge(rows.clone()).unwrap_err().to_string();
+        assert!(error.contains("another version of the numerics") && error.contains(NUMERICS), "{error}");
+        whole.merge_rechecked(rows.clone()).unwrap();
         assert_eq!((whole.len(), whole.numerics().count()), (2, 2));
+        // A version that stands for both stands for each.
+        rows.clone().merge(whole.clone()).unwrap();
         let both = [whole.journal(), rows.journal()].concat();
         assert_eq!(Rows::from_journal(&both).unwrap().journal(), whole.journal());
     }
@@ -601,7 +715,8 @@ mod tests {
             rows.merge(later).unwrap();
             assert_eq!(rows.journal(), wanted, "the other way round: {a:b} {b:b} {c:b}");
             let missing: Vec<u64> = (0..4).filter(|i| (a | b | c) >> i & 1 == 0).collect();
-            assert_eq!(rows.missing(Shard::WHOLE), missing);
+            assert_eq!(rows.missing(Shard::WHOLE).collect::<Vec<_>>(), missing);
+            assert_eq!(rows.missing_count(Shard::WHOLE), missing.len() as u64);
         }
         for number in 0..4 {
             let mut rows = part(15);
@@ -614,6 +729,12 @@ mod tests {
         // Every shard of every number of shards: each row once.
         for n in 1..=6 {
             let mut all: Vec<u64> = (1..=n).flat_map(|k| Shard { k, n }.rows(&sweep)).collect();
+            for shard in (1..=n).map(|k| Shard { k, n }) {
+                let rows = part(5).missing(shard).collect::<Vec<_>>();
+                assert_eq!(rows, [1, 3].into_iter().filter(|row| shard.has(*row)).collect::<Vec<_>>());
+                assert_eq!(part(5).missing_count(shard), rows.len() as u64);
+                assert_eq!(shard.count(&sweep), shard.rows(&sweep).count() as u64);
+            }
             all.sort_unstable();
             assert_eq!(all, [0, 1, 2, 3], "{n} shards");
         }
