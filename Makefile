@@ -153,6 +153,10 @@ package: ## the crate, packed, unpacked and built as the registry would have it;
 deny: ## licences, duplicates, sources and known defects of every dependency (needs cargo-deny: cargo install --locked cargo-deny)
 	@$(CARGO) deny --workspace check
 
+.PHONY: fonts
+fonts: ## assets/fonts/glyphs.bin from the fonts' files
+	@$(CARGO) run --locked --quiet --manifest-path tools/fonts/Cargo.toml --target-dir target/tools
+
 .PHONY: sbom
 sbom: ## what the program links, with versions, licences and checksums (CycloneDX), into target/sbom (needs cargo-cyclonedx; scripts/sbom.sh)
 	@sh scripts/sbom.sh

@@ -48,7 +48,7 @@ const ROOMS: [(&str, &[&str]); 14] = [
 ];
 
 /// Who may name a library, by rooms (`bin` is src/bin, `figures` the figures).
-const LIBRARIES: [(&str, &[&str]); 11] = [
+const LIBRARIES: [(&str, &[&str]); 10] = [
     ("libm", &["num"]),
     ("pxfm", &["num"]),
     // Numbers in vector registers, and the runs in lanes that choose an instruction set; nothing else may look at the processor.
@@ -58,7 +58,6 @@ const LIBRARIES: [(&str, &[&str]); 11] = [
     ("plotters", &["render"]),
     ("plotters_backend", &["render"]),
     ("tiny_skia", &["render"]),
-    ("skrifa", &["render"]),
     ("tempfile", &["record", "job"]),
     ("clap", &["cli", "bin"]),
 ];

@@ -2,19 +2,18 @@
 
 use std::sync::OnceLock;
 
-use skrifa::charmap::Charmap;
-use skrifa::instance::{LocationRef, Size};
-use skrifa::metrics::GlyphMetrics;
-use skrifa::outline::{DrawSettings, OutlinePen};
-use skrifa::raw::tables::gpos::{PairPos, PositionSubtables, ValueRecord};
-use skrifa::raw::types::GlyphId16;
-use skrifa::raw::{ReadError, TableProvider};
-use skrifa::{FontRef, MetadataProvider, OutlineGlyphCollection, Tag};
-
-static REGULAR: &[u8] = include_bytes!("../../../assets/fonts/LibertinusSerif-Regular.otf");
-static ITALIC: &[u8] = include_bytes!("../../../assets/fonts/LibertinusSerif-Italic.otf");
-static BOLD: &[u8] = include_bytes!("../../../assets/fonts/LibertinusSerif-Bold.otf");
-static BOLD_ITALIC: &[u8] = include_bytes!("../../../assets/fonts/LibertinusSerif-BoldItalic.otf");
+/// Made of the fonts' files by tools/fonts. All numbers are little-endian.
+///
+/// For each face its length in bytes (u32), then: units per em, number of characters, of rows and of
+/// columns of the table of kerning (u16 each); for each character, in increasing order, its code (u32),
+/// the offset of its outline among the outlines (u32), its advance (i16), its row as the left one of a
+/// pair and its column as the right one (u16 each); the table of kerning, row after row (i16 each); the
+/// outlines. An outline is a list of strokes that ends with a dot: a letter as in SVG (M, L, C, Z), then
+/// the coordinates of its points, each as the difference to the coordinate before: an i8, or, if that is
+/// -128, the i16 behind it.
+static GLYPHS: &[u8] = include_bytes!("../../../assets/fonts/glyphs.bin");
+/// Bytes of a character's record.
+const RECORD: usize = 14;
 
 /// A face of the font family: upright or italic, regular or bold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,58 +28,41 @@ pub enum FontFace {
     BoldItalic,
 }
 
-/// Height of capitals as a share of the font size.
+/// Height of capitals as a share of the font size: what the regular face's table OS/2 says (tools/fonts).
 pub const CAP_HEIGHT: f64 = 0.658;
 
+/// The parts of [`GLYPHS`] that are a face's.
 struct Loaded {
-    characters: Charmap<'static>,
-    outlines: OutlineGlyphCollection<'static>,
-    metrics: GlyphMetrics<'static>,
     units_per_em: f64,
-    kerning: Vec<PairPos<'static>>,
+    columns: usize,
+    characters: &'static [u8],
+    kerning: &'static [u8],
+    outlines: &'static [u8],
 }
 
 fn loaded(face: FontFace) -> &'static Loaded {
     static FONTS: OnceLock<[Loaded; 4]> = OnceLock::new();
-    let fonts = FONTS.get_or_init(|| [REGULAR, ITALIC, BOLD, BOLD_ITALIC].map(load));
-    match face {
-        FontFace::Regular => &fonts[0],
-        FontFace::Italic => &fonts[1],
-        FontFace::Bold => &fonts[2],
-        FontFace::BoldItalic => &fonts[3],
-    }
+    let fonts = FONTS.get_or_init(|| {
+        let mut rest = GLYPHS;
+        [(); 4].map(|()| {
+            // The bytes are part of the program and a test reads all of them, so this cannot fail at run time.
+            let (face, next) = rest[4..].split_at(number(rest, 0) as usize);
+            rest = next;
+            let [characters, rows, columns] = [2, 4, 6].map(|at| usize::from(small(face, at)));
+            let (characters, tables) = face[8..].split_at(RECORD * characters);
+            let (kerning, outlines) = tables.split_at(2 * rows * columns);
+            Loaded { units_per_em: small(face, 0).into(), columns, characters, kerning, outlines }
+        })
+    });
+    &fonts[face as usize]
 }
 
-fn load(bytes: &'static [u8]) -> Loaded {
-    // The bytes are part of the program and a test loads each of them, so this cannot fail at run time.
-    let font = FontRef::new(bytes).expect("an embedded font is readable");
-    // In the font's own units: nothing is scaled, hinted or varied here.
-    let (size, place) = (Size::unscaled(), LocationRef::default());
-    Loaded {
-        characters: font.charmap(),
-        outlines: font.outline_glyphs(),
-        metrics: font.glyph_metrics(size, place),
-        units_per_em: f64::from(font.metrics(size, place).units_per_em),
-        kerning: kerning(&font).expect("an embedded font's kerning is readable"),
-    }
+fn small(bytes: &[u8], at: usize) -> u16 {
+    u16::from_le_bytes([bytes[at], bytes[at + 1]])
 }
 
-/// The tables of pairs that the font's first feature "kern" names, in their order.
-fn kerning(font: &FontRef<'static>) -> Result<Vec<PairPos<'static>>, ReadError> {
-    let gpos = font.gpos()?;
-    let (features, lookups) = (gpos.feature_list()?, gpos.lookup_list()?.lookups());
-    let Some(record) = features.feature_records().iter().find(|f| f.feature_tag() == Tag::new(b"kern")) else {
-        return Ok(Vec::new());
-    };
-    let mut tables = Vec::new();
-    for index in record.feature(features.offset_data())?.lookup_list_indices() {
-        if let PositionSubtables::Pair(pairs) = lookups.get(usize::from(index.get()))?.subtables()? {
-            for pair in pairs.iter() {
-                tables.push(pair?);
-            }
-        }
-    }
-    Ok(tables)
+fn number(bytes: &[u8], at: usize) -> u32 {
+    u32::from(small(bytes, at)) | u32::from(small(bytes, at + 2)) << 16
 }
 
 /// A glyph of a face.
@@ -88,21 +70,21 @@ fn kerning(font: &FontRef<'static>) -> Result<Vec<PairPos<'static>>, ReadError> 
 pub struct Glyph {
     /// The face it comes from.
     pub face: FontFace,
-    id: GlyphId16,
+    record: &'static [u8; RECORD],
 }
 
 /// The glyph of a character; signs that a face lacks come from the regular one. `None` if the family has no such sign.
 pub fn glyph(face: FontFace, character: char) -> Option<Glyph> {
     [face, FontFace::Regular].into_iter().find_map(|face| {
-        let id = loaded(face).characters.map(character)?;
-        Some(Glyph { face, id: GlyphId16::try_from(id).ok()? })
+        let (records, _) = loaded(face).characters.as_chunks();
+        let at = records.binary_search_by_key(&u32::from(character), |record| number(record, 0)).ok()?;
+        Some(Glyph { face, record: &records[at] })
     })
 }
 
 /// Advance width of a glyph as a share of the font size.
 pub fn advance(glyph: Glyph) -> f64 {
-    let font = loaded(glyph.face);
-    f64::from(font.metrics.advance_width(glyph.id.into()).unwrap_or(0.0)) / font.units_per_em
+    f64::from(small(glyph.record, 8) as i16) / loaded(glyph.face).units_per_em
 }
 
 /// Correction of the distance between two neighbouring glyphs as a share of the font size.
@@ -111,29 +93,8 @@ pub fn kern(left: Glyph, right: Glyph) -> f64 {
         return 0.0;
     }
     let font = loaded(left.face);
-    let adjustments = font.kerning.iter().filter_map(|pairs| adjustment(pairs, left.id, right.id)?.x_advance());
-    let first = adjustments.into_iter().find(|advance| *advance != 0);
-    f64::from(first.unwrap_or(0)) / font.units_per_em
-}
-
-/// What a table of pairs says about the left one of two glyphs.
-fn adjustment(pairs: &PairPos<'static>, left: GlyphId16, right: GlyphId16) -> Option<ValueRecord<'static>> {
-    match pairs {
-        PairPos::Format1(single) => {
-            let set = single.coverage().ok()?.get(left)?;
-            let set = single.pair_sets().get(set as usize).ok()?;
-            Some(*set.find_pair_value_record(right)?.value_record1())
-        }
-        PairPos::Format2(classes) => {
-            classes.coverage().ok()?.get(left)?;
-            let row = u16::try_from(classes.class_def1().ok()?.get(left)).ok()?;
-            let column = u16::try_from(classes.class_def2().ok()?.get(right)).ok()?;
-            let [first, _] = classes.value_record_refs(row, column)?;
-            Some(first)
-        }
-        // For fonts of more than 65535 glyphs.
-        PairPos::Format3(_) | PairPos::Format4(_) => None,
-    }
+    let place = usize::from(small(left.record, 10)) * font.columns + usize::from(small(right.record, 12));
+    f64::from(small(font.kerning, 2 * place) as i16) / font.units_per_em
 }
 
 /// A piece of a glyph's outline as shares of the font size, y upwards from the baseline.
@@ -152,54 +113,28 @@ pub enum Stroke {
 /// The outline of a glyph.
 pub fn outline(glyph: Glyph) -> Vec<Stroke> {
     let font = loaded(glyph.face);
-    let mut collector = Collector { scale: font.units_per_em, last: [0.0; 2], strokes: Vec::new() };
-    // A glyph without ink, such as a space, has no outline.
-    if let Some(outline) = font.outlines.get(glyph.id.into()) {
-        let settings = DrawSettings::unhinted(Size::unscaled(), LocationRef::default());
-        // A test draws every glyph of every embedded font.
-        let _ = outline.draw(settings, &mut collector);
-    }
-    collector.strokes
-}
-
-struct Collector {
-    scale: f64,
-    last: [f64; 2],
-    strokes: Vec<Stroke>,
-}
-
-impl Collector {
-    fn at(&self, x: f32, y: f32) -> [f64; 2] {
-        [f64::from(x) / self.scale, f64::from(y) / self.scale]
-    }
-}
-
-impl OutlinePen for Collector {
-    fn move_to(&mut self, x: f32, y: f32) {
-        self.last = self.at(x, y);
-        self.strokes.push(Stroke::Move(self.last));
-    }
-
-    fn line_to(&mut self, x: f32, y: f32) {
-        self.last = self.at(x, y);
-        self.strokes.push(Stroke::Line(self.last));
-    }
-
-    fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
-        // Raised to a cubic: only TrueType outlines have these, and one kind of curve is enough for three writers.
-        let (control, end) = (self.at(x1, y1), self.at(x, y));
-        let third = |from: [f64; 2]| [0, 1].map(|i| from[i] + 2.0 / 3.0 * (control[i] - from[i]));
-        self.strokes.push(Stroke::Cubic(third(self.last), third(end), end));
-        self.last = end;
-    }
-
-    fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
-        self.last = self.at(x, y);
-        self.strokes.push(Stroke::Cubic(self.at(x1, y1), self.at(x2, y2), self.last));
-    }
-
-    fn close(&mut self) {
-        self.strokes.push(Stroke::Close);
+    let mut bytes = font.outlines[number(glyph.record, 4) as usize..].iter().map(|byte| *byte as i8);
+    let mut next = move || bytes.next().unwrap_or(0);
+    let mut strokes = Vec::new();
+    let mut last = [0_i16; 2];
+    loop {
+        let letter = next() as u8;
+        let mut point = || {
+            for coordinate in &mut last {
+                *coordinate += match next() {
+                    i8::MIN => i16::from_le_bytes([next() as u8, next() as u8]),
+                    step => i16::from(step),
+                };
+            }
+            last.map(|coordinate| f64::from(coordinate) / font.units_per_em)
+        };
+        strokes.push(match letter {
+            b'M' => Stroke::Move(point()),
+            b'L' => Stroke::Line(point()),
+            b'C' => Stroke::Cubic(point(), point(), point()),
+            b'Z' => Stroke::Close,
+            _ => return strokes,
+        });
     }
 }
 
@@ -231,25 +166,40 @@ mod tests {
         assert_eq!(kern(n, n), 0.0);
     }
 
+    /// Advances, outlines and kerning, as skrifa 0.49 read them from the font files.
     #[test]
-    fn the_stated_heights_are_those_of_the_font() {
-        let height = FontRef::new(REGULAR).unwrap().os2().unwrap().s_cap_height().unwrap();
-        assert_eq!(f64::from(height) / loaded(FontFace::Regular).units_per_em, CAP_HEIGHT);
-    }
-
-    #[test]
-    fn every_glyph_can_be_drawn() {
-        for (face, least) in
-            [(FontFace::Regular, 2000), (FontFace::Italic, 2000), (FontFace::Bold, 2000), (FontFace::BoldItalic, 1500)]
-        {
-            let mut drawn = 0;
-            for (id, outline) in loaded(face).outlines.iter() {
-                let mut collector = Collector { scale: 1.0, last: [0.0; 2], strokes: Vec::new() };
-                let settings = DrawSettings::unhinted(Size::unscaled(), LocationRef::default());
-                outline.draw(settings, &mut collector).unwrap_or_else(|e| panic!("{face:?} {id}: {e}"));
-                drawn += 1;
+    fn every_glyph_is_the_font_files() {
+        use sha2::{Digest, Sha256};
+        let faces = [FontFace::Regular, FontFace::Italic, FontFace::Bold, FontFace::BoldItalic];
+        let mut hash = Sha256::new();
+        let mut number = |x: f64| hash.update(x.to_bits().to_le_bytes());
+        let mut drawn = 0;
+        for face in faces {
+            for c in (0..=0x1ffff).filter_map(char::from_u32) {
+                let Some(g) = glyph(face, c) else { continue };
+                drawn += usize::from(g.face == face);
+                number(f64::from(u32::from(c)));
+                number(advance(g));
+                for stroke in outline(g) {
+                    let (name, points) = match stroke {
+                        Stroke::Move(p) => (0.0, vec![p]),
+                        Stroke::Line(p) => (1.0, vec![p]),
+                        Stroke::Cubic(a, b, p) => (2.0, vec![a, b, p]),
+                        Stroke::Close => (3.0, vec![]),
+                    };
+                    number(name);
+                    points.into_iter().flatten().for_each(&mut number);
+                }
             }
-            assert!(drawn > least, "{face:?}: {drawn}");
+            // Latin, its supplement and Greek, with the signs of captions.
+            let signs = (0x20..0x7f).chain(0xa0..0x100).chain(0x391..0x3ca).chain(0x2010..0x2030).chain(0x2200..0x2270);
+            let glyphs: Vec<Glyph> = signs.filter_map(char::from_u32).filter_map(|c| glyph(face, c)).collect();
+            for left in &glyphs {
+                glyphs.iter().for_each(|right| number(kern(*left, *right)));
+            }
         }
+        assert!(drawn > 8000, "{drawn}");
+        let digest: String = hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
+        assert_eq!(digest, "19bd82af7e039c91101ca5956651130e6a2b44c6ee3a44dd82b90c5ef740f3e1");
     }
 }
