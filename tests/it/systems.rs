@@ -175,8 +175,8 @@ fn a_file_on_the_command_line() {
     let (code, out, err) = run(&["--set", "gain=2"]);
     assert_eq!((code, err.as_str()), (0, ""));
     let lines: Vec<&str> = out.lines().collect();
-    assert!(lines[1].starts_with("t,x,v,mode"), "{}", lines[1]);
-    let last: Vec<f64> = lines[lines.len() - 1].split(',').take(3).map(|v| v.parse().unwrap()).collect();
+    assert!(lines[0].starts_with("t,x,v,mode"), "{}", lines[0]);
+    let last: Vec<f64> = lines[lines.len() - 2].split(',').take(3).map(|v| v.parse().unwrap()).collect();
     assert!((last[0] - 5.0).abs() < 1e-12 && (last[1] + 2.0 * last[2]).abs() < 1e-7, "{last:?}");
     // The run's own description gives the same bytes.
     let (_, spec, _) = run(&["--set", "gain=2", "--print-spec"]);

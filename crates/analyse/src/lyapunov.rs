@@ -21,7 +21,7 @@ use twofold_integrate::{
     Course, Dopri5, Failure, Flow, Kick, Kicker, Observer, Step, StepCap, Stepper, Tolerance, Watch,
 };
 use twofold_num::elementary::{ln, sqrt};
-use twofold_num::fit::mean;
+use twofold_num::fit::{line, mean};
 use twofold_system::{Equations, VectorField};
 
 /// A largest Lyapunov exponent.
@@ -35,6 +35,42 @@ pub struct Exponent {
     /// Time averaged over.
     pub duration: f64,
 }
+
+/// An exponent with an interval: what a statement about its sign may rest on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// The mean over the run, with its standard error alone.
+    pub exponent: Exponent,
+    /// Half of the interval around the mean in which the exponent lies with 95 %: what scatters ([`QUANTILE`] standard errors), what growth
+    /// slower than any exponential adds to a mean over a finite time, and what the method's local errors can add.
+    pub half_width: f64,
+}
+
+/// What an interval says about an exponent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sign {
+    /// The whole interval is above zero.
+    Positive,
+    /// The whole interval is below zero.
+    Negative,
+    /// Zero is in it.
+    Zero,
+}
+
+impl Estimate {
+    /// What the interval says.
+    pub fn sign(&self) -> Sign {
+        match self.exponent.value {
+            v if v > self.half_width => Sign::Positive,
+            v if v < -self.half_width => Sign::Negative,
+            _ => Sign::Zero,
+        }
+    }
+}
+
+/// Student's 97.5 % quantile for the seven degrees of freedom of the longest blocks.
+const QUANTILE: f64 = 2.365;
 
 /// How an exponent is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -105,8 +141,7 @@ pub fn largest_along<const N: usize, const M: usize, T: VectorField<M>>(
     largest_watched(tangent, x0, kicked_states, settings, &())
 }
 
-/// [`largest_along`], reporting to `watch` how far it has come. Where `watch` refuses, the mean is over the blocks that are finished: its
-/// duration says how long that was. There is no number if they are fewer than eight of the 64.
+/// [`estimate_along`] without the interval.
 ///
 /// # Errors
 /// If the orbit cannot be followed.
@@ -117,6 +152,21 @@ pub fn largest_watched<const N: usize, const M: usize, T: VectorField<M>>(
     settings: &Settings,
     watch: &dyn Watch,
 ) -> Result<Exponent, Failure> {
+    Ok(estimate_along(tangent, x0, kicked_states, settings, watch)?.exponent)
+}
+
+/// [`largest_along`] with its interval, reporting to `watch` how far it has come. Where `watch` refuses, the mean is over the blocks that are finished: its
+/// duration says how long that was. There is no number if they are fewer than eight of the 64.
+///
+/// # Errors
+/// If the orbit cannot be followed.
+pub fn estimate_along<const N: usize, const M: usize, T: VectorField<M>>(
+    tangent: &T,
+    x0: SVector<f64, N>,
+    kicked_states: usize,
+    settings: &Settings,
+    watch: &dyn Watch,
+) -> Result<Estimate, Failure> {
     const { assert!(M == 2 * N) };
     let mut stepper = Dopri5::<M>::new(settings.tolerance);
     let mut kicker = settings.kick.map(|kick| Kicker::new(kick, kicked_states));
@@ -148,7 +198,7 @@ pub fn largest_watched<const N: usize, const M: usize, T: VectorField<M>>(
                     }
                 }
                 if stepper.statistics().steps.is_multiple_of(4096) && !watch.reached(t) {
-                    return Ok(mean_of(&rates, settings));
+                    return Ok(estimate_of(&rates, settings, t, stepper.statistics().steps));
                 }
                 if stepper.statistics().steps >= settings.max_steps {
                     let x: Vec<f64> = state.iter().take(N).copied().collect();
@@ -168,7 +218,7 @@ pub fn largest_watched<const N: usize, const M: usize, T: VectorField<M>>(
             rates.push(growth / (t - start));
         }
     }
-    Ok(mean_of(&rates, settings))
+    Ok(estimate_of(&rates, settings, t, stepper.statistics().steps))
 }
 
 /// [`largest_watched`] for many orbits side by side in the lanes of vector registers: of each the number that it has alone, bit for bit, in the
@@ -258,6 +308,26 @@ fn mean_of(rates: &[f64], settings: &Settings) -> Exponent {
     let duration =
         if rates.len() == BLOCKS { settings.duration } else { settings.duration * rates.len() as f64 / BLOCKS as f64 };
     Exponent { value, standard_error: blocked_error(rates), duration }
+}
+
+/// The mean with its interval, `steps` having been made until `t`.
+///
+/// Where vectors grow like a power of time, as at a shear or in regular motion, the mean falls like ln(t)/t and its scatter says nothing of it
+/// (Skokos 2010, Lect. Notes Phys. 790, 63-135, sec. 5): ln |v| = exponent t + power ln t is fitted to the blocks, and the interval reaches as
+/// far as the power matters. The method's local errors, at most its tolerance in each step, would make a vector grow or shrink by themselves.
+pub(super) fn estimate_of(rates: &[f64], settings: &Settings, t: f64, steps: u64) -> Estimate {
+    let exponent = mean_of(rates, settings);
+    // The mean of 1/t over a block; the first one has none if it begins at 0.
+    let points = rates.iter().enumerate().filter_map(|(k, rate)| {
+        let (from, to) = (block_end(settings, k), block_end(settings, k + 1));
+        (from > 0.0).then(|| (ln(to / from) / (to - from), *rate))
+    });
+    let fitted = line(&points.collect::<Vec<_>>()).filter(|l| l.slope.abs() > l.slope_error);
+    let slow = fitted.map_or(0.0, |l| (exponent.value - l.intercept).abs());
+    let Tolerance { rtol, atol } = settings.tolerance;
+    let method = (rtol + atol * RANGE) * steps as f64 / t.max(f64::MIN_POSITIVE);
+    let half_width = QUANTILE * exponent.standard_error + slow + method;
+    Estimate { exponent, half_width }
 }
 
 /// Length of the tangent vector.

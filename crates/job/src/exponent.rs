@@ -8,15 +8,16 @@ use super::answer::{Answer, Stop};
 use super::desk::Desk;
 use super::question::{JobError, Question};
 use super::spec::SwitchSpec;
-use twofold_analyse::lyapunov::{self, Exponent};
+use twofold_analyse::lyapunov::{self, Estimate, Exponent};
 use twofold_analyse::tangent::Tangent;
 use twofold_integrate::Watch;
 use twofold_integrate::ensemble::InstructionSet;
 use twofold_num::tape::Program;
 use twofold_system::{Alike, BoundField, Compiled, Field, Hysteretic, Smoothed, System};
 
-/// The largest Lyapunov exponent of the orbit from `start`. Fact: `exponent` ([`Exponent`]), or `failure` with the reason if the orbit
-/// could not be followed (it leaves, or its motion is set-valued and has no tangent flow).
+/// The largest Lyapunov exponent of the orbit from `start`. Facts: `exponent` ([`Exponent`]), `half_width` of its 95 % interval and `sign`
+/// ([`Sign`](lyapunov::Sign)) by that interval; or `failure` with the reason if the orbit could not be followed (it leaves, or its
+/// future is a set).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LargestExponent {
     /// The system.
@@ -87,7 +88,7 @@ impl LargestExponent {
         })
     }
 
-    fn exponent(&self, watch: &dyn Watch) -> Result<Exponent, String> {
+    fn exponent(&self, watch: &dyn Watch) -> Result<Estimate, String> {
         let start = |i: usize| self.start.get(i).copied().unwrap_or(f64::NAN);
         let dimension = self.system.dimension();
         if self.start.len() != dimension {
@@ -98,14 +99,14 @@ impl LargestExponent {
                 let field = Smoothed { system, transition, eps };
                 let x = SVector::from_fn(|i, _| start(i));
                 let tangent = Tangent::<_, 1>(&field);
-                return lyapunov::largest_watched::<3, 6, _>(&tangent, x, 3, &self.settings, watch)
+                return lyapunov::estimate_along::<3, 6, _>(&tangent, x, 3, &self.settings, watch)
                     .map_err(|e| e.to_string());
             }
             (SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. }, Some(Compiled::Caricature(system))) => {
                 let field = Hysteretic { system, eps, eps_prime, relaxation };
                 let x = SVector::from_fn(|i, _| if i < 3 { start(i) } else { self.phi() });
                 let tangent = Tangent::<_, 1>(&field);
-                return lyapunov::largest_watched::<4, 8, _>(&tangent, x, 3, &self.settings, watch)
+                return lyapunov::estimate_along::<4, 8, _>(&tangent, x, 3, &self.settings, watch)
                     .map_err(|e| e.to_string());
             }
             (SwitchSpec::Smoothed { eps, transition }, _) => Field::smoothed(&self.system, transition, eps),
@@ -130,10 +131,10 @@ impl LargestExponent {
     }
 
     /// By the recorded equation and its variational equation.
-    fn along<const N: usize, const M: usize>(&self, tangent: &Field, watch: &dyn Watch) -> Result<Exponent, String> {
+    fn along<const N: usize, const M: usize>(&self, tangent: &Field, watch: &dyn Watch) -> Result<Estimate, String> {
         let tangent = tangent.bind::<M>().map_err(|e| e.to_string())?;
         let x = SVector::<f64, N>::from_fn(|i, _| self.start.get(i).copied().unwrap_or_else(|| self.phi()));
-        lyapunov::largest_watched::<N, M, _>(&tangent, x, self.start.len(), &self.settings, watch)
+        lyapunov::estimate_along::<N, M, _>(&tangent, x, self.start.len(), &self.settings, watch)
             .map_err(|e| e.to_string())
     }
 
@@ -170,7 +171,7 @@ impl Question for LargestExponent {
     fn compute(&self, _: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
         let found = self.exponent(watch);
         let mut answer = Answer::of_tables(Vec::new());
-        if let Ok(exponent) = &found
+        if let Ok(Estimate { exponent, .. }) = &found
             && exponent.duration < self.settings.duration
         {
             if !exponent.value.is_finite() {
@@ -179,7 +180,10 @@ impl Question for LargestExponent {
             answer.stop = Stop::Interrupted;
         }
         Ok(match found {
-            Ok(exponent) => answer.with_fact("exponent", &exponent),
+            Ok(estimate) => answer
+                .with_fact("exponent", &estimate.exponent)
+                .with_fact("half_width", &estimate.half_width)
+                .with_fact("sign", &estimate.sign()),
             Err(failure) => answer.with_fact("failure", &failure),
         })
     }

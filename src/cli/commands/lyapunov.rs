@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::analyse::lyapunov::{Exponent, Settings};
+use crate::analyse::lyapunov::{Exponent, Settings, Sign};
 use crate::cli::ending;
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::progress::Progress;
@@ -10,11 +10,13 @@ use crate::cli::speak::{Delivery, deliver, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::integrate::StepCap;
 use crate::job::{Desk, JobError, LargestExponent, Question, Stop, encode};
+use crate::num::elementary::log10;
 
-/// The largest Lyapunov exponent of the orbit from the start, with its standard error: the mean rate at which a tangent vector grows.
+/// The largest Lyapunov exponent of the orbit from the start, with its 95 % interval: the mean rate at which a tangent vector grows.
 ///
-/// Above zero: neighbours part exponentially. Zero within its error: a closed orbit or a torus. Below: a rest. The error comes from averages
-/// over blocks of the orbit and knows only what the orbit has seen: an orbit that changes its ways once in a long while has a larger one.
+/// Above zero: neighbours part exponentially. Zero in the interval: a closed orbit, a torus, or growth that is not exponential. Below: a rest.
+/// The interval holds the scatter of averages over blocks of the orbit, what growth like a power of time adds, and the method's own errors. It knows
+/// only what the orbit has seen: an orbit that changes its ways once in a long while has a larger one.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     twofold lyapunov --system chua --t-end 5000\n  \
@@ -74,17 +76,19 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let bytes = match format {
         Format::Json => encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() })),
         Format::Text => {
-            let (value, error) = (found.value, found.standard_error);
-            let meaning = if value > 3.0 * error {
-                "neighbours part"
-            } else if value < -3.0 * error {
-                "neighbours approach"
-            } else {
-                "not told from zero"
+            let half_width: f64 = answer.fact("half_width").map_err(JobError::from)?;
+            let sign: Sign = answer.fact("sign").map_err(JobError::from)?;
+            let value = found.value;
+            let meaning = match sign {
+                Sign::Positive => "neighbours part",
+                Sign::Negative => "neighbours approach",
+                Sign::Zero => "not distinguishable from zero",
             };
             let until = transient + found.duration;
+            // So many that rounding does not move the interval.
+            let digits = (2.0 - log10(half_width)).ceil().clamp(6.0, 17.0) as usize;
             format!(
-                "{value:.6} +- {error:.1e} per unit time ({meaning}; mean over t = {transient} to {until}, standard error)\n"
+                "{value:.digits$} +- {half_width:.1e} per unit time ({meaning}; mean over t = {transient} to {until}, 95 % interval)\n"
             )
             .into_bytes()
         }
