@@ -900,7 +900,7 @@ class Sweep:
 
     @property
     def ends(self) -> List[str]:
-        """Where each run ends: "period-1", "leaving-period-1", "quasi-periodic", "irregular", "undecided", "noisy", "noisy-around-period-1", "far",
+        """Where each run ends: "rest", "period-1", "leaving-period-1", "quasi-periodic", "irregular", "undecided", "noisy", "noisy-around-period-1", "far",
         "escaped", "too-few" or "failed"."""
         return [str(word) for word in self.table["outcome"]]
 

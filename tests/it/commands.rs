@@ -362,7 +362,7 @@ fn scans_show_what_changes_and_where_starts_end() {
     for (x, number) in table.numbers("start.x").iter().zip(table.integers("number")) {
         assert_eq!(*number, if *x < 0.0 { 1 } else { 2 }, "{x}");
     }
-    assert!(table.words("ending").all(|w| w == "quiet") && table.len() == 18);
+    assert!(table.words("ending").all(|w| w == "rest") && table.len() == 18);
     // Threads change no byte.
     let again = good(at, &[&map[..], &over[..6], &["--threads", "3"]].concat());
     assert_eq!(again, out);

@@ -119,7 +119,7 @@ impl Run {
             "irregular" => Kind::Irregular,
             "far" if later => Kind::Irregular,
             "far" => Kind::Far,
-            "failed" | "undecided" | "too-few" | "escaped" => Kind::Undecided,
+            "failed" | "undecided" | "too-few" | "escaped" | "rest" => Kind::Undecided,
             _ if later => Kind::Irregular,
             "period-1" => Kind::PeriodOne,
             "period-3" => Kind::PeriodThree,

@@ -13,9 +13,8 @@ use crate::cli::speak::{Delivery, complain, deliver, is_standard_output, try_del
 use crate::cli::{CliError, Exit, in_pool};
 use crate::draw::scan::{self, Basin, Scanned};
 use crate::integrate::Watch;
-use crate::job::scan::Ending;
 use crate::job::spec::{Observation, RunSpec};
-use crate::job::sweep::{Axis, Sweep, Values};
+use crate::job::sweep::{Axis, Coordinate, Ending, Sweep, Values};
 use crate::job::table::{Column, Entry, Table};
 use crate::job::{self, Answer, Desk, JobError, Run, encode};
 use crate::render::markup;
@@ -25,8 +24,8 @@ use super::plot::{Format, small_print, write};
 /// Vary one or two settings of a run and see what it does: over one, an orbit diagram (the late passages through the plane for each value); over
 /// two, such as a plane of starts, a map of what each run ends on.
 ///
-/// Passages of the late half of each run count. A run ends on a period if its passages repeat within --alike, is quiet if it passes the plane no
-/// more, and else irregular; runs that end on the same passages have the same number. For statistics with verdicts see `twofold sweep`.
+/// Endings are the outcomes of `twofold sweep`: rest, period-K, irregular and so on. Runs that end on the same attractor have the same number. For
+/// more settings, statistics and resuming see there.
 /// Ctrl-C keeps the rows that are finished: on standard output, or beside --out under the name FILE.part.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
@@ -38,7 +37,7 @@ pub struct Arguments {
     /// A setting and its values: params.NAME, start.NAME, shift.NAME, eps ... =FROM..TO:COUNT, FROM..TO:log:COUNT or a,b,c; once or twice.
     #[arg(long, value_name = "NAME=VALUES", required = true, allow_hyphen_values = true, help_heading = "Scan")]
     over: Vec<Axis>,
-    /// Passages this near (in shares of 1 + their size) are taken for one, over two settings [default: 0.001].
+    /// Over two settings, attractors this near (as a share of the largest number in any start or attractor) have one number [default: 0.01].
     #[arg(long, value_name = "SHARE", allow_hyphen_values = true, help_heading = "Scan")]
     alike: Option<f64>,
     /// Draw the picture into this file (.png, .svg or .pdf).
@@ -95,7 +94,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
                 .into(),
         );
     }
-    let alike = arguments.alike.unwrap_or(1e-3);
+    let alike = arguments.alike.unwrap_or(1e-2);
     if !two && arguments.alike.is_some() {
         return Err(CliError::no_effect(
             "--alike",
@@ -103,7 +102,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         ));
     }
     if !(alike > 0.0 && alike.is_finite()) {
-        return usage(format!("--alike is {alike}: give a number above zero, such as 0.001"));
+        return usage(format!("--alike is {alike}: give a number above zero, such as 0.01"));
     }
     let shown = shown(arguments, &spec, two)?;
     let sweep = Sweep::new(spec, arguments.over.clone(), None).map_err(|e| CliError::Usage(format!("--over: {e}")))?;
@@ -131,7 +130,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         (0..rows)
             .into_par_iter()
             .map(|row| {
-                let cell = cell(&sweep, row, two, alike, &progress);
+                let cell = cell(&sweep, row, two, &progress);
                 let finished = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
                 watch.reached(finished as f64);
                 cell
@@ -188,23 +187,23 @@ fn shown(arguments: &Arguments, spec: &RunSpec, two: bool) -> Result<Option<Stri
 }
 
 /// One run, or nothing if it was interrupted.
-fn cell(sweep: &Sweep, row: u64, two: bool, alike: f64, progress: &Progress) -> Option<Cell> {
+fn cell(sweep: &Sweep, row: u64, two: bool, progress: &Progress) -> Option<Cell> {
     if progress.asked_to_stop().is_some() {
         return None;
     }
     let settings = sweep.settings(row);
     let found = sweep.question(row).map_err(JobError::Other).and_then(|fate| {
+        let (silent, watch) = (Silent(progress), SilentRun(progress));
+        let desk = Desk::new(None, &silent);
+        if two {
+            return fate.ending(&desk, &watch).map(Found::Ending);
+        }
         let run = fate.0.run;
-        let answer = Desk::new(None, &Silent(progress)).ask(&Run(run.clone()))?;
+        let answer = desk.ask(&Run(run.clone()))?;
         if answer.stop == job::Stop::Interrupted {
             return Err(JobError::Interrupted);
         }
-        let missing = || JobError::Other("no section was recorded".into());
-        Ok(if two {
-            Found::Ending(Ending::of(&run, &answer, alike).ok_or_else(missing)?)
-        } else {
-            Found::Passages(late(&run, &answer).ok_or_else(missing)?)
-        })
+        late(&run, &answer).map(Found::Passages).ok_or_else(|| JobError::Other("no section was recorded".into()))
     });
     match found {
         Err(JobError::Interrupted) => None,
@@ -290,19 +289,29 @@ fn endings(sweep: &Sweep, cells: &[Cell], alike: f64) -> (Table, Vec<Basin>) {
     );
     let mut known: Vec<(Ending, Basin)> = Vec::new();
     let mut failed = Basin { name: "failed".into(), attracts: false, cells: Vec::new() };
+    let scale = cells.iter().filter_map(|c| match &c.found {
+        Ok(Found::Ending(ending)) => Some(ending.place.iter().flatten().copied()),
+        _ => None,
+    });
+    let given = cells.iter().flat_map(|c| sweep.axes().iter().zip(&c.settings)).filter_map(|(axis, entry)| {
+        let start = matches!(axis.coordinate, Coordinate::Start(_));
+        start.then(|| entry.value())
+    });
+    let starts = sweep.run().start.iter().copied().chain(given);
+    let near = alike * scale.flatten().chain(starts).fold(0.0_f64, |a, x| a.max(x.abs()));
     let height = sweep.axes().get(1).map_or(1, Axis::count).max(1) as usize;
     for (row, cell) in cells.iter().enumerate() {
         let at = (row / height, row % height);
         let (word, number, reason) = match &cell.found {
             Ok(Found::Ending(ending)) => {
-                // Ten times wider than what makes a turn one: runs come to an attractor from different sides.
-                let index = known.iter().position(|(e, _)| e.is_like(ending, 10.0 * alike)).unwrap_or_else(|| {
-                    let attracts = *ending != Ending::Irregular;
-                    known.push((ending.clone(), Basin { name: ending.word(), attracts, cells: Vec::new() }));
+                let word = &ending.outcome.word;
+                let index = known.iter().position(|(e, _)| e.is_like(ending, near)).unwrap_or_else(|| {
+                    let attracts = !ending.place.is_empty();
+                    known.push((ending.clone(), Basin { name: word.clone(), attracts, cells: Vec::new() }));
                     known.len() - 1
                 });
                 known[index].1.cells.push(at);
-                (ending.word(), index as i64 + 1, String::new())
+                (word.clone(), index as i64 + 1, String::new())
             }
             Ok(Found::Passages(_)) => continue,
             Err(error) => {
@@ -313,7 +322,7 @@ fn endings(sweep: &Sweep, cells: &[Cell], alike: f64) -> (Table, Vec<Basin>) {
         let more = [Entry::Word(word), Entry::Integer(number), Entry::Word(reason)];
         table.push(cell.settings.iter().cloned().chain(more));
     }
-    let words: Vec<String> = known.iter().map(|(ending, _)| ending.word()).collect();
+    let words: Vec<String> = known.iter().map(|(ending, _)| ending.outcome.word.clone()).collect();
     let mut basins: Vec<Basin> = known.into_iter().map(|(_, basin)| basin).collect();
     // Two attractors may have one word; the rows tell them apart by their numbers.
     for (i, basin) in basins.iter_mut().enumerate() {

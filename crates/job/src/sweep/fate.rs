@@ -8,6 +8,7 @@ use crate::answer::{Answer, Stop};
 use crate::classification::{Classification, SoFar};
 use crate::desk::Desk;
 use crate::question::{JobError, Question};
+use crate::rest::{self, Rest};
 use crate::run::Run;
 use crate::simulate::simulate_until;
 use crate::spec::SwitchSpec;
@@ -15,8 +16,8 @@ use twofold_analyse::attractor::{Evidence, Verdict};
 use twofold_analyse::lyapunov::Exponent;
 use twofold_integrate::Watch;
 
-/// What a run settles on, as [`Classification`] has it, or that it goes to the far state: the region that no orbit leaves. Fact: `outcome`
-/// ([`Outcome`]).
+/// What a run settles on, as [`Classification`] has it, or that it ends at a rest ([`rest`]), or that it goes to the far state: the region that
+/// no orbit leaves. Fact: `outcome` ([`Outcome`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fate(pub Classification);
 
@@ -24,7 +25,7 @@ pub struct Fate(pub Classification);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Outcome {
-    /// In a word: `period-1`, `leaving-period-1` (turns around it and moves away), `quasi-periodic`, `irregular`, `undecided`, `noisy`,
+    /// In a word: `rest`, `period-1`, `leaving-period-1` (turns around it and moves away), `quasi-periodic`, `irregular`, `undecided`, `noisy`,
     /// `noisy-around-period-1`, `far`, `escaped`, `too-few`.
     pub word: String,
     /// Period of the closed orbit, 0 where there is none.
@@ -53,7 +54,42 @@ pub struct Outcome {
     pub steps: u64,
 }
 
+/// An outcome, and where it is: what tells two attractors of one kind apart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ending {
+    /// What the run settles on.
+    pub outcome: Outcome,
+    /// The points of a closed orbit in the plane of the section, in the order of the motion, or the state at rest; else nothing.
+    pub place: Vec<Vec<f64>>,
+}
+
+impl Ending {
+    fn of(evidence: &Evidence, answer: &Answer) -> Result<Self, JobError> {
+        let cycle = evidence.verdict.cycle();
+        let place = cycle.map_or(Vec::new(), |c| c.points.iter().take(c.period).map(|p| p.u.to_vec()).collect());
+        Ok(Self { outcome: Outcome::of(evidence, answer)?, place })
+    }
+
+    /// Whether this is where the other run ends, too: places count as one that are within `near` of each other.
+    pub fn is_like(&self, other: &Self, near: f64) -> bool {
+        let (a, b) = (&self.place, &other.place);
+        let n = a.len();
+        let alike = |i: usize, j: usize| {
+            let square = a[i].iter().zip(&b[j]).map(|(x, y)| (x - y) * (x - y)).sum::<f64>();
+            square <= near * near
+        };
+        // The same turn may be cut at another passage.
+        self.outcome.word == other.outcome.word
+            && n == b.len()
+            && (n == 0 || (0..n).any(|s| (0..n).all(|i| alike(i, (i + s) % n))))
+    }
+}
+
 impl Outcome {
+    fn at_rest(rest: &Rest, answer: &Answer) -> Result<Self, JobError> {
+        Ok(Self { word: "rest".into(), captured_at: None, rate: rest.rate(), ..Self::far(answer)? })
+    }
+
     fn of(evidence: &Evidence, answer: &Answer) -> Result<Self, JobError> {
         let cycle = evidence.verdict.cycle();
         let approach = cycle.and_then(|c| c.approach);
@@ -132,7 +168,7 @@ impl Question for Fate {
 
     fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
         let answer = self.run(desk, watch)?;
-        Ok(Answer::of_tables(Vec::new()).with_fact("outcome", &self.judged(desk, &answer)?))
+        Ok(Answer::of_tables(Vec::new()).with_fact("outcome", &self.judged(desk, &answer)?.outcome))
     }
 }
 
@@ -158,12 +194,21 @@ impl Fate {
         }
     }
 
+    /// What the run settles on, and where.
+    ///
+    /// # Errors
+    ///
+    /// Whatever the computation met.
+    pub fn ending(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Ending, JobError> {
+        self.judged(desk, &self.run(desk, watch)?)
+    }
+
     /// What the answer to the run's question comes to.
     ///
     /// # Errors
     ///
     /// Whatever the computation met.
-    fn judged(&self, desk: &Desk<'_>, answer: &Answer) -> Result<Outcome, JobError> {
+    fn judged(&self, desk: &Desk<'_>, answer: &Answer) -> Result<Ending, JobError> {
         match self.so_far(desk, answer)? {
             SoFar::Judged(outcome) => Ok(outcome),
             SoFar::Awaits(exponent) => self.with_exponent(answer, exponent.found(&*desk.ask(&*exponent)?)),
@@ -175,16 +220,20 @@ impl Fate {
     /// # Errors
     ///
     /// As [`Fate::judged`].
-    pub(super) fn so_far(&self, desk: &Desk<'_>, answer: &Answer) -> Result<SoFar<Outcome>, JobError> {
+    pub(super) fn so_far(&self, desk: &Desk<'_>, answer: &Answer) -> Result<SoFar<Ending>, JobError> {
         if answer.stop == Stop::Interrupted {
             return Err(JobError::Interrupted);
         }
         let state: Vec<f64> = answer.fact("state")?;
         if self.is_far().is_some_and(|far| far(&state)) {
-            return Ok(SoFar::Judged(Outcome::far(answer)?));
+            return Ok(SoFar::Judged(Ending { outcome: Outcome::far(answer)?, place: Vec::new() }));
+        }
+        if let Some(rest) = rest::at_end(desk, &self.0.run, answer)? {
+            let outcome = Outcome::at_rest(&rest, answer)?;
+            return Ok(SoFar::Judged(Ending { outcome, place: vec![rest.state] }));
         }
         Ok(match self.0.so_far(desk, answer)? {
-            SoFar::Judged(evidence) => SoFar::Judged(Outcome::of(&evidence, answer)?),
+            SoFar::Judged(evidence) => SoFar::Judged(Ending::of(&evidence, answer)?),
             SoFar::Awaits(exponent) => SoFar::Awaits(exponent),
         })
     }
@@ -194,8 +243,8 @@ impl Fate {
     /// # Errors
     ///
     /// If the answer is none to the run's question.
-    pub(super) fn with_exponent(&self, answer: &Answer, exponent: Option<Exponent>) -> Result<Outcome, JobError> {
-        Outcome::of(&self.0.with_exponent(answer, exponent)?, answer)
+    pub(super) fn with_exponent(&self, answer: &Answer, exponent: Option<Exponent>) -> Result<Ending, JobError> {
+        Ending::of(&self.0.with_exponent(answer, exponent)?, answer)
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::SVector;
 
-use super::{Fate, Outcome, Row, Sweep, far};
+use super::{Ending, Fate, Row, Sweep, far};
 use crate::answer::Answer;
 use crate::classification::SoFar;
 use crate::desk::{Desk, Progress};
@@ -62,9 +62,9 @@ impl Cell {
     }
 
     /// Its row.
-    fn row(&self, outcome: Result<Outcome, JobError>) -> Row {
-        match outcome {
-            Ok(outcome) => Row::found(self.number, self.settings.clone(), &self.key, outcome),
+    fn row(&self, ending: Result<Ending, JobError>) -> Row {
+        match ending {
+            Ok(ending) => Row::found(self.number, self.settings.clone(), &self.key, ending.outcome),
             Err(error) => Row::failed(self.number, self.settings.clone(), Some(&self.key), error.to_string()),
         }
     }

@@ -42,7 +42,7 @@ mod rows;
 use serde::{Deserialize, Serialize};
 
 pub use axis::{Axis, AxisError, Coordinate, FORMS, Values};
-pub use fate::{Fate, Outcome};
+pub use fate::{Ending, Fate, Outcome};
 pub use rows::{Row, Rows, RowsError};
 
 use super::classification::Classification;

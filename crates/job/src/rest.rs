@@ -1,0 +1,351 @@
+//! Rests: where a motion ends that does not go on moving.
+//!
+//! A rest is a zero of the equation that holds there: of a smooth field, of f+ where h > 0, of f- where h < 0, or of a mixture of both on
+//! h = 0 (a pseudo-equilibrium; Filippov 1988, sec. 19; di Bernardo, Budd, Champneys & Kowalczyk 2008, sec. 5.1). It is found by Newton's
+//! method from where a run ended. That the run ends there is another statement: it is made if the distance from the rest goes on falling
+//! as the rest's eigenvalues say. Nothing here has a unit: distances are compared with distances.
+
+use serde::{Deserialize, Serialize};
+
+use super::answer::{Answer, Stop};
+use super::desk::Desk;
+use super::question::JobError;
+use super::run::Run;
+use super::spec::{Method, MethodSpec, Observation, RunSpec, SwitchSpec};
+use twofold_integrate::{Schedule, StepCap, Tolerance};
+use twofold_num::elementary::{exp, ln, sqrt};
+use twofold_num::linear::{eigenvalues, solve_any};
+use twofold_num::tape::Program;
+use twofold_num::{Dual, Elementary};
+use twofold_system::{Field, System};
+
+/// What a rest is a zero of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RestKind {
+    /// The field.
+    Equilibrium,
+    /// A mixture of both fields on the switching surface.
+    PseudoEquilibrium,
+}
+
+/// Whether neighbours come to a rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stability {
+    /// They do.
+    Attracts,
+    /// Some leave.
+    Repels,
+    /// The largest real part of an eigenvalue is zero within its rounding: linear terms do not decide.
+    Neutral,
+}
+
+/// A rest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rest {
+    /// What it is a zero of.
+    pub kind: RestKind,
+    /// Where; with phi as last state, if the switch is hysteretic.
+    pub state: Vec<f64>,
+    /// Eigenvalues (real, imaginary) of the equation there, by falling real part; along the surface, of a pseudo-equilibrium. None where
+    /// the equation has no derivative.
+    pub eigenvalues: Vec<[f64; 2]>,
+    /// What they, and the fields on both sides, say.
+    pub stability: Stability,
+}
+
+impl Rest {
+    /// The rate per unit time at which neighbours approach in the end, negative if they leave.
+    pub fn rate(&self) -> Option<f64> {
+        self.eigenvalues.first().map(|l| 0.0 - l[0])
+    }
+
+    /// In a word or two.
+    pub fn word(&self) -> &'static str {
+        match self.kind {
+            RestKind::Equilibrium => "equilibrium",
+            RestKind::PseudoEquilibrium => "pseudo-equilibrium",
+        }
+    }
+}
+
+/// Real parts of eigenvalues below this share of the largest modulus are rounding.
+const ROUNDING: f64 = 1e-9;
+/// Newton iterations: enough for the linear convergence at a multiple zero.
+const ITERATIONS: usize = 100;
+
+/// f and its Jacobian matrix, row by row.
+fn linearised(n: usize, f: &dyn Fn(&[Dual<f64, 1>], &mut [Dual<f64, 1>]), outputs: usize, x: &[f64]) -> Jet {
+    let mut jet = Jet { value: vec![0.0; outputs], rows: vec![0.0; outputs * n] };
+    let mut out = vec![Dual::constant(0.0); outputs];
+    for j in 0..n {
+        let at: Vec<Dual<f64, 1>> =
+            (0..n).map(|i| if i == j { Dual::variable(x[i], 0) } else { Dual::constant(x[i]) }).collect();
+        f(&at, &mut out);
+        for (i, o) in out.iter().enumerate() {
+            jet.value[i] = o.value;
+            jet.rows[i * n + j] = o.partials[0];
+        }
+    }
+    jet
+}
+
+/// Values with derivatives.
+struct Jet {
+    value: Vec<f64>,
+    rows: Vec<f64>,
+}
+
+fn size(x: &[f64]) -> f64 {
+    sqrt(x.iter().map(|v| v * v).sum())
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    sqrt(a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum())
+}
+
+/// A zero near `from` of as many equations as unknowns: the point, if Newton's method comes to one. Only the first `states` unknowns are
+/// looked at to see that it did.
+fn zero(from: &[f64], states: usize, equations: &dyn Fn(&[f64]) -> Jet) -> Option<Vec<f64>> {
+    let mut x = from.to_vec();
+    let mut before = f64::INFINITY;
+    for _ in 0..ITERATIONS {
+        let jet = equations(&x);
+        if jet.value.iter().all(|v| *v == 0.0) {
+            return Some(x);
+        }
+        let right: Vec<f64> = jet.value.iter().map(|v| -v).collect();
+        let step = solve_any(&jet.rows, &right, 0.0)?;
+        x.iter_mut().zip(&step).for_each(|(x, s)| *x += s);
+        let step = size(&step[..states]);
+        let small = step <= 1e-13 * size(&x[..states]) || step <= 1e-10 * distance(&x[..states], &from[..states]);
+        if small && step >= 0.5 * before || step <= 1e-15 * size(&x[..states]) || step == 0.0 {
+            return x.iter().all(|v| v.is_finite()).then_some(x);
+        }
+        before = if small { step } else { f64::INFINITY };
+    }
+    None
+}
+
+/// Eigenvalues by falling real part, and what they say.
+fn stability_of(matrix: &[f64], n: usize) -> Option<(Vec<[f64; 2]>, Stability)> {
+    let mut found = eigenvalues(matrix, n)?;
+    found.sort_by(|a, b| b[0].total_cmp(&a[0]).then(b[1].total_cmp(&a[1])));
+    let largest = found.iter().map(|l| size(l)).fold(0.0, f64::max);
+    let stability = match found.first() {
+        Some(l) if l[0] > ROUNDING * largest => Stability::Repels,
+        Some(l) if l[0] < -ROUNDING * largest => Stability::Attracts,
+        None => Stability::Attracts,
+        _ => Stability::Neutral,
+    };
+    Some((found, stability))
+}
+
+/// The equation of a smoothed or hysteretic switch.
+pub(super) fn field(system: &System, switch: SwitchSpec) -> Option<Field> {
+    match switch {
+        SwitchSpec::Smoothed { eps, transition } => Some(Field::smoothed(system, transition, eps)),
+        SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. } if system.definition().second().is_none() => {
+            Some(Field::hysteretic(system, eps, eps_prime, relaxation))
+        }
+        _ => None,
+    }
+}
+
+/// The value of h.
+fn switching<S: Elementary>(system: &System, x: &[S]) -> S {
+    let mut h = [S::from_f64(f64::NAN)];
+    Program::new(&system.tape().select([0])).evaluate(x, &mut h);
+    let [h] = h;
+    h
+}
+
+/// The rest that Newton's method finds from `from`, the equation's state, whether or not anything ends there.
+pub fn near(system: &System, switch: SwitchSpec, from: &[f64]) -> Option<Rest> {
+    let regular = |field: &Field| {
+        let n = field.dimension();
+        let jet = |x: &[f64]| linearised(n, &|x, out| field.evaluate(x, out), n, x);
+        let state = zero(from, n, &jet)?;
+        let (eigenvalues, stability) = stability_of(&jet(&state).rows, n)?;
+        Some(Rest { kind: RestKind::Equilibrium, state, eigenvalues, stability })
+    };
+    if let Some(field) = field(system, switch) {
+        return regular(&field);
+    }
+    if !matches!(switch, SwitchSpec::Filippov { .. }) || system.definition().second().is_some() {
+        return None;
+    }
+    let [plus, minus] = [Field::plus(system), Field::minus(system)];
+    // A side's rest counts where that side is.
+    let on = |field: &Field, sign: f64| regular(field).filter(|r| sign * switching(system, &r.state) > 0.0);
+    let candidates = [pseudo(system, &plus, &minus, from), on(&plus, 1.0), on(&minus, -1.0)];
+    let there = |r: &Rest| distance(&r.state, from);
+    candidates.into_iter().flatten().min_by(|a, b| there(a).total_cmp(&there(b)))
+}
+
+/// The pseudo-equilibrium near `from`: f- + w (f+ - f-) = 0 and h = 0 with a weight w in (0, 1).
+fn pseudo(system: &System, plus: &Field, minus: &Field, from: &[f64]) -> Option<Rest> {
+    let n = from.len();
+    let equations = |x: &[f64]| {
+        let both = |x: &[Dual<f64, 1>], out: &mut [Dual<f64, 1>]| {
+            let (mut p, mut m) = (vec![Dual::constant(0.0); n], vec![Dual::constant(0.0); n]);
+            plus.evaluate(&x[..n], &mut p);
+            minus.evaluate(&x[..n], &mut m);
+            for i in 0..n {
+                out[i] = m[i] + (p[i] - m[i]) * x[n];
+            }
+            out[n] = switching(system, &x[..n]);
+        };
+        linearised(n + 1, &both, n + 1, x)
+    };
+    let of = |field: &Field, x: &[f64]| {
+        let mut out = vec![0.0; n];
+        field.evaluate(x, &mut out);
+        out
+    };
+    // The mixture that is nearest to rest: exactly one if the fields are opposite.
+    let (p, m) = (of(plus, from), of(minus, from));
+    let along: Vec<f64> = p.iter().zip(&m).map(|(p, m)| p - m).collect();
+    let weight = -m.iter().zip(&along).map(|(m, a)| m * a).sum::<f64>() / along.iter().map(|a| a * a).sum::<f64>();
+    let mut start = from.to_vec();
+    start.push(if weight.is_finite() { weight } else { 0.5 });
+    let Some(found) = zero(&start, n, &equations) else {
+        // Where the fields have no derivative the run may have come to the very point (in finite time).
+        let left: Vec<f64> = m.iter().zip(&along).map(|(m, a)| m + weight * a).collect();
+        let at_rest = size(&left) <= 1e-6 * size(&p).max(size(&m)) && (0.0..=1.0).contains(&weight);
+        let h = linearised(n, &|x, out| out[0] = switching(system, x), 1, from);
+        let on_surface = h.value[0].abs() <= 1e-9 * size(&h.rows) * size(from);
+        let kind = RestKind::PseudoEquilibrium;
+        return (at_rest && on_surface && size(&p) > 0.0).then(|| Rest {
+            kind,
+            state: from.to_vec(),
+            eigenvalues: Vec::new(),
+            stability: Stability::Attracts,
+        });
+    };
+    let (state, weight) = (found[..n].to_vec(), found[n]);
+    if !(weight > 0.0 && weight < 1.0) {
+        return None;
+    }
+    let h = linearised(n, &|x, out| out[0] = switching(system, x), 1, &state).rows;
+    let lie = |f: &[f64]| f.iter().zip(&h).map(|(f, h)| f * h).sum::<f64>();
+    let (p, m) = (of(plus, &state), of(minus, &state));
+    let towards = lie(&m) - lie(&p);
+    let sliding = Field::sliding(system);
+    let full = linearised(
+        n,
+        &|x, out| {
+            let mut all = vec![Dual::constant(0.0); n + 1];
+            let at: Vec<_> = x.iter().copied().chain([Dual::constant(0.0)]).collect();
+            sliding.evaluate(&at, &mut all);
+            out.copy_from_slice(&all[..n]);
+        },
+        n,
+        &state,
+    );
+    // Along the surface: the coordinate that h depends on most is a function of the others.
+    let k = (0..n).max_by(|i, j| h[*i].abs().total_cmp(&h[*j].abs()))?;
+    let kept: Vec<usize> = (0..n).filter(|i| *i != k).collect();
+    let entry = |i: usize, j: usize| (full.rows[i * n + j] - full.rows[i * n + k] * h[j] / h[k]) / towards;
+    let matrix: Vec<f64> = kept.iter().flat_map(|i| kept.iter().map(|j| entry(*i, *j)).collect::<Vec<_>>()).collect();
+    let (eigenvalues, along) = stability_of(&matrix, n - 1)?;
+    let stability = if towards > 0.0 { along } else { Stability::Repels };
+    Some(Rest { kind: RestKind::PseudoEquilibrium, state, eigenvalues, stability })
+}
+
+/// Windows of time over which the distance from a rest is compared.
+const WINDOWS: usize = 3;
+/// Points looked at in each.
+const POINTS: usize = 32;
+/// Share of the linear rate at which the distance has to fall at least.
+const AS_FAST: f64 = 0.75;
+
+/// The rest at which `run` ends, if it ends at one; `answer` is what it came to, with its section. A run that is kicked ends nowhere.
+///
+/// # Errors
+///
+/// If it was interrupted.
+pub fn at_end(desk: &Desk<'_>, run: &RunSpec, answer: &Answer) -> Result<Option<Rest>, JobError> {
+    if run.schedule.kick.is_some() || answer.stop == Stop::Interrupted {
+        return Ok(None);
+    }
+    let end: Vec<f64> = answer.fact("state")?;
+    let n = end.len();
+    let phi = |x: &[f64]| if switching(&run.system, x) > 0.0 { 1.0 } else { 0.0 };
+    let full = |x: &[f64]| -> Vec<f64> {
+        let more = matches!(run.switch, SwitchSpec::Hysteretic { .. }).then(|| phi(x));
+        x.iter().copied().chain(more).collect()
+    };
+    let Some(rest) = near(&run.system, run.switch, &full(&end)) else { return Ok(None) };
+    let from = |x: &[f64]| distance(x, &rest.state[..n]);
+    let (before, after) = (from(&run.start), from(&end));
+    // Started there, or as near as rounding tells.
+    let noise = |x: &[f64]| f64::EPSILON * 4.0 * size(x);
+    if before <= noise(&run.start) && after <= noise(&end) {
+        return Ok(Some(rest));
+    }
+    if rest.stability == Stability::Repels || after > 0.5 * before {
+        return Ok(None);
+    }
+    let Tolerance { rtol, atol } = run.method.tolerance;
+    if rest.stability == Stability::Attracts && after <= 100.0 * (rtol * size(&end) + atol) {
+        return Ok(Some(rest));
+    }
+    let leading = rest.eigenvalues.first().copied().unwrap_or([f64::NAN; 2]);
+    // Long enough for a turn, and for the longest time between late passages: a closed orbit does not come nearer in it.
+    let turn = if leading[1] == 0.0 { 0.5 / leading[0].abs() } else { std::f64::consts::TAU / leading[1].abs() };
+    let late = answer.table("section").map_or(&[][..], |s| s.numbers("t"));
+    let late = late.iter().skip_while(|t| **t < 0.5 * run.t_end).copied().collect::<Vec<_>>();
+    let window = 1.25 * late.windows(2).map(|w| w[1] - w[0]).fold(turn, f64::max);
+    if !(window.is_finite() && window <= 10.0 * run.t_end) {
+        return Ok(None);
+    }
+    let implicit = [Method::Lsoda, Method::Radau5].contains(&run.method.name);
+    let name = if implicit { run.method.name } else { Method::Dopri5 };
+    let mut switch = run.switch;
+    if let SwitchSpec::Hysteretic { phi0, .. } = &mut switch {
+        *phi0 = phi(&end);
+    }
+    let further = RunSpec {
+        switch,
+        start: end.clone(),
+        t_end: window * WINDOWS as f64,
+        method: MethodSpec {
+            name,
+            tolerance: Tolerance { rtol: 1e-10, atol: 1e-6 * after },
+            step_cap: StepCap::None,
+            precision: None,
+            order: None,
+            ..run.method
+        },
+        schedule: Schedule::default(),
+        observe: Observation::Times { every: window / POINTS as f64 },
+        ..run.clone()
+    };
+    let answer = match desk.ask(&Run(further)) {
+        Ok(answer) if answer.stop != Stop::Interrupted => answer,
+        Ok(_) | Err(JobError::Interrupted) => return Err(JobError::Interrupted),
+        Err(_) => return Ok(None),
+    };
+    let table = &answer.tables[0];
+    let columns: Vec<&[f64]> = run.system.coordinates().iter().map(|name| table.numbers(name)).collect();
+    let farthest = |k: usize| {
+        (k * POINTS..((k + 1) * POINTS + 1).min(table.len()))
+            .map(|row| from(&columns.iter().map(|c| c[row]).collect::<Vec<_>>()))
+            .fold(0.0, f64::max)
+    };
+    let (first, last) = (farthest(0), farthest(WINDOWS - 1));
+    let time = window * (WINDOWS - 1) as f64;
+    let falls = match rest.stability {
+        // The linear rate, down to what rounding leaves of the distance.
+        Stability::Attracts => {
+            let rate = leading[0].abs();
+            last <= first * exp(-AS_FAST * rate * time) || last <= 1e-8 * size(&end)
+        }
+        // Slower than any exponential: at least as its last power would be, and not by the method's own errors.
+        _ => ln(first / last) > 1e-7 * time.max(1.0) && last < first * (1.0 - 0.05 * time / (run.t_end + time)),
+    };
+    Ok(falls.then_some(rest))
+}
