@@ -99,6 +99,17 @@ impl<const D: usize> TimedMotion<D> {
         Self { times, modes: Vec::new(), start: true, new_piece: true, events: Vec::new() }
     }
 
+    /// As [`TimesRecorder::at_most`].
+    pub fn at_most(mut self, samples: usize) -> Self {
+        self.times = self.times.at_most(samples);
+        self
+    }
+
+    /// As [`TimesRecorder::is_behind`].
+    pub fn is_behind(&self, t: f64) -> bool {
+        self.times.is_behind(t)
+    }
+
     /// Number of points, or pieces without one, that are kept now.
     pub fn kept(&self) -> usize {
         let empty = self.modes.iter().rev().skip(1).filter(|(_, count)| *count == 0).count();

@@ -111,18 +111,36 @@ impl<const N: usize, const D: usize> Observer<N> for PathRecorder<D> {
 pub struct TimesRecorder<const D: usize = 3> {
     every: f64,
     next: u64,
+    most: usize,
     samples: Vec<Sample<D>>,
 }
 
 impl<const D: usize> TimesRecorder<D> {
     /// A recorder that begins with `x0` at time 0.
     pub fn new<const N: usize>(x0: &SVector<f64, N>, every: f64) -> Self {
-        Self { every, next: 1, samples: vec![Sample { t: 0.0, x: leading(x0) }] }
+        Self { every, next: 1, most: MOST_POINTS, samples: vec![Sample { t: 0.0, x: leading(x0) }] }
+    }
+
+    /// Stops when it has so many samples, instead of [`MOST_POINTS`], also within a step: given the same step again once they are
+    /// taken away, it goes on in it.
+    pub fn at_most(mut self, samples: usize) -> Self {
+        self.most = samples;
+        self
+    }
+
+    /// Whether a sample up to time `t` is not recorded yet.
+    pub fn is_behind(&self, t: f64) -> bool {
+        self.time() <= t
+    }
+
+    /// Time of the next sample.
+    fn time(&self) -> f64 {
+        self.next as f64 * self.every
     }
 
     /// The first of the interval's multiples that is not recorded yet, where it lies in this step.
     fn due<const N: usize>(&mut self, step: &Step<'_, N>) -> Option<Sample<D>> {
-        let t = self.next as f64 * self.every;
+        let t = self.time();
         if t > step.t1 {
             return None;
         }
@@ -151,11 +169,10 @@ impl<const D: usize> TimesRecorder<D> {
     /// Takes in a step, and says how many samples came of it.
     pub(super) fn record<const N: usize>(&mut self, step: &Step<'_, N>) -> usize {
         let before = self.samples.len();
-        while let Some(sample) = self.due(step) {
+        while self.samples.len() < self.most
+            && let Some(sample) = self.due(step)
+        {
             self.samples.push(sample);
-            if self.samples.len() >= MOST_POINTS {
-                break;
-            }
         }
         self.samples.len() - before
     }
@@ -164,7 +181,7 @@ impl<const D: usize> TimesRecorder<D> {
 impl<const N: usize, const D: usize> Observer<N> for TimesRecorder<D> {
     fn step(&mut self, step: &Step<'_, N>) -> Flow {
         self.record(step);
-        if self.samples.len() < MOST_POINTS { Flow::Continue } else { Flow::Stop }
+        if self.samples.len() < self.most { Flow::Continue } else { Flow::Stop }
     }
 }
 
@@ -224,6 +241,30 @@ mod tests {
         // 0.2 is four fifths into the first step.
         assert_eq!(samples[2].x, <[f64; 3]>::from(HalfCircle.at(0.2 / 0.25)));
         assert_eq!(samples[10].x, <[f64; 3]>::from(HalfCircle.at(1.0)));
+    }
+
+    /// Taken away a few at a time, also within a step, the samples are those of one who keeps them all.
+    #[test]
+    fn a_recorder_of_few_samples_goes_on_within_a_step() {
+        let steps = [(0.0, 0.25), (0.25, 0.27), (0.27, 1.0)].map(|(t0, t1)| Step {
+            t0,
+            t1,
+            x0: HalfCircle.at(0.0),
+            x1: HalfCircle.at(1.0),
+            interpolant: &HalfCircle,
+        });
+        let mut whole = TimesRecorder::<3>::new(&HalfCircle.at(0.0), 0.01);
+        let mut few = whole.clone().at_most(4);
+        let mut taken = Vec::new();
+        for step in &steps {
+            assert_eq!(whole.step(step), Flow::Continue);
+            while few.step(step) == Flow::Stop || few.is_behind(step.t1) {
+                assert_eq!(few.len(), 4);
+                taken.extend(few.take());
+            }
+        }
+        taken.extend(few.take());
+        assert_eq!((taken.len(), taken), (101, whole.into_samples()));
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! From a spec to a recording. Pure: the same spec gives the same bytes.
 
+use std::cell::Cell;
+
 use nalgebra::{SVector, vector};
 
 use super::answer::{Answer, Stop};
@@ -142,14 +144,14 @@ pub fn stream(spec: &RunSpec, rows: &mut dyn FnMut(&Table) -> bool, watch: &dyn 
         return Err(JobError::Other("a funnel is not given away in parts".into()));
     }
     match spec.system.dimension() {
-        1 => streamed(spec, rows, |aside| record::<1, 2>(spec, aside, watch)),
-        2 => streamed(spec, rows, |aside| record::<2, 3>(spec, aside, watch)),
-        3 => streamed(spec, rows, |aside| three_states(spec, aside, watch)),
-        4 => streamed(spec, rows, |aside| record::<4, 5>(spec, aside, watch)),
-        5 => streamed(spec, rows, |aside| record::<5, 6>(spec, aside, watch)),
-        6 => streamed(spec, rows, |aside| record::<6, 7>(spec, aside, watch)),
-        7 => streamed(spec, rows, |aside| record::<7, 8>(spec, aside, watch)),
-        8 => streamed(spec, rows, |aside| record::<8, 9>(spec, aside, watch)),
+        1 => streamed(spec, rows, watch, |aside| record::<1, 2>(spec, aside, watch)),
+        2 => streamed(spec, rows, watch, |aside| record::<2, 3>(spec, aside, watch)),
+        3 => streamed(spec, rows, watch, |aside| three_states(spec, aside, watch)),
+        4 => streamed(spec, rows, watch, |aside| record::<4, 5>(spec, aside, watch)),
+        5 => streamed(spec, rows, watch, |aside| record::<5, 6>(spec, aside, watch)),
+        6 => streamed(spec, rows, watch, |aside| record::<6, 7>(spec, aside, watch)),
+        7 => streamed(spec, rows, watch, |aside| record::<7, 8>(spec, aside, watch)),
+        8 => streamed(spec, rows, watch, |aside| record::<8, 9>(spec, aside, watch)),
         _ => Err(too_many_states(spec, UP_TO_EIGHT)),
     }
 }
@@ -169,6 +171,13 @@ struct Aside<'a, const D: usize> {
     end: Vec<f64>,
 }
 
+impl<const D: usize> Aside<'_, D> {
+    /// The most samples of one step that are kept at a time.
+    fn most(&self) -> usize {
+        if self.sink.is_some() { PART } else { MOST_POINTS }
+    }
+}
+
 impl<const D: usize> Default for Aside<'_, D> {
     fn default() -> Self {
         Self { sink: None, until: None, part: Part::WHOLE, end: Vec::new() }
@@ -178,13 +187,17 @@ impl<const D: usize> Default for Aside<'_, D> {
 fn streamed<const D: usize>(
     spec: &RunSpec,
     rows: &mut dyn FnMut(&Table) -> bool,
+    watch: &dyn Watch,
     run: impl FnOnce(&mut Aside<'_, D>) -> Result<Recording<D>, JobError>,
 ) -> Result<Streamed, JobError> {
-    let (mut first_piece, mut count) = (0, 0);
+    let (mut first_piece, mut count, stopped) = (0, 0, Cell::new(None));
     let mut give = |data: Data<D>| {
         let more = Recording::part(spec, &data, first_piece).is_none_or(|table| {
             count += table.len() as u64;
-            rows(&table)
+            // One step may hold more samples than anybody waits for.
+            let t = table.numbers("t").last().copied();
+            stopped.set(t.filter(|t| !watch.reached(*t)));
+            rows(&table) && stopped.get().is_none()
         });
         if let Data::Motion(motion) = &data {
             // The last piece goes on.
@@ -193,9 +206,15 @@ fn streamed<const D: usize>(
         more
     };
     let end = run(&mut Aside { sink: Some(&mut give), ..Aside::default() })?;
-    let wanted = give(end.data);
-    let stop = if wanted { end.stop.into() } else { Stop::Found };
-    Ok(Streamed { t: end.t, rows: count, statistics: end.statistics, stop })
+    let within = stopped.get();
+    let wanted = give(end.data) || stopped.get().is_some();
+    match within {
+        Some(t) => Ok(Streamed { t, rows: count, statistics: end.statistics, stop: Stop::Interrupted }),
+        None => {
+            let stop = if wanted { end.stop.into() } else { Stop::Found };
+            Ok(Streamed { t: end.t, rows: count, statistics: end.statistics, stop })
+        }
+    }
 }
 
 /// Points that are kept before they are given away.
@@ -211,6 +230,10 @@ struct Draining<'a, 'b, R, const D: usize> {
 trait Recorder<const D: usize> {
     fn kept(&self) -> usize;
     fn take(&mut self) -> Data<D>;
+    /// Whether a step up to time `t` is to be given to it again: it was full before the step's end.
+    fn is_behind(&self, _t: f64) -> bool {
+        false
+    }
 }
 
 impl<const D: usize> Recorder<D> for PathRecorder<D> {
@@ -228,6 +251,9 @@ impl<const D: usize> Recorder<D> for TimesRecorder<D> {
     }
     fn take(&mut self) -> Data<D> {
         Data::Path(TimesRecorder::take(self))
+    }
+    fn is_behind(&self, t: f64) -> bool {
+        TimesRecorder::is_behind(self, t)
     }
 }
 
@@ -256,9 +282,13 @@ impl<const D: usize> Recorder<D> for TimedMotion<D> {
     fn take(&mut self) -> Data<D> {
         Data::Motion(TimedMotion::take(self))
     }
+    fn is_behind(&self, t: f64) -> bool {
+        TimedMotion::is_behind(self, t)
+    }
 }
 
 impl<R: Recorder<D>, const D: usize> Draining<'_, '_, R, D> {
+    /// Gives points away if there are enough of them. Who keeps everything has no limit below that of memory.
     fn drained(&mut self, flow: Flow) -> Flow {
         if let Some(sink) = self.aside.sink.as_mut()
             && self.recorder.kept() >= PART
@@ -271,8 +301,12 @@ impl<R: Recorder<D>, const D: usize> Draining<'_, '_, R, D> {
 
 impl<R: Recorder<D> + Observer<N>, const D: usize, const N: usize> Observer<N> for Draining<'_, '_, R, D> {
     fn step(&mut self, step: &Step<'_, N>) -> Flow {
-        let flow = self.recorder.step(step);
-        let flow = self.drained(flow);
+        let mut flow = self.recorder.step(step);
+        flow = self.drained(flow);
+        while flow == Flow::Continue && self.recorder.is_behind(step.t1) {
+            flow = self.recorder.step(step);
+            flow = self.drained(flow);
+        }
         match self.aside.until {
             Some(until) if until(&step.x1.as_slice()[..D.min(N)]) => Flow::Stop,
             _ => flow,
@@ -285,8 +319,13 @@ impl<R: Recorder<D> + Observer<N>, const D: usize, const N: usize> Observer<N> f
 
 impl<R: Recorder<D> + FilippovObserver<D>, const D: usize> FilippovObserver<D> for Draining<'_, '_, R, D> {
     fn step(&mut self, mode: Mode, step: &Step<'_, D>) -> Flow {
-        let flow = self.recorder.step(mode, step);
-        self.drained(flow)
+        let mut flow = self.recorder.step(mode, step);
+        flow = self.drained(flow);
+        while flow == Flow::Continue && self.recorder.is_behind(step.t1) {
+            flow = self.recorder.step(mode, step);
+            flow = self.drained(flow);
+        }
+        flow
     }
     fn event(&mut self, event: &ModeEvent<D>) -> Flow {
         self.recorder.event(event)
@@ -418,7 +457,8 @@ fn watched<const D: usize>(
             Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
         }
         Observation::Times { every } => {
-            let mut draining = Draining { recorder: TimedMotion::new(&start(spec), every), aside };
+            let mut draining =
+                Draining { recorder: TimedMotion::new(&start(spec), every).at_most(aside.most()), aside };
             let end = run(&mut draining)?;
             Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
         }
@@ -507,7 +547,8 @@ fn observe<F: VectorField<N>, const D: usize, const N: usize>(
             (integrate(spec, field, x0, D, part, &mut draining, watch)?, Data::Path(draining.recorder.into_samples()))
         }
         Observation::Times { every } => {
-            let mut draining = Draining { recorder: TimesRecorder::<D>::new(&x0, every), aside: &mut *aside };
+            let recorder = TimesRecorder::<D>::new(&x0, every).at_most(aside.most());
+            let mut draining = Draining { recorder, aside: &mut *aside };
             (integrate(spec, field, x0, D, part, &mut draining, watch)?, Data::Path(draining.recorder.into_samples()))
         }
         Observation::Section { coordinate, value } => {
@@ -720,6 +761,28 @@ mod tests {
     }
 
     /// Passages of a circle at unit speed through y = 0: one each pi.
+    struct UntilHalf;
+    impl Watch for UntilHalf {
+        fn reached(&self, t: f64) -> bool {
+            t < 0.5
+        }
+    }
+
+    /// However many samples a step holds, few are kept; and who asks to stop within it is heard.
+    #[test]
+    fn a_step_is_given_away_in_parts() {
+        for switch in [switches()[0], switches()[2]] {
+            let run = cases::run(cases::decays(2), switch, 1.0, Observation::Times { every: 1e-5 });
+            let (end, rows, parts) = in_parts(&run);
+            assert!(end.statistics.steps < 1000 && parts.iter().all(|n| *n <= PART), "{parts:?}");
+            assert_eq!((end.rows, end.t, end.stop), (100_001, 1.0, Stop::Finished));
+            assert!(format!("{rows:?}") == format!("{:?}", answer(&run, &()).unwrap().tables[0].rows()));
+            let stop = stream(&run, &mut |_| true, &UntilHalf).unwrap();
+            assert_eq!(stop.stop, Stop::Interrupted);
+            assert!(stop.t >= 0.5 && stop.rows < 50_001 + PART as u64 && stop.rows as usize % PART == 0, "{stop:?}");
+        }
+    }
+
     #[test]
     fn sections_are_given_away_in_parts() {
         let circle = cases::smooth(&["x", "y"], "x + 9", &["x*(1 - x*x - y*y) - y", "y*(1 - x*x - y*y) + x"]);
