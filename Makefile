@@ -39,7 +39,7 @@ rigor-test: ## millions of interval operations against exact integer arithmetic 
 # 2^24 points a function; make elementary SKIP= : tanh and exp at 2^30 points too (half an hour).
 SKIP := --skip 2_30
 elementary: ## elementary functions against double-double arithmetic, and their frozen bits: 2^24 points each (minutes)
-	@$(CARGO) test --release --locked --lib num::elementary -- --include-ignored --nocapture $(SKIP)
+	@$(CARGO) test --release --locked --package twofold-num --lib elementary -- --include-ignored --nocapture $(SKIP)
 
 # The sweeps behind figures/census, figures/audit and figures/basin: 300 starts within 1e-9 of the paper's; fig. 7(iii) by other methods and
 # tolerances, and to shorter times with small local errors; alpha and beta over three decades each, and one exponent changed; starts on a plane.
@@ -148,7 +148,7 @@ wheel: ## the Python package as a wheel for this machine, into target/wheels (ne
 	@$(VENV)/bin/maturin build --release --locked --quiet --manifest-path python/Cargo.toml --out target/wheels
 
 package: ## the crate, packed, unpacked and built as the registry would have it; nothing is published
-	@$(CARGO) publish --dry-run --locked
+	@$(CARGO) publish --dry-run --workspace --locked
 
 deny: ## licences, duplicates, sources and known defects of every dependency (needs cargo-deny: cargo install --locked cargo-deny)
 	@$(CARGO) deny --workspace check

@@ -2,7 +2,7 @@
 //! a hundredth apart leave it thirty times nearer. For honesty beside `sensitivity.rs`: what grows by 7.7e12 is a disturbance made at
 //! the singularity, not one brought there.
 //!
-//! Proof. Validated Taylor steps with centres in double-double arithmetic (src/rigor), of three orbits from the start through the singularity (the third
+//! Proof. Validated Taylor steps with centres in double-double arithmetic (crates/rigor/src), of three orbits from the start through the singularity (the third
 //! crossing of y = 0) to the fourth crossing. (The derivative itself, whose factors are 1e-14 and 1e13, is beyond enclosures in f64.)
 
 use nalgebra::SVector;

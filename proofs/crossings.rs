@@ -1,7 +1,7 @@
 //! Theorem. The orbit from (0.2, 0, -1) crosses y = 0 where the reference tables say, in both readings: through the singularity, 24 rows of
 //! the printed reading and all 61 of the reconstructed one.
 //!
-//! Proof. Validated Taylor steps with centres in double-double arithmetic (src/rigor), from crossing to crossing. No crossing is
+//! Proof. Validated Taylor steps with centres in double-double arithmetic (crates/rigor/src), from crossing to crossing. No crossing is
 //! missed: while a step's box meets y = 0, the flow crosses it in one direction on all of the box. Each row of the tables, which were
 //! computed outside this project in 113-bit arithmetic, lies in the enclosure, up to the uncertainty that the row claims and its
 //! own printed digits.

@@ -7,7 +7,7 @@
 //! orbit, and with it a horseshoe (Smale 1967).
 //!
 //! Proof. Covering relations (Zgliczynski & Gidea 2004) between small parallelograms along the saddle orbit and along the homoclinic one, with validated
-//! Taylor steps (src/rigor) whose centres are in double-double arithmetic. They make two loops, of 2 and of 14 sets, that have the hub in common. A chain that runs
+//! Taylor steps (crates/rigor/src) whose centres are in double-double arithmetic. They make two loops, of 2 and of 14 sets, that have the hub in common. A chain that runs
 //! through them in any order is followed by an orbit; where it can choose, the next set is one of two that are disjoint. So chains of n sets, of
 //! which there are about lambda^n with lambda^-2 + lambda^-14 = 1, are told apart by orbits, and lambda > 1.12.
 //!

@@ -39,7 +39,7 @@
 //!
 //! 1. *Coming in*, s >= s0. R = s - E obeys R' = L - w + g p - F R (s - R), so that 0 <= R <= c1/s holds for good if F c1 (1 - c1/s0^2) >= L - w + g p1 for all |p| <= p1; |p| falls,
 //!    since p'/p = -F R. And d ln|q|/d ln s = (1/mu)/((1 - R/s)(1 - g p/w)): integrated, |q(s0)| = |p(S)| S (s0/S)^(1/mu) times a number near 1, as R/s <= c1/s^2 and |p| falls like a power.
-//! 2. *Past the singularity*, from s0 to -x0: (p, q) = d (a, b) with |d| <= d0, d constant. Validated Taylor steps (src/rigor) for all d at once, and for the derivative by the state at s = 0, which by
+//! 2. *Past the singularity*, from s0 to -x0: (p, q) = d (a, b) with |d| <= d0, d constant. Validated Taylor steps (crates/rigor/src) for all d at once, and for the derivative by the state at s = 0, which by
 //!    the mean value theorem also gives the state, because a = b = 0 is a solution.
 //! 3. *Going out*, x = -s >= x0. D = -E obeys D' = L - F D (x - D), so that 0 <= D <= c2/x holds for good if F c2 (1 - c2/x0^2) >= L + c2 (w + g p2)/x0^2. Then p'/p = F (x - D) > 0. By
 //!    F D (x - D) = L - D', ln(p2/|p(x0)|) is the integral of F x - L/(x - D) + D'/(x - D), which is f (x^2 - x0^2)/2 - ln(x/x0)/mu but for bounded terms. At equal |p|, disturbances (of x,

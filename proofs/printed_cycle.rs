@@ -1,7 +1,7 @@
 //! Theorem. In the printed reading (alpha = 1e-3, beta = 1e-5, eps = 1e-3, tanh) the smoothed caricature has an attracting
 //! periodic orbit. It crosses y = 0 upwards once a turn, in a box of width below 1e-8; its period is known to ten digits.
 //!
-//! Proof. Krawczyk's inclusion for the return map to y = 0, with validated Taylor steps (src/rigor); both multipliers lie in
+//! Proof. Krawczyk's inclusion for the return map to y = 0, with validated Taylor steps (crates/rigor/src); both multipliers lie in
 //! the unit disc because 1 - det > 0 and 1 + det +- trace > 0.
 
 use twofold::rigor::cycle::Search;

@@ -4,7 +4,7 @@
 //! The first state is, to its digits, where the orbit of the figures (from (0.2, 0, -1)) first passes the singularity. How much a
 //! disturbance there grows until the first exit crossing is enclosed, too: the derivative's largest element is 7.67e12.
 //!
-//! Proof. Validated Taylor steps with centres in double-double arithmetic (src/rigor). In f64 intervals, 1e-16 times the growth would
+//! Proof. Validated Taylor steps with centres in double-double arithmetic (crates/rigor/src). In f64 intervals, 1e-16 times the growth would
 //! leave nothing.
 
 use nalgebra::SVector;

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The polynomials of src/num/elementary/kernels.rs, computed with 300 bits (needs mpmath).
+"""The polynomials of crates/num/src/elementary/kernels.rs, computed with 300 bits (needs mpmath).
 
 Each interpolates its function at Chebyshev nodes; printed with the largest error of the rounded coefficients, relative to
 what the kernel adds it to, as a power of two.

@@ -1,5 +1,5 @@
 // Unit of work W3 (benches/README.md) with Taylor series in __float128, the compiler's 113-bit numbers: the recurrences are written out for the
-// caricature, and the steps are those of our own method (src/integrate/taylor.rs), so that arithmetic is compared with arithmetic.
+// caricature, and the steps are those of our own method (crates/integrate/src/taylor.rs), so that arithmetic is compared with arithmetic.
 //
 //     quad_taylor W3 B 3
 //

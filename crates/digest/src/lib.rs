@@ -41,10 +41,8 @@ impl Sources {
             if file.extension().is_some_and(|e| e == "rs") {
                 let invalid = |e: String| Error::new(ErrorKind::InvalidData, format!("{}: {e}", file.display()));
                 let text = String::from_utf8(bytes).map_err(|e| invalid(e.to_string()))?;
-                let tokens: TokenStream = text.parse().map_err(|e| invalid(format!("{e}")))?;
-                let mut modules = Vec::new();
-                bytes = Vec::new();
-                write(tokens, &mut bytes, &mut modules);
+                let (code, modules) = code(&text).map_err(invalid)?;
+                bytes = code.into_bytes();
                 // Where the file of a module stands that this file names: beside lib.rs, main.rs and mod.rs, below others.
                 let stem = name.trim_end_matches(".rs");
                 let base = match stem.rsplit_once('/') {
@@ -113,6 +111,19 @@ impl Sources {
     }
 }
 
+/// What Rust code says: its tokens, one a line, without comments, documentation and items under `#[cfg(test)]`; and the names of test modules
+/// that stand in files of their own.
+///
+/// # Errors
+///
+/// If it is no Rust.
+pub fn code(text: &str) -> std::result::Result<(String, Vec<String>), String> {
+    let tokens: TokenStream = text.parse().map_err(|e| format!("{e}"))?;
+    let (mut code, mut modules) = (String::new(), Vec::new());
+    write(tokens, &mut code, &mut modules);
+    Ok((code, modules))
+}
+
 /// Every file at a place, which must exist.
 fn collect(place: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
     if !place.is_dir() {
@@ -127,7 +138,7 @@ fn collect(place: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
 }
 
 /// Writes what tokens say, one a line, without documentation and tests; `modules` gets the names of test modules that stand in files.
-fn write(tokens: TokenStream, into: &mut Vec<u8>, modules: &mut Vec<String>) {
+fn write(tokens: TokenStream, into: &mut String, modules: &mut Vec<String>) {
     let tokens: Vec<TokenTree> = tokens.into_iter().collect();
     let mut i = 0;
     while i < tokens.len() {
@@ -155,11 +166,11 @@ fn write(tokens: TokenStream, into: &mut Vec<u8>, modules: &mut Vec<String>) {
                             Delimiter::Bracket => ("[\n", "]\n"),
                             Delimiter::None => ("", ""),
                         };
-                        into.extend_from_slice(open.as_bytes());
+                        into.push_str(open);
                         write(group.stream(), into, modules);
-                        into.extend_from_slice(close.as_bytes());
+                        into.push_str(close);
                     }
-                    other => into.extend_from_slice(format!("{other}\n").as_bytes()),
+                    other => into.push_str(&format!("{other}\n")),
                 }
                 i += 1;
             }
@@ -188,5 +199,105 @@ fn attribute(tokens: &[TokenTree]) -> Option<(usize, String)> {
             Some((length, group.stream().to_string().replace(char::is_whitespace, "")))
         }
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CODE: &str = "/// One.\npub fn one() -> i32 {\n    1 // one\n}\n\n#[cfg(test)]\nmod plain;\n";
+
+    /// The digest of a folder with the sources above after an edit.
+    fn after(edit: impl Fn(&Path)) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        fs::create_dir_all(root.join("src/part")).unwrap();
+        for (name, text) in [("lib.rs", CODE), ("plain.rs", "fn two() {}"), ("part/mod.rs", ""), ("data.toml", "a = 1")]
+        {
+            fs::write(root.join("src").join(name), text).unwrap();
+        }
+        edit(root);
+        let mut sources = Sources::default();
+        sources.add(root, "src", |name| !name.ends_with(".png")).unwrap();
+        sources.digest()
+    }
+
+    fn rewritten(from: &'static str, to: &'static str) -> String {
+        assert!(CODE.contains(from), "{from}");
+        after(|root| fs::write(root.join("src/lib.rs"), CODE.replace(from, to)).unwrap())
+    }
+
+    #[test]
+    fn what_computes_nothing_changes_nothing() {
+        let before = after(|_| {});
+        for (from, to) in [
+            ("// one", "/* another /* nested */ comment */"),
+            ("/// One.", "/// Another documentation, \"quoted\"."),
+            ("/// One.", "#[doc = \"One\"]"),
+            ("/// One.", "//! Of the file.\n"),
+            ("\n\n", "\n\r\n\t \n"),
+            (
+                "#[cfg(test)]",
+                "#[cfg(test)]\nuse std::fs;\n#[cfg(test)]\nfn helper() -> [u8; 2] { [1, 2] }\n#[cfg(test)]",
+            ),
+            ("#[cfg(test)]", "#[cfg(test)]\n#[allow(dead_code)]\nmod tests { fn f() { g(\"}\") } }\n#[cfg(test)]"),
+        ] {
+            assert_eq!(rewritten(from, to), before, "{from} -> {to}");
+        }
+        assert_eq!(after(|root| fs::write(root.join("src/plain.rs"), "fn three() {}").unwrap()), before);
+        assert_eq!(after(|root| fs::write(root.join("src/picture.png"), "x").unwrap()), before);
+        assert_eq!(after(|root| fs::write(root.join("src/data.toml"), "a = 1\r").unwrap()), before);
+    }
+
+    #[test]
+    fn what_computes_changes_the_digest() {
+        let mut seen = BTreeSet::from([after(|_| {})]);
+        for (from, to) in [
+            ("    1", "    2"),
+            ("one()", "other()"),
+            ("#[cfg(test)]", "fn another() {}\n#[cfg(test)]"),
+            ("/// One.", "#[inline]"),
+            ("#[cfg(test)]", ""),
+            ("#[cfg(test)]", "#[cfg(not(test))]"),
+        ] {
+            assert!(seen.insert(rewritten(from, to)), "{from} -> {to}");
+        }
+        for (file, text) in
+            [("data.toml", "a = 2"), ("part/mod.rs", "fn f() {}"), ("part/new.rs", "fn f() {}"), ("x.csv", "")]
+        {
+            assert!(seen.insert(after(|root| fs::write(root.join("src").join(file), text).unwrap())), "{file}");
+        }
+    }
+
+    #[test]
+    fn of_the_lock_file_only_what_a_package_is_built_from() {
+        let lock = "version = 4\n\n[[package]]\nname = \"ours\"\nversion = \"1.0.0\"\ndependencies = [\n \"libm\",\n \"rand 0.2.0\",\n]\n\n\
+            [[package]]\nname = \"libm\"\nversion = \"0.2.16\"\nchecksum = \"ab\"\n\n\
+            [[package]]\nname = \"rand\"\nversion = \"0.1.0\"\n\n[[package]]\nname = \"rand\"\nversion = \"0.2.0\"\n\n\
+            [[package]]\nname = \"clap\"\nversion = \"4.0.0\"\ndependencies = [\n \"libm\",\n]\n";
+        let digest = |text: &str| {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("Cargo.lock");
+            fs::write(&path, text).unwrap();
+            let mut sources = Sources::default();
+            sources.add_locked(&path, "ours").map(|()| sources.digest())
+        };
+        let before = digest(lock).unwrap();
+        for unrelated in [("4.0.0", "4.0.1"), ("0.1.0", "0.1.1")] {
+            assert_eq!(digest(&lock.replace(unrelated.0, unrelated.1)).unwrap(), before, "{unrelated:?}");
+        }
+        for related in [("0.2.16", "0.2.17"), ("\"ab\"", "\"ac\""), ("0.2.0", "0.2.1")] {
+            assert_ne!(digest(&lock.replace(related.0, related.1)).unwrap(), before, "{related:?}");
+        }
+        assert!(digest("version = 4\n").is_err());
+    }
+
+    #[test]
+    fn a_place_that_is_not_there_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(Sources::default().add(folder.path(), "src", |_| true).is_err());
+        fs::write(folder.path().join("x.rs"), "fn f( {").unwrap();
+        assert!(Sources::default().add(folder.path(), "x.rs", |_| true).is_err());
     }
 }
