@@ -199,10 +199,16 @@ fn one_file_holds_all_that_is_unsafe() {
         .map(|path| path.strip_prefix(root).unwrap().display().to_string())
         .collect();
     found.sort();
-    assert_eq!(found, ["src/bin/twofold/mathematics.rs", "src/lib.rs"]);
-    let library = fs::read_to_string(root.join("src/lib.rs")).unwrap();
-    let lines: Vec<&str> = library.lines().filter(|line| says_unsafe(line)).collect();
-    assert_eq!(lines, ["#![forbid(unsafe_code)]"]);
+    let (libraries, others): (Vec<String>, Vec<String>) = found.into_iter().partition(|f| f.ends_with("src/lib.rs"));
+    assert_eq!(others, ["src/bin/twofold/mathematics.rs"]);
+    // Every library of the workspace forbids it, in a line of its own.
+    let crates = fs::read_dir(root.join("crates")).unwrap().count();
+    assert_eq!(libraries.len(), crates + 1, "{libraries:?}");
+    for library in libraries {
+        let text = fs::read_to_string(root.join(&library)).unwrap();
+        let lines: Vec<&str> = text.lines().filter(|line| says_unsafe(line)).collect();
+        assert_eq!(lines, ["#![forbid(unsafe_code)]"], "{library}");
+    }
     // And every program of ours has it.
     let mut programs = 0;
     // Not the proofs, which ask for none, nor the tools and peers beside the project.

@@ -76,8 +76,15 @@ fn versions_agree() {
     if workflows().is_empty() {
         return;
     }
-    let version = format!("version = \"{}\"", env!("CARGO_PKG_VERSION"));
-    assert!(text("python/Cargo.toml").lines().any(|l| l == version), "python/Cargo.toml has no line {version}");
+    let manifest = text("Cargo.toml");
+    // Crates of one version belong together.
+    let exact = format!("version = \"={}\"", env!("CARGO_PKG_VERSION"));
+    for line in manifest.lines().filter(|l| l.starts_with("twofold-") && l.contains("path = ")) {
+        assert!(line.contains(&exact), "{line}: {exact}");
+    }
+    for name in members() {
+        assert!(text(format!("{name}/Cargo.toml")).contains("\nversion.workspace = true\n"), "{name}");
+    }
     let toolchain = text("rust-toolchain.toml");
     let channel = toolchain.lines().find_map(|l| l.strip_prefix("channel = \"")?.strip_suffix('"')).unwrap();
     assert!(text("Containerfile").contains(&format!("ARG RUST={channel}\n")));
@@ -99,19 +106,36 @@ fn files_are_checked_out_as_they_are_committed() {
     );
 }
 
+/// The folders of the workspace's members.
+fn members() -> Vec<String> {
+    let manifest = text("Cargo.toml");
+    let members = manifest.lines().find_map(|l| l.strip_prefix("members = [")?.strip_suffix(']')).unwrap();
+    let mut found = Vec::new();
+    for member in members.split(", ").map(|m| m.trim_matches('"')) {
+        match member.strip_suffix("/*") {
+            Some(folder) => found.extend(
+                fs::read_dir(root().join(folder))
+                    .unwrap()
+                    .map(|e| format!("{folder}/{}", e.unwrap().file_name().into_string().unwrap())),
+            ),
+            None => found.push(member.to_owned()),
+        }
+    }
+    assert!(found.len() > 10, "{found:?}");
+    found
+}
+
 /// Cargo reads every member of a workspace, also of those that it does not build: an image is built from sources that are whole.
 #[test]
 fn the_image_is_built_from_a_whole_workspace() {
     if workflows().is_empty() {
         return;
     }
-    let manifest = text("Cargo.toml");
-    let members = manifest.lines().find_map(|l| l.strip_prefix("members = [")?.strip_suffix(']')).unwrap();
     let ignored = text(".containerignore");
-    for member in members.split(", ").map(|m| m.trim_matches('"')) {
+    for member in members() {
         let room = member.split('/').next().unwrap();
         assert!(ignored.lines().all(|l| l != member && l != room), ".containerignore leaves out {member}");
-        assert!(root().join(member).join("Cargo.toml").is_file(), "{member}");
+        assert!(root().join(&member).join("Cargo.toml").is_file(), "{member}");
     }
 }
 
