@@ -154,7 +154,7 @@ deny: ## licences, duplicates, sources and known defects of every dependency (ne
 	@$(CARGO) deny --workspace check
 
 .PHONY: fonts
-fonts: ## assets/fonts/glyphs.bin from the fonts' files
+fonts: ## crates/render/fonts/glyphs.bin from the fonts' files
 	@$(CARGO) run --locked --quiet --manifest-path tools/fonts/Cargo.toml --target-dir target/tools
 
 .PHONY: sbom

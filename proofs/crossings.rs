@@ -15,8 +15,8 @@ use twofold_proofs::{SECTION, ball, equation, parameters, refuse, write};
 const STATEMENT: &str = "For beta = 1e-5, eps = 1e-3, the tanh transition and alpha = 1e-3 or 0.1, the first crossings of y = 0 by the orbit \
 of the smoothed caricature from (0.2, 0, -1) are those listed, each within its radius; there are no others between them.";
 
-const PRINTED: &str = include_str!("../tests/data/crossings-printed.csv");
-const RECONSTRUCTED: &str = include_str!("../tests/data/crossings-reconstructed.csv");
+const PRINTED: &str = include_str!("../crates/verify/data/crossings-printed.csv");
+const RECONSTRUCTED: &str = include_str!("../crates/verify/data/crossings-reconstructed.csv");
 
 /// Proves a table: (what was printed, the certificate's rows).
 fn table(alpha: f64, text: &str) -> Result<(String, Vec<Value>), String> {

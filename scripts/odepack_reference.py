@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes tests/data/odepack/: what ODEPACK's LSODA, as SciPy carries it, does on the test problems.
+"""Makes figures/workprecision/odepack/: what ODEPACK's LSODA, as SciPy carries it, does on the test problems.
 
 Frozen: run by hand, committed with the versions used, never run by the tests.
 

@@ -3,7 +3,9 @@
 //! The crate regenerates every figure of M. R. Jeffrey, *Singularities that induce a breakdown of determinism in mechanics*
 //! (2013), byte for byte the same on any machine, and says panel by panel whether the paper's claim holds.
 //!
-//! # The house
+//! # Parts
+//!
+//! Each is a crate of its own (`twofold-num` and so on) that this one re-exports; docs/architecture.md says what may import what.
 //!
 //! - [`num`]: arithmetic that results depend on. Elementary functions with the same bits everywhere, the scalar traits
 //!   over which equations are written, tapes of recorded equations, dual numbers, series, intervals, random numbers.
@@ -13,21 +15,11 @@
 //! - [`rigor`]: validated steps, sets, Poincaré maps, closed orbits: enclosures that are theorems. The theorems: `proofs/`.
 //! - [`verify`]: checks the theorems' certificates in exact arithmetic; shares nothing with [`rigor`].
 //! - [`analyse`]: what is made of steps: paths, Poincaré sections, exponents, closed orbits.
-//! - [`job`]: a question as data, its computation, its answer.
+//! - [`job`]: a question as data, its computation, its answer. [`record`]: files, hashes, manifests, all-or-nothing writes.
+//! - [`render`]: the only user of plotters: one drawing, three formats.
 //! - [`paper`]: what speaks of this paper: readings, claims, figures as data.
 //! - [`draw`]: drawings from answers. [`compare`]: two pictures, point by point. [`report`]: the page about everything.
 //! - [`cli`]: flags, progress, errors in words.
-//! - [`render`]: the only user of plotters: one drawing, three formats.
-//! - [`record`]: the only user of files: hashes, manifests, all-or-nothing writes.
-//!
-//! A question and its answer: system + question -> [`job`] -> key -> store or computation -> answer (columns, facts, statistics, stop
-//! reason) -> view -> drawing -> bytes -> hash. A verdict is a job whose input is an answer; a figure is a view of answers.
-//!
-//! # Walls
-//!
-//! `tests/it/architecture.rs` holds them up: a room imports only rooms below it; only `paper` and what stands above it knows the paper; only `cli` knows
-//! flags and terminals; only `record` touches files; only `num` names a math library; only `render` names plotters; nothing but a progress display
-//! reads a clock; parallelism is over independent jobs, collected in order.
 //!
 //! # Why isn't there ...?
 //!
@@ -68,14 +60,32 @@ pub use twofold_job as job;
 pub use twofold_job::record;
 pub use twofold_num as num;
 #[cfg(feature = "figures")]
-pub use twofold_paper as paper;
-#[cfg(feature = "figures")]
 pub use twofold_paper::{compare, draw, report};
 #[cfg(feature = "figures")]
 pub use twofold_render as render;
 pub use twofold_rigor as rigor;
 pub use twofold_system as system;
 pub use twofold_verify as verify;
+
+/// What speaks of a paper: readings, claims, verdicts; and this paper's figures as data.
+///
+/// ```
+/// use twofold::job::Desk;
+/// use twofold::paper::{figures, pipeline};
+/// let figure = figures::all().into_iter().find(|f| f.id == "fig1").expect("the first figure");
+/// let picture = pipeline::compute(&figure.pictures[0], &Desk::quiet())?;
+/// assert!(picture.rendered.svg.starts_with(b"<?xml") || picture.rendered.svg.starts_with(b"<svg"));
+/// // The committed reference holds the same hashes.
+/// let reference = figures::reference("fig1").expect("every figure has one");
+/// assert!(reference.contains(picture.record.hashes.pixels.as_str()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[cfg(feature = "figures")]
+pub mod paper {
+    #[doc(inline)]
+    pub use twofold_jeffrey_2013 as figures;
+    pub use twofold_paper::*;
+}
 
 #[cfg(feature = "cli")]
 pub mod cli;

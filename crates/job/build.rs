@@ -18,7 +18,7 @@ fn numerics() -> std::io::Result<String> {
     for name in ["num", "system", "integrate", "analyse", "job"] {
         sources.add(root, &format!("crates/{name}/src"), |_| true)?;
     }
-    sources.add(root, "systems", |file| file.ends_with(".toml"))?;
+    sources.add(root, "systems", |file| file.ends_with(".toml") && file != "systems/Cargo.toml")?;
     sources.add_locked(&root.join("Cargo.lock"), "twofold-job")?;
     Ok(sources.digest())
 }

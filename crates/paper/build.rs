@@ -20,6 +20,5 @@ fn figures() -> std::io::Result<String> {
     sources.add(root, "crates/paper/src", |file| !above.iter().any(|a| file.starts_with(a)))?;
     let inputs = [".rs", ".parquet", ".csv", ".toml"];
     sources.add(root, "figures", |file| inputs.iter().any(|e| file.ends_with(e)) && !file.ends_with("/main.rs"))?;
-    sources.add(root, "tests/data/odepack", |_| true)?;
     Ok(sources.digest())
 }

@@ -1,4 +1,4 @@
-//! Error against work for ODEPACK's LSODA (frozen, tests/data/odepack) and for this crate's methods (computed).
+//! Error against work for ODEPACK's LSODA (frozen, figures/workprecision/odepack) and for this crate's methods (computed).
 
 use serde::Deserialize;
 use twofold::analyse::work_precision::{WorkPrecisionQuestion, weighted_error, work_precision};
@@ -6,7 +6,7 @@ use twofold::integrate::{Method, StepCap, Tolerance};
 
 use super::problems::{Problem, Visit, for_each};
 
-/// tests/data/odepack/reference.json.
+/// figures/workprecision/odepack/reference.json.
 #[derive(Debug, Deserialize)]
 pub struct Reference {
     /// One entry a problem.
@@ -93,8 +93,7 @@ impl ReferenceProblem {
 
 /// The frozen reference file.
 pub fn reference() -> Reference {
-    serde_json::from_str(include_str!("../../tests/data/odepack/reference.json"))
-        .expect("reference.json is committed and has this form")
+    serde_json::from_str(include_str!("odepack/reference.json")).expect("reference.json is committed and has this form")
 }
 
 /// A point of the picture.

@@ -1,4 +1,4 @@
-//! Error against work: ODEPACK's LSODA, as frozen in tests/data/odepack, and this crate's methods. Not a figure of the paper; it
+//! Error against work: ODEPACK's LSODA, as frozen in figures/workprecision/odepack, and this crate's methods. Not a figure of the paper; it
 //! says how far the methods behind the other figures can be trusted where the answer is known.
 
 #[allow(dead_code)] // what the frozen file says beyond this picture is for tests/it/odepack.rs
@@ -41,7 +41,7 @@ const METHODS: [(&str, &str, MarkerShape, Colour, f64); 4] = [
 ];
 
 fn question() -> Value {
-    let odepack = include_str!("../../tests/data/odepack/reference.json");
+    let odepack = include_str!("odepack/reference.json");
     json!({
         "study": "work-precision",
         "odepack_sha256": Hash::of(odepack.as_bytes()).as_str(),

@@ -127,7 +127,7 @@ fn committed_rows_come_out_the_same() {
 #[test]
 fn readme_says_what_the_census_says() {
     let found = Reading::ALL.map(|reading| figures::census::found_in(reading, &on_disk("figures/census")).unwrap());
-    let text = census::text(&found);
+    let text = census::text(&found, figures::reference);
     let readme = fs::read_to_string(path("README.md")).unwrap();
     let (_, rest) = readme.split_once(census::BEGIN).expect("README has a place for the census");
     let (said, _) = rest.split_once(census::END).expect("README's text about the census ends");

@@ -650,7 +650,7 @@ fn points_of_the_chaotic_set_are_connected_through_the_singularity() {
 
 /// y = 0 crossings of the smoothed system in 113-bit arithmetic: (t, x, z).
 fn reference(name: &str, rows: usize) -> Vec<[f64; 3]> {
-    let text = std::fs::read_to_string(format!("{}/tests/data/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+    let text = std::fs::read_to_string(format!("{}/crates/verify/data/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
     let lines = text.lines().filter(|l| !l.starts_with('#')).skip(1);
     lines
         .map(|l| l.split(',').take(3).map(|v| v.parse().unwrap()).collect::<Vec<f64>>().try_into().unwrap())

@@ -1,4 +1,4 @@
-//! Our LSODA against ODEPACK's own Fortran, as SciPy carries it: tests/data/odepack/reference.json, made once by
+//! Our LSODA against ODEPACK's own Fortran, as SciPy carries it: figures/workprecision/odepack/reference.json, made once by
 //! scripts/odepack_reference.py. Radau5 against the same reference solutions.
 //!
 //! Step control magnifies rounding: after some hundred steps two programs that differ in the last bits make different

@@ -12,7 +12,7 @@ use common::{copy, figures, schema, write_references};
 use serde_json::Value;
 use twofold::record::{Hash, read_tree, visit_tree};
 use twofold::render::{Pixels, decode_png, encode_png};
-use twofold::report::{Links, MadeFile, Reference, Report, assemble, page};
+use twofold::report::{Links, MadeFile, Program, Reference, Report, assemble, page};
 
 fn twofold(arguments: &[&str]) -> Output {
     Command::cargo_bin("twofold").unwrap().args(arguments).output().unwrap()
@@ -54,9 +54,11 @@ impl Bench {
     }
 
     fn report(&self) -> Report {
+        let known = twofold::paper::figures::all();
         assemble(
-            &visit_tree(&self.made(), &|_| true, &MadeFile::read).unwrap().0,
+            &visit_tree(&self.made(), &|_| true, &|path, place| MadeFile::read(path, place, &known)).unwrap().0,
             &read_tree(&self.expected(), &|_| true).unwrap().files,
+            &Program { figures: &known, readme: include_str!("../../README.md") },
         )
     }
 

@@ -561,8 +561,9 @@ pub(super) fn percent(share: f64, interval: [f64; 2]) -> String {
     format!("{:.0} % [{:.0}, {:.0}]", 100.0 * share, 100.0 * interval[0], 100.0 * interval[1])
 }
 
-/// README's text about the census: the table of shares, the figures as groups, the tests.
-pub fn text(found: &[Found; 2]) -> String {
+/// README's text about the census: the table of shares, the figures as groups, the tests. `reference` has the committed manifest of each
+/// figure, as text.
+pub fn text(found: &[Found; 2], reference: impl Fn(&str) -> Option<&'static str>) -> String {
     use std::fmt::Write as _;
     let mut text =
         String::from("| panel | the paper says | printed reading | reconstructed reading |\n|---|---|---|---|\n");
@@ -573,7 +574,7 @@ pub fn text(found: &[Found; 2]) -> String {
             // Not captured, and not shown to be chaotic: whether they count is said, not decided.
             let open = if s.said == Said::Chaos { s.at_end[5] } else { 0 };
             let more = if open > 0 { format!(", {open} more undecided") } else { String::new() };
-            let single = match single_run(s.panel.as_str(), s.reading) {
+            let single = match single_run(s.panel.as_str(), s.reading, &reference) {
                 Some(true) => "; the figure's run agrees",
                 Some(false) => "; the figure's run differs",
                 None => "",
@@ -634,10 +635,10 @@ pub fn text(found: &[Found; 2]) -> String {
 }
 
 /// Whether the one run that a panel shows bears the paper out, by the committed reference of its figure.
-fn single_run(panel: &str, reading: Reading) -> Option<bool> {
+fn single_run(panel: &str, reading: Reading, reference: impl Fn(&str) -> Option<&'static str>) -> Option<bool> {
     let (figure, label) = panel.trim_end_matches(')').split_once('(')?;
     let id = format!("fig{figure}");
-    let manifest = Manifest::parse(super::figures::reference(&id)?, &id).ok()?;
+    let manifest = Manifest::parse(reference(&id)?, &id).ok()?;
     let picture = manifest.picture(&format!("{id}-{}", reading.word()))?;
     Some(picture.panels.iter().find(|p| p.label == label)?.verdict.as_ref()?.agrees)
 }

@@ -5,26 +5,20 @@
 //! -> [`drawing`] -> bytes -> files. The figures themselves stand in `figures/NAME/figure.rs`: every number of the
 //! paper's caption, and nothing else.
 //!
-//! ```
-//! use twofold_job::Desk;
-//! use twofold_paper::{figures, pipeline};
-//! let figure = figures::all().into_iter().find(|f| f.id == "fig1").expect("the first figure");
-//! let picture = pipeline::compute(&figure.pictures[0], &Desk::quiet())?;
-//! assert!(picture.rendered.svg.starts_with(b"<?xml") || picture.rendered.svg.starts_with(b"<svg"));
-//! // The committed reference holds the same hashes.
-//! let reference = figures::reference("fig1").expect("every figure has one");
-//! assert!(reference.contains(picture.record.hashes.pixels.as_str()));
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
 
-// The figures' files, which stand in figures/, call the library by its public name and paths, as anybody's own figure would.
+// Tests try the paper's own figures. Their files call the library by its public name and paths.
+#[cfg(test)]
 extern crate self as twofold;
-use crate as paper;
+#[cfg(test)]
+#[allow(missing_docs)]
+#[path = "../../../figures/figures.rs"]
+pub mod figures;
+#[cfg(test)]
 #[rustfmt::skip]
 use {
-    twofold_analyse as analyse, twofold_integrate as integrate, twofold_job as job, twofold_job::record, twofold_num as num,
+    crate as paper, twofold_analyse as analyse, twofold_integrate as integrate, twofold_job as job, twofold_job::record, twofold_num as num,
     twofold_render as render, twofold_system as system,
 };
 
@@ -36,7 +30,6 @@ pub mod claims;
 pub mod compare;
 pub mod draw;
 pub mod drawing;
-pub mod figures;
 pub mod pipeline;
 pub mod readme;
 pub mod report;

@@ -59,3 +59,38 @@ impl Study {
         answers.iter().flat_map(|a| a.tables.iter().cloned()).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+    use twofold_job::question::{key, question_hash};
+
+    use super::*;
+
+    /// The same question of the same kind, computed by code that the numerics' digest covers.
+    #[derive(Debug)]
+    struct OfTheNumerics(Computed);
+
+    impl Question for OfTheNumerics {
+        fn kind(&self) -> &'static str {
+            self.0.kind()
+        }
+
+        fn json(&self) -> Value {
+            self.0.json()
+        }
+
+        fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+            self.0.compute(desk, watch)
+        }
+    }
+
+    #[test]
+    fn what_a_figure_computes_is_stored_under_the_digest_of_its_code() {
+        let own = Computed { kind: "own", question: json!({ "x": 1 }), cost: 1.0, compute: || Ok(Vec::new()) };
+        let other = OfTheNumerics(own.clone());
+        assert_eq!(question_hash(&own), question_hash(&other));
+        assert_ne!(key(&own), key(&other));
+        assert!(own.code().is_some_and(|digest| digest.len() == 32));
+    }
+}

@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 /// outlines. An outline is a list of strokes that ends with a dot: a letter as in SVG (M, L, C, Z), then
 /// the coordinates of its points, each as the difference to the coordinate before: an i8, or, if that is
 /// -128, the i16 behind it.
-static GLYPHS: &[u8] = include_bytes!("../../../assets/fonts/glyphs.bin");
+static GLYPHS: &[u8] = include_bytes!("../fonts/glyphs.bin");
 /// Bytes of a character's record.
 const RECORD: usize = 14;
 

@@ -215,9 +215,9 @@ struct Horseshoe {
 }
 
 /// Crossings computed outside this project in 113-bit arithmetic.
-const PRINTED: &str = include_str!("../../../tests/data/crossings-printed.csv");
+const PRINTED: &str = include_str!("../data/crossings-printed.csv");
 /// See [`PRINTED`].
-const RECONSTRUCTED: &str = include_str!("../../../tests/data/crossings-reconstructed.csv");
+const RECONSTRUCTED: &str = include_str!("../data/crossings-reconstructed.csv");
 
 /// The statements, word for word: a certificate proves these and no others.
 const STATEMENTS: [(&str, &str); 8] = [

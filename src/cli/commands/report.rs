@@ -8,7 +8,9 @@ use crate::cli::speak::print_json;
 use crate::cli::{CliError, Exit, in_pool, print};
 use crate::paper::{Figure, figures};
 use crate::record::{self, FileBytes, read_tree, visit_tree};
-use crate::report::{Links, MadeFile, Report, archive, assemble, names, page};
+use crate::report::{Links, MadeFile, Program, Report, archive, assemble, names, page};
+
+const README: &str = include_str!("../../../README.md");
 
 /// Write a self-contained page about the figures in a folder, and beside it report.json, verdicts.json and RO-Crate metadata.
 ///
@@ -36,9 +38,11 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 
 fn report(arguments: &Arguments) -> Result<Exit, CliError> {
     let folder = &arguments.figures;
-    let (made, _) = visit_tree(folder, &|_| true, &MadeFile::read)
+    let known = figures::all();
+    let (made, _) = visit_tree(folder, &|_| true, &|path, place| MadeFile::read(path, place, &known))
         .map_err(|e| CliError::Usage(format!("{e}; run `make figures` first, or name another --figures")))?;
-    let report = assemble(&made, &references(arguments.expected.as_deref())?);
+    let report =
+        assemble(&made, &references(arguments.expected.as_deref())?, &Program { figures: &known, readme: README });
     if report.figures.is_empty() {
         return Err(CliError::Usage(format!(
             "{}: no figure's pictures are in this folder; run `make figures` first, or name another --figures",

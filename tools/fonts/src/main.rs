@@ -1,4 +1,4 @@
-//! Writes assets/fonts/glyphs.bin: advances, kerning and outlines of the fonts in assets/fonts, as
+//! Writes crates/render/fonts/glyphs.bin: advances, kerning and outlines of the fonts in assets/fonts, as
 //! skrifa reads them. crates/render/src/font.rs says how the file is laid out.
 
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ use skrifa::raw::types::GlyphId16;
 use skrifa::{FontRef, GlyphId, MetadataProvider, Tag};
 
 const FACES: [&str; 4] = ["Regular", "Italic", "Bold", "BoldItalic"];
-const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/fonts");
+const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../crates/render/fonts");
 
 fn main() {
     let mut bytes = Vec::new();

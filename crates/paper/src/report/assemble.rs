@@ -8,11 +8,11 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::model::*;
-use super::space;
-use crate::Reading;
+use super::{prose, space};
 use crate::compare;
 use crate::pipeline::{PanelRecord, TableRecord, pixel_hash};
 use crate::wording;
+use crate::{Camera, Figure, Reading};
 use twofold_job::Table;
 use twofold_job::encode::from_csv;
 use twofold_job::record::{FileBytes, FileError, Hash, Layer, Manifest, PictureEntry, files};
@@ -51,13 +51,13 @@ pub struct MadeFile {
 }
 
 impl MadeFile {
-    /// The file at `place`, whose path inside the figures' folder is `path`.
+    /// The file at `place`, whose path inside the figures' folder is `path`, among the files of these figures.
     ///
     /// # Errors
     /// If it cannot be read.
-    pub fn read(path: String, place: &Path) -> Result<Self, FileError> {
+    pub fn read(path: String, place: &Path, figures: &[Figure]) -> Result<Self, FileError> {
         let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
-        if path.ends_with(".csv") && space::camera(folder).is_none() {
+        if path.ends_with(".csv") && space::camera(figures, folder).is_none() {
             let (sha256, size) = files::digest(place)?;
             return Ok(Self { path, size, sha256, bytes: Vec::new() });
         }
@@ -78,15 +78,24 @@ impl MadeFile {
     }
 }
 
+/// What a report takes from the program that makes it.
+#[derive(Clone, Copy, Debug)]
+pub struct Program<'a> {
+    /// The figures that it knows.
+    pub figures: &'a [Figure],
+    /// Its README, whose findings the page repeats.
+    pub readme: &'a str,
+}
+
 /// Puts the report together: `made` are the files of the figures' folder, `committed` those of the references' folder
 /// (figN/expected.json and figN/NAME.png).
-pub fn assemble(made: &[MadeFile], committed: &[FileBytes]) -> Report {
+pub fn assemble(made: &[MadeFile], committed: &[FileBytes], program: &Program<'_>) -> Report {
     let mut problems = Vec::new();
     let mut folders: BTreeMap<(bool, Vec<Piece>, &str), Vec<&MadeFile>> = BTreeMap::new();
     for file in made.iter().filter(|f| !f.folder().is_empty() && !f.folder().contains('/')) {
         folders.entry((!of_the_paper(file.folder()), natural(file.folder()), file.folder())).or_default().push(file);
     }
-    let committed = Committed(committed);
+    let committed = Committed { files: committed, figures: program.figures };
     let folders: Vec<(&str, Vec<&MadeFile>)> = folders.into_iter().map(|((_, _, id), files)| (id, files)).collect();
     let each: Vec<(FigureReport, Vec<String>)> =
         folders.par_iter().map(|(id, files)| figure(id, files, &committed)).collect();
@@ -107,6 +116,7 @@ pub fn assemble(made: &[MadeFile], committed: &[FileBytes]) -> Report {
         figures,
         making,
         problems,
+        findings: prose::of_the_project(program.readme),
     }
 }
 
@@ -155,12 +165,15 @@ enum Piece {
     Word(String),
 }
 
-/// The files of the references' folder.
-struct Committed<'a>(&'a [FileBytes]);
+/// The files of the references' folder, and the figures they belong to.
+struct Committed<'a> {
+    files: &'a [FileBytes],
+    figures: &'a [Figure],
+}
 
 impl Committed<'_> {
     fn file(&self, path: &str) -> Option<&[u8]> {
-        self.0.iter().find(|f| f.path == path).map(|f| f.bytes.as_slice())
+        self.files.iter().find(|f| f.path == path).map(|f| f.bytes.as_slice())
     }
 
     fn manifest(&self, id: &str) -> Result<Manifest, String> {
@@ -320,7 +333,8 @@ fn picture(
         })
         .collect();
     let panels: Vec<PanelReport> = record.panels.into_iter().map(panel).collect();
-    let spaces = spaces(id, &panels, &record.tables, files);
+    let camera = space::camera(committed.figures, id);
+    let spaces = camera.map_or_else(Vec::new, |camera| spaces(camera, &panels, &record.tables, files));
     PictureReport {
         spaces,
         description: description(&name, &record.title, record.reading, &record.caption, &panels),
@@ -340,8 +354,12 @@ fn picture(
 }
 
 /// The panels in space, from their tables; none of a picture that is no view in space, or whose tables are not there.
-fn spaces(id: &str, panels: &[PanelReport], tables: &[TableRecord], files: &[&MadeFile]) -> Vec<space::SpaceView> {
-    let Some(camera) = space::camera(id) else { return Vec::new() };
+fn spaces(
+    camera: Camera,
+    panels: &[PanelReport],
+    tables: &[TableRecord],
+    files: &[&MadeFile],
+) -> Vec<space::SpaceView> {
     let table = |panel: &PanelReport| -> Option<Table> {
         let own = tables.iter().filter(|t| t.panel.as_deref() == Some(panel.label.as_str()));
         let found = own.filter_map(|t| files.iter().find(|f| f.name() == t.file));

@@ -5,10 +5,10 @@
 //! records, not known here. Same input, same bytes: no clock, no path of the machine.
 //!
 //! ```
-//! use twofold_paper::report::{Links, MadeFile, assemble, page};
+//! use twofold_paper::report::{Links, MadeFile, Program, assemble, page};
 //! // No record vouches for this file, so it counts for nothing.
 //! let file = MadeFile::of("own/table.csv".into(), b"t,x\n".to_vec());
-//! let report = assemble(&[file], &[]);
+//! let report = assemble(&[file], &[], &Program { figures: &[], readme: "" });
 //! assert_eq!((report.summary.pictures, report.summary.panels), (0, 0));
 //! assert!(page(&report, Links::Beside).starts_with(b"<!DOCTYPE html>"));
 //! ```
@@ -23,7 +23,7 @@ mod rules;
 mod space;
 
 pub use archive::{RELEASE_DATE, archive};
-pub use assemble::{MadeFile, assemble};
+pub use assemble::{MadeFile, Program, assemble};
 pub use model::*;
 pub use page::{Links, page};
 pub use space::SpaceView;

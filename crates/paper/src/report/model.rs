@@ -34,6 +34,9 @@ pub struct Report {
     pub making: Vec<Making>,
     /// What could not be read, a line each.
     pub problems: Vec<String>,
+    /// What the program's README says was found, as HTML; for the page alone.
+    #[serde(skip)]
+    pub findings: Vec<String>,
 }
 
 /// The file in the folder of the figures that says how they were made. It is the one file there that holds times, and no figure depends on it.

@@ -7,8 +7,6 @@ use super::html::escape;
 use super::model::{Report, VerdictReport};
 use crate::Reading;
 
-const README: &str = include_str!("../../../../README.md");
-
 /// What this folder's verdicts say, a paragraph for each reading, as HTML.
 pub fn of_this_folder(report: &Report) -> Vec<String> {
     let pictures = || {
@@ -67,8 +65,8 @@ fn panel_name(picture: &str, reading: Option<Reading>, panel: &str) -> String {
 }
 
 /// What the README says was found: its paragraphs that begin with a finding in bold, and its theorems, as HTML blocks.
-pub fn of_the_project() -> Vec<String> {
-    let section = README.split("\n## ").find(|s| s.starts_with("What was found")).unwrap_or_default();
+pub fn of_the_project(readme: &str) -> Vec<String> {
+    let section = readme.split("\n## ").find(|s| s.starts_with("What was found")).unwrap_or_default();
     let mut blocks = Vec::new();
     let mut heading = "";
     for block in section.split("\n\n").map(str::trim) {
@@ -143,7 +141,7 @@ mod tests {
 
     #[test]
     fn the_readme_has_findings() {
-        let blocks = of_the_project();
+        let blocks = of_the_project(include_str!("../../../../README.md"));
         assert!(blocks.len() >= 6, "{blocks:#?}");
         assert!(blocks.iter().any(|b| b.contains("<strong>The singularity eats digits.</strong>")));
         assert!(blocks.last().unwrap().contains("<li>"));

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::html::base64;
 use crate::draw::surface;
-use crate::{Camera, View, figures};
+use crate::{Camera, Figure, View};
 use twofold_job::Table;
 use twofold_render::number::number;
 use twofold_render::sheet::{SpacePanel, range_of};
@@ -38,8 +38,8 @@ pub struct Source<'a> {
 }
 
 /// The camera of a figure's pictures, if they are views in space.
-pub fn camera(figure: &str) -> Option<Camera> {
-    let known = figures::all().into_iter().find(|f| f.id == figure)?;
+pub fn camera(figures: &[Figure], figure: &str) -> Option<Camera> {
+    let known = figures.iter().find(|f| f.id == figure)?;
     known.pictures.iter().find_map(|p| match p.view {
         View::Space { camera } => Some(camera),
         _ => None,
@@ -285,8 +285,9 @@ mod tests {
 
     #[test]
     fn only_figures_in_space_have_views() {
-        let known: Vec<&str> = figures::all().iter().map(|f| f.id).filter(|id| camera(id).is_some()).collect();
+        let figures = crate::figures::all();
+        let known: Vec<&str> = figures.iter().map(|f| f.id).filter(|id| camera(&figures, id).is_some()).collect();
         assert_eq!(known, ["fig2", "fig4", "fig5", "fig6"]);
-        assert!(camera("nothing").is_none());
+        assert!(camera(&figures, "nothing").is_none());
     }
 }

@@ -24,7 +24,7 @@ pub(super) fn findings(html: &mut String, report: &Report) {
         "<p>A panel is one run, and which orbit a run ends on can hang on the ninth digit of its start: a verdict says what happened once, the \
          census how often it does.</p>\n<h3>In the published figures of this version</h3>"
     );
-    for block in prose::of_the_project() {
+    for block in &report.findings {
         put!(html, "{block}");
     }
     put!(html, "</div>\n</section>");

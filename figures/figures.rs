@@ -1,0 +1,71 @@
+//! Every figure, in the paper's order, then our own, with the committed references.
+//!
+//! Each figure stands in `figures/NAME/figure.rs`: every number of the paper's caption, and nothing else; beside it the hashes that it must
+//! have. Both are part of the library, so that an installed program can make and check them anywhere.
+
+use twofold::paper::Figure;
+
+/// Names a figure's module and embeds its reference.
+macro_rules! figures {
+    ($($name:ident: $path:literal, $reference:literal;)*) => {
+        $(
+            #[path = $path]
+            #[allow(missing_docs)]
+            pub mod $name;
+        )*
+
+        /// Every figure.
+        pub fn all() -> Vec<Figure> {
+            vec![$($name::figure()),*]
+        }
+
+        /// The committed manifest of a figure, as text.
+        pub fn reference(id: &str) -> Option<&'static str> {
+            match id {
+                $(stringify!($name) => Some(include_str!($reference)),)*
+                _ => None,
+            }
+        }
+    };
+}
+
+figures! {
+    fig1: "fig1/figure.rs", "fig1/expected.json";
+    fig2: "fig2/figure.rs", "fig2/expected.json";
+    fig3: "fig3/figure.rs", "fig3/expected.json";
+    fig4: "fig4/figure.rs", "fig4/expected.json";
+    fig5: "fig5/figure.rs", "fig5/expected.json";
+    fig6: "fig6/figure.rs", "fig6/expected.json";
+    fig7: "fig7/figure.rs", "fig7/expected.json";
+    fig8: "fig8/figure.rs", "fig8/expected.json";
+    fig9: "fig9/figure.rs", "fig9/expected.json";
+    lottery: "lottery/figure.rs", "lottery/expected.json";
+    workprecision: "workprecision/figure.rs", "workprecision/expected.json";
+    digits: "digits/figure.rs", "digits/expected.json";
+    convergence: "convergence/figure.rs", "convergence/expected.json";
+    law: "law/figure.rs", "law/expected.json";
+    census: "census/figure.rs", "census/expected.json";
+    audit: "audit/figure.rs", "audit/expected.json";
+    basin: "basin/figure.rs", "basin/expected.json";
+}
+
+/// The sweeps whose rows are committed beside a figure: name and content of each Parquet file. Empty for figures that compute all they show.
+pub fn data(id: &str) -> &'static [(&'static str, &'static [u8])] {
+    match id {
+        "census" => census::DATA,
+        "audit" => audit::DATA,
+        "basin" => basin::DATA,
+        _ => &[],
+    }
+}
+
+/// The checkpoints of a figure's long runs ([`Checkpoints`](twofold::paper::checkpoints::Checkpoints)), as text, for `twofold audit`. None for figures without such runs.
+pub fn checkpoints(id: &str) -> Option<&'static str> {
+    match id {
+        "fig7" => Some(include_str!("fig7/checkpoints.json")),
+        "fig8" => Some(include_str!("fig8/checkpoints.json")),
+        "fig9" => Some(include_str!("fig9/checkpoints.json")),
+        "lottery" => Some(include_str!("lottery/checkpoints.json")),
+        _ => None,
+    }
+}
