@@ -41,7 +41,7 @@ pub struct Exponent {
 pub struct Estimate {
     /// The mean over the run, with its standard error alone.
     pub exponent: Exponent,
-    /// Half of the interval around the mean in which the exponent lies with 95 %: what scatters ([`QUANTILE`] standard errors), what growth
+    /// Half of the interval around the mean in which the exponent lies with 95 %: what scatters (`QUANTILE` standard errors), what growth
     /// slower than any exponential adds to a mean over a finite time, and what the method's local errors can add.
     pub half_width: f64,
 }

@@ -332,7 +332,8 @@ impl Failure {
         let scale = 1.0 + t.abs();
         let soon = ahead(0.5 / rate);
         let faster = growth(&soon, &field(&soon));
-        if size > 1e100 || size > 1e3 && rate * scale > 1e3 && !(faster <= 1.2 * rate) {
+        let accelerates = faster.is_nan() || faster > 1.2 * rate;
+        if size > 1e100 || size > 1e3 && rate * scale > 1e3 && accelerates {
             return Self::Unbounded { t: t + 1.0 / rate, state };
         }
         let mut time = 1e-16 * scale;

@@ -403,7 +403,8 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
                     value = value * s + *c;
                 }
                 let next = s - value / slope;
-                if !((next - start).to_f64().abs() <= 1e-6 * h) {
+                let moved = (next - start).to_f64().abs();
+                if moved.is_nan() || moved > 1e-6 * h {
                     s = start;
                     break;
                 }
@@ -448,9 +449,9 @@ const MOST_LANDINGS: i32 = 14;
 /// The part of the unit interval in which the last two terms of the series `c` are `allowed` at most.
 fn resolved(c: &[f64], allowed: f64) -> f64 {
     let mut part = 1.0_f64;
-    for k in c.len().saturating_sub(2).max(1)..c.len() {
-        if c[k].abs() > allowed {
-            part = part.min(rough_pow(allowed / c[k].abs(), 1.0 / k as f64));
+    for (k, term) in c.iter().enumerate().skip(c.len().saturating_sub(2).max(1)) {
+        if term.abs() > allowed {
+            part = part.min(rough_pow(allowed / term.abs(), 1.0 / k as f64));
         }
     }
     part

@@ -76,8 +76,11 @@ const ROUNDING: f64 = 1e-9;
 /// Newton iterations: enough for the linear convergence at a multiple zero.
 const ITERATIONS: usize = 100;
 
+/// A map over dual numbers: arguments, then the places of its values.
+type DualMap<'a> = dyn Fn(&[Dual<f64, 1>], &mut [Dual<f64, 1>]) + 'a;
+
 /// f and its Jacobian matrix, row by row.
-fn linearised(n: usize, f: &dyn Fn(&[Dual<f64, 1>], &mut [Dual<f64, 1>]), outputs: usize, x: &[f64]) -> Jet {
+fn linearised(n: usize, f: &DualMap<'_>, outputs: usize, x: &[f64]) -> Jet {
     let mut jet = Jet { value: vec![0.0; outputs], rows: vec![0.0; outputs * n] };
     let mut out = vec![Dual::constant(0.0); outputs];
     for j in 0..n {

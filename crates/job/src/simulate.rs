@@ -779,7 +779,10 @@ mod tests {
             assert!(format!("{rows:?}") == format!("{:?}", answer(&run, &()).unwrap().tables[0].rows()));
             let stop = stream(&run, &mut |_| true, &UntilHalf).unwrap();
             assert_eq!(stop.stop, Stop::Interrupted);
-            assert!(stop.t >= 0.5 && stop.rows < 50_001 + PART as u64 && stop.rows as usize % PART == 0, "{stop:?}");
+            assert!(
+                stop.t >= 0.5 && stop.rows < 50_001 + PART as u64 && (stop.rows as usize).is_multiple_of(PART),
+                "{stop:?}"
+            );
         }
     }
 
