@@ -1,13 +1,12 @@
-//! Checks certificates of theorems in exact rational arithmetic.
+//! Checks certificates of theorems by computing what they claim anew.
 //!
-//! A proof (`proofs/`) encloses orbits and writes down the boxes and numbers on which its statement rests. This room reads such a certificate and
-//! decides whether the statement follows from the numbers, in fractions of whole numbers: nothing is rounded, and nothing is shared with the prover, neither
-//! its intervals nor its integrator nor the equation.
+//! A proof (`proofs/`) encloses orbits and writes down the boxes and numbers on which its statement rests. From a certificate this room takes the starting points
+//! alone, follows the orbits with a validated integrator of its own (`orbit`, in an arithmetic of its own, `ball`) and refuses every claimed enclosure that does
+//! not hold what it finds. What follows from the enclosures is decided in fractions of whole numbers (`rational`). Nothing is shared with the
+//! prover: neither its intervals nor its integrator nor the equation.
 //!
-//! What a certificate cannot show by itself is that its enclosures hold the flow. Two things are done about that. Numbers that the prover derived from others are
-//! derived again and must be as tight as they can be, so that none can be altered alone; and closed orbits are followed by a plain integrator of this room's
-//! own, orbits from a start are compared with tables computed elsewhere. Then an altered number is noticed from about the sixth digit on, or by the
-//! numbers that rest on it; `tests/it/verify.rs` alters each in turn and lists what can pass.
+//! Everything on which a statement rests is rigorous. Two kinds of claimed numbers that no statement rests on, derivatives and images of whole sets, are wider than they need be;
+//! they are compared with quotients of differences and with images of points, to more digits than are claimed. See proofs/README.md.
 //!
 //! ```
 //! use twofold_verify::{Refused, verify};
@@ -16,12 +15,15 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
 
+mod ball;
 mod certificate;
 mod inner;
-mod plain;
+mod orbit;
 mod rational;
+mod recompute;
+mod strict;
 
-pub use certificate::verify;
+pub use certificate::{Checker, verify};
 
 /// What a certificate shows.
 #[derive(Clone, Debug, PartialEq, Eq)]

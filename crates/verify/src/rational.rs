@@ -26,6 +26,18 @@ impl Rational {
         Self { numerator: n.into(), denominator: 1.into() }
     }
 
+    /// m 2^-places.
+    pub fn dyadic(m: BigInt, places: u32) -> Self {
+        Self::new(m, BigInt::from(1) << places)
+    }
+
+    /// The largest whole number of units 2^-places that is not above it.
+    pub fn scaled_down(&self, places: u32) -> BigInt {
+        let scaled: BigInt = &self.numerator << places;
+        let whole: BigInt = &scaled / &self.denominator;
+        if self.is_negative() && &whole * &self.denominator != scaled { whole - 1 } else { whole }
+    }
+
     /// One over a power of ten.
     pub fn tenth_to(power: u32) -> Self {
         Self::new(1.into(), BigInt::from(10).pow(power))
@@ -75,12 +87,7 @@ impl Rational {
 
     /// The largest multiple of a small power of two that is not above it.
     fn rounded_down(&self) -> Self {
-        let scaled: BigInt = &self.numerator << GRID;
-        let mut whole: BigInt = &scaled / &self.denominator;
-        if self.is_negative() && &whole * &self.denominator != scaled {
-            whole -= 1;
-        }
-        Self::new(whole, BigInt::from(1) << GRID)
+        Self::dyadic(self.scaled_down(GRID), GRID)
     }
 
     /// One over it; `None` of zero.
@@ -225,6 +232,11 @@ impl Range {
     /// Whether the two have a number in common.
     pub fn meets(&self, o: &Self) -> bool {
         self.low <= o.high && o.low <= self.high
+    }
+
+    /// The least range that holds both.
+    pub fn hull(&self, o: &Self) -> Self {
+        Self { low: self.low.clone().min(o.low.clone()), high: self.high.clone().max(o.high.clone()) }
     }
 
     /// The distance of the bounds.
