@@ -103,6 +103,12 @@ proofs: ## prove the theorems anew (proofs/README.md), write their certificates 
 second-opinion: ## the first theorem proved by CAPD, another group's library: make second-opinion CAPD=/path/to/its/clone (needs a C++ compiler, cmake)
 	@CAPD="$(CAPD)" sh proofs/capd/run.sh
 
+.PHONY: forge
+forge: ## forge every number of every certificate, alone and in groups, and write proofs/forgeries.md (half an hour)
+	@$(CARGO) test --release --locked --test it verify:: -- --ignored --nocapture > target/forge.log || { cat target/forge.log; exit 1; }
+	@{ printf '# Forged certificates\n\nWritten by `make forge` (tests/it/verify.rs). Numbers of forgeries; every one that is certainly false is refused.\n\n'; \
+	grep '^|' target/forge.log; } > proofs/forgeries.md
+
 # The theorems that take seconds each; the others are checked by their certificates alone.
 QUICK := printed-cycle inner-law saddles
 proofs-quick: ## prove the quick theorems anew, byte for byte as committed, and verify every certificate (a minute)

@@ -141,7 +141,7 @@ impl Settings {
 const LONGEST_STEP: f64 = 0.5;
 const SHORTEST_STEP: f64 = 1e-9;
 /// Steps between two crossings; the slowest passage takes some thousands.
-const MOST_STEPS: usize = 100_000;
+const MOST_STEPS: usize = 20_000;
 
 pub(super) type Matrix = [[Ball; 3]; 3];
 
