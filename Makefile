@@ -168,9 +168,9 @@ sbom: ## what the program links, with versions, licences and checksums (CycloneD
 	@sh scripts/sbom.sh
 
 lint: ## formatting, clippy and documentation, warnings denied
-	@$(CARGO) fmt --check
+	@$(CARGO) fmt --all --check
 	@$(CARGO) clippy --workspace --exclude twofold-python --locked --all-targets -- -D warnings
-	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --quiet
+	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --exclude twofold-python --locked --no-deps --quiet
 
 torture: ## kill the program at random moments and look for losses: make torture KILLS=100
 	@$(CARGO) build --release --locked --bin twofold

@@ -154,7 +154,7 @@ pub fn fold_conditions<P: PiecewiseSmooth<N>, const N: usize>(system: &P, x: &SV
     [system.switching(&at), p, q]
 }
 
-/// The shortest u with (gradient of row i) . u = `right`[i]; `None` if the gradients are dependent.
+/// The shortest u with (gradient of row i) . u = `right[i]`; `None` if the gradients are dependent.
 pub fn shortest<const N: usize>(rows: &[Dual<f64, N>; 3], right: [f64; 3]) -> Option<SVector<f64, N>> {
     let row = |i: usize| SVector::<f64, N>::from(rows[i].partials);
     let gram = SMatrix::<f64, 3, 3>::from_fn(|i, j| row(i).dot(&row(j)));
