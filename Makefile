@@ -168,7 +168,7 @@ sbom: ## what the program links, with versions, licences and checksums (CycloneD
 	@sh scripts/sbom.sh
 
 lint: ## formatting, clippy and documentation, warnings denied
-	@$(CARGO) fmt --all --check
+	@git ls-files '*.rs' | xargs rustfmt --edition 2024 --check
 	@$(CARGO) clippy --workspace --exclude twofold-python --locked --all-targets -- -D warnings
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --exclude twofold-python --locked --no-deps --quiet
 

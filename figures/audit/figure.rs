@@ -62,9 +62,8 @@ pub fn candidates() -> Result<[Vec<Candidate>; 2], JobError> {
 ///
 /// If they are not such as `make census` writes, or `read` fails.
 pub fn candidates_in(read: &dyn Fn(&str) -> Result<Vec<u8>, JobError>) -> Result<[Vec<Candidate>; 2], JobError> {
-    let tables = |names: &[&str]| -> Result<Vec<Table>, JobError> {
-        names.iter().map(|name| table_of(&read(name)?)).collect()
-    };
+    let tables =
+        |names: &[&str]| -> Result<Vec<Table>, JobError> { names.iter().map(|name| table_of(&read(name)?)).collect() };
     let sweeps = [
         tables(&["../census/fig7.parquet", "alpha7.parquet", "beta7.parquet"])?,
         tables(&["../census/fig8.parquet", "alpha8.parquet", "beta8.parquet"])?,
@@ -159,7 +158,8 @@ fn draw(tables: &[Table]) -> Sheet {
         sheet = sheet.legend(LegendEntry::new(LegendKey::Area(shade(share), 100), format!("10^{{{words:.1}}}")));
     }
     let (ca, cb) = (candidates.numbers("alpha"), candidates.numbers("beta"));
-    let posteriors = PRIORS.map(|prior| ["", "_low", "_high"].map(|end| candidates.numbers(&format!("posterior_prior_{prior}{end}"))));
+    let posteriors = PRIORS
+        .map(|prior| ["", "_low", "_high"].map(|end| candidates.numbers(&format!("posterior_prior_{prior}{end}"))));
     let n = candidates.len() as f64;
     let mut odds = PlanePanel::new(Axis::linear("", -0.8, n + 0.1), Axis::linear("", -0.3, 1.1));
     odds.axes = false;

@@ -95,7 +95,12 @@ pub fn found_in(reading: Reading, read: &dyn Fn(&str) -> Result<Vec<u8>, JobErro
         fig7: table("fig7.parquet")?,
         fig8: table("fig8.parquet")?,
         methods: tables(&["methods-printed.parquet", "methods.parquet"])?,
-        tolerances: tables(&["tolerances-printed.parquet", "tolerances.parquet", "tight-printed.parquet", "tight.parquet"])?,
+        tolerances: tables(&[
+            "tolerances-printed.parquet",
+            "tolerances.parquet",
+            "tight-printed.parquet",
+            "tight.parquet",
+        ])?,
         shorter,
     };
     Ok(Found::of(reading, &data, &claims().rules))

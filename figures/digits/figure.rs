@@ -82,14 +82,7 @@ fn digits_question() -> DigitsQuestion {
 }
 
 fn growth_question() -> PassageQuestion {
-    PassageQuestion {
-        start: START,
-        beyond: BEYOND,
-        offsets: OFFSETS.into(),
-        carried: AT_START,
-        far: 0.0,
-        by: EXIT_BY,
-    }
+    PassageQuestion { start: START, beyond: BEYOND, offsets: OFFSETS.into(), carried: AT_START, far: 0.0, by: EXIT_BY }
 }
 
 /// What the figure asks: the digits first, then the growth for each eps.
@@ -169,8 +162,7 @@ fn draw(reading: Reading, answers: &[Arc<Answer>]) -> Sheet {
     let tables = Study::tables(answers);
     let [rows, visits, passages @ ..] = &tables[..] else { unreachable!("the first question has two tables") };
     let growth: Vec<Vec<Entry>> = passages.iter().filter(|t| t.name == "growth").flat_map(Table::rows).collect();
-    let mut digits =
-        PlanePanel::new(Axis::linear("*t*", 0.0, T_END), Axis::linear("digits that are right", -2.0, TOP));
+    let mut digits = PlanePanel::new(Axis::linear("*t*", 0.0, T_END), Axis::linear("digits that are right", -2.0, TOP));
     for visit in visits.rows() {
         let t = value(&visit[0]);
         digits = digits.line(vec![[t, -2.0], [t, TOP]], LineStyle::new(style::MAGENTA, style::CURVE_PT).dashed());
@@ -272,7 +264,10 @@ pub fn figure() -> Figure {
                   near the singularity across and along the switching layer and for disturbances made at the start.",
         [
             Study { questions: || questions(Reading::Printed), draw: |answers| draw(Reading::Printed, answers) },
-            Study { questions: || questions(Reading::Reconstructed), draw: |answers| draw(Reading::Reconstructed, answers) },
+            Study {
+                questions: || questions(Reading::Reconstructed),
+                draw: |answers| draw(Reading::Reconstructed, answers),
+            },
         ],
     )
 }

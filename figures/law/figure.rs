@@ -320,8 +320,7 @@ fn selection_panel(ladder: &[Row], law: &Predicted, tanh: f64) -> (PlanePanel, S
     let line_to = |eps: f64| [eps, grown(law, tanh, at, eps)];
     let predicted: Vec<[f64; 2]> = ladder.iter().map(|r| line_to(r.eps)).collect();
     let asymptote = law.selection(tanh, f64::INFINITY);
-    let straight: Vec<[f64; 2]> =
-        [1e-2, 2e-7].map(|eps: f64| [eps, at.1 + asymptote * ln(at.0 / eps)]).into();
+    let straight: Vec<[f64; 2]> = [1e-2, 2e-7].map(|eps: f64| [eps, at.1 + asymptote * ln(at.0 / eps)]).into();
     let dots = marker(MarkerShape::Dot, style::VERMILLION, 3.0);
     let y = Axis::covering("*z*^{2}/*ε* at the first exit", points.iter().map(|p| p[1]));
     let mut panel = PlanePanel::new(Axis::log("*ε*", 1.5e-7, 1.5e-2), y).line(straight, formula.dashed());
@@ -341,7 +340,8 @@ fn selection_panel(ladder: &[Row], law: &Predicted, tanh: f64) -> (PlanePanel, S
 fn far_panel(ladder: &[Row], law: &Predicted, tanh: f64) -> (PlanePanel, String) {
     let formula = LineStyle::new(style::SOFT_INK, style::CURVE_PT);
     let found = jumps(ladder);
-    let mut panel = PlanePanel::new(Axis::log("*ε*", 1.5e-7, 1.5e-2), Axis::linear("*y*, *z* of the far exit", -2.2, 2.8));
+    let mut panel =
+        PlanePanel::new(Axis::log("*ε*", 1.5e-7, 1.5e-2), Axis::linear("*y*, *z* of the far exit", -2.2, 2.8));
     // Branch by branch.
     for (which, colour) in [(0, style::BLUE), (1, style::VERMILLION)] {
         let mut branch: Vec<[f64; 2]> = Vec::new();
@@ -369,10 +369,8 @@ fn far_panel(ladder: &[Row], law: &Predicted, tanh: f64) -> (PlanePanel, String)
             said.push(format!("{r:.1}"));
         }
     }
-    let between: Vec<String> = found
-        .windows(2)
-        .map(|w| format!("{:.1}", sqrt(w[0].0 * w[0].1 / (w[1].0 * w[1].1))))
-        .collect();
+    let between: Vec<String> =
+        found.windows(2).map(|w| format!("{:.1}", sqrt(w[0].0 * w[0].1 / (w[1].0 * w[1].1)))).collect();
     let at: Vec<String> = found.iter().map(|j| format!("{} and {}", short(j.0), short(j.1))).collect();
     let text = format!(
         "(d) First upward passage through *x* = 0 beyond {}: it depends on *ε* through the fractional part of ln(1/*ε*)/(2 ln *λ*), *λ* = {:.4}, up to a \
@@ -433,8 +431,7 @@ fn nearness_panel(growth: &[Row], printed: &[Row], law: &Predicted) -> (PlanePan
 fn exponents_panel(rows: &[Row]) -> (PlanePanel, String) {
     let mut panel = PlanePanel::new(Axis::linear("1/*μ*", 2.0, 9.6), Axis::linear("exponent", 0.0, 6.4));
     for ratio in RATIOS.into_iter().filter(|r| r.fract() == 0.0) {
-        panel = panel
-            .line(vec![[ratio, 0.0], [ratio, 6.4]], LineStyle::new(style::SOFT_INK, style::FRAME_PT).dotted());
+        panel = panel.line(vec![[ratio, 0.0], [ratio, 6.4]], LineStyle::new(style::SOFT_INK, style::FRAME_PT).dotted());
     }
     let formula = LineStyle::new(style::SOFT_INK, style::CURVE_PT).dashed();
     panel = panel
@@ -444,17 +441,16 @@ fn exponents_panel(rows: &[Row]) -> (PlanePanel, String) {
     let mut said = Vec::new();
     let mut series = [Vec::new(), Vec::new()];
     for (ratio, pair) in RATIOS.into_iter().zip(rows.chunks(2)) {
-        let found: Vec<f64> =
-            (0..2).map(|which| local_slopes(pair, which).first().map_or(f64::NAN, |s| s.1)).collect();
+        let found: Vec<f64> = (0..2).map(|which| local_slopes(pair, which).first().map_or(f64::NAN, |s| s.1)).collect();
         for (points, exponent) in series.iter_mut().zip(&found) {
             points.push([ratio, *exponent]);
         }
         said.push(format!("{}: {:.2}, {:.2}", number(ratio), found[0], found[1]));
     }
-    for (points, (words, colour, shape)) in series.into_iter().zip([
-        ("across", style::VERMILLION, MarkerShape::Dot),
-        ("along", style::BLUE, MarkerShape::Square),
-    ]) {
+    for (points, (words, colour, shape)) in series
+        .into_iter()
+        .zip([("across", style::VERMILLION, MarkerShape::Dot), ("along", style::BLUE, MarkerShape::Square)])
+    {
         let look = marker(shape, colour, 4.0);
         panel = panel
             .markers(points.into_iter().filter(|p| p[1].is_finite()).collect(), look)
@@ -513,7 +509,8 @@ impl Rule {
     }
 
     fn switch(self, eps: f64) -> SwitchSpec {
-        let hysteretic = |relaxation| SwitchSpec::Hysteretic { eps, eps_prime: RELAXATION * eps, relaxation, phi0: 1.0 };
+        let hysteretic =
+            |relaxation| SwitchSpec::Hysteretic { eps, eps_prime: RELAXATION * eps, relaxation, phi0: 1.0 };
         match self {
             Rule::Literal => hysteretic(Relaxation::Literal),
             Rule::Single => hysteretic(Relaxation::Single),
@@ -575,7 +572,8 @@ fn draw_selection(answers: &[Arc<Answer>]) -> Sheet {
         Axis::log("*ε*", 6e-5, 1.6e-2),
         Axis::linear("−*z*/√*ε* where the surface is left", -4.0, 20.0),
     );
-    let mut sides = PlanePanel::new(Axis::log("*ε*", 6e-5, 1.6e-2), Axis::linear("share that leaves to *x* < 0", -0.08, 1.3));
+    let mut sides =
+        PlanePanel::new(Axis::log("*ε*", 6e-5, 1.6e-2), Axis::linear("share that leaves to *x* < 0", -0.08, 1.3));
     let smooth: Vec<&Row> = rows[0].iter().filter(|r| SELECTION.contains(&r.eps)).collect();
     let dots = marker(MarkerShape::Dot, style::INK, 4.0);
     let tip: Vec<[f64; 2]> = smooth.iter().map(|r| [r.eps, sqrt(r.z2)]).collect();
