@@ -2,7 +2,7 @@
 
 use pyo3::prelude::*;
 use serde_json::{Value, json};
-use twofold::paper::{Reading, figures, readme};
+use twofold::paper::{Reading, figures, verdict_table};
 use twofold::record::Manifest;
 
 use crate::errors::InternalError;
@@ -49,5 +49,5 @@ pub fn panels() -> PyResult<String> {
 /// README's table of verdicts, in Markdown.
 #[pyfunction]
 pub fn verdict_table() -> PyResult<String> {
-    Ok(readme::table(&manifests()?))
+    Ok(verdict_table::table(&manifests()?))
 }

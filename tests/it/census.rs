@@ -1,4 +1,4 @@
-//! The committed census: its sweeps are those of the figures, its rows come out the same today, and README says what it says.
+//! The committed census: its sweeps are those of the figures, its rows come out the same today, and docs/census.md says what it says.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -125,23 +125,23 @@ fn committed_rows_come_out_the_same() {
 }
 
 #[test]
-fn readme_says_what_the_census_says() {
+fn the_page_says_what_the_census_says() {
     let found = Reading::ALL.map(|reading| figures::census::found_in(reading, &on_disk("figures/census")).unwrap());
     let text = census::text(&found, figures::reference);
-    let readme = fs::read_to_string(path("README.md")).unwrap();
-    let (_, rest) = readme.split_once(census::BEGIN).expect("README has a place for the census");
-    let (said, _) = rest.split_once(census::END).expect("README's text about the census ends");
-    assert!(said.trim() == text.trim(), "README does not say what figures/census says:\n{}\n\n{text}\n", census::BEGIN);
+    let page = fs::read_to_string(path("docs/census.md")).unwrap();
+    let (_, rest) = page.split_once(census::BEGIN).expect("the page has a place for the census");
+    let (said, _) = rest.split_once(census::END).expect("its text about the census ends");
+    assert!(said.trim() == text.trim(), "docs/census.md does not say what figures/census says:\n{}\n\n{text}\n", census::BEGIN);
 }
 
 #[test]
-fn readme_says_what_the_audit_says() {
+fn the_page_says_what_the_audit_says() {
     let [equal, whole] = figures::audit::candidates_in(&on_disk("figures/audit")).unwrap();
     let text = audit::text(&equal, &whole);
-    let readme = fs::read_to_string(path("README.md")).unwrap();
-    let (_, rest) = readme.split_once(audit::BEGIN).expect("README has a place for the audit");
-    let (said, _) = rest.split_once(audit::END).expect("README's text about the audit ends");
-    assert!(said.trim() == text.trim(), "README does not say what figures/audit says:\n{}\n\n{text}\n", audit::BEGIN);
+    let page = fs::read_to_string(path("docs/census.md")).unwrap();
+    let (_, rest) = page.split_once(audit::BEGIN).expect("the page has a place for the audit");
+    let (said, _) = rest.split_once(audit::END).expect("its text about the audit ends");
+    assert!(said.trim() == text.trim(), "docs/census.md does not say what figures/audit says:\n{}\n\n{text}\n", audit::BEGIN);
 }
 
 #[test]

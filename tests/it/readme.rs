@@ -1,9 +1,9 @@
-//! README says what the references say.
+//! README and the pages of findings say what the references say.
 
 use std::fs;
 use std::path::Path;
 
-use twofold::paper::{audit, census, figures, readme};
+use twofold::paper::{audit, census, figures, verdict_table};
 use twofold::record::Manifest;
 
 fn text(path: &str) -> String {
@@ -14,13 +14,13 @@ fn text(path: &str) -> String {
 fn golden_table_of_verdicts_is_that_of_the_references() {
     let manifests: Vec<Manifest> =
         figures::all().iter().map(|f| Manifest::parse(figures::reference(f.id).unwrap(), f.id).unwrap()).collect();
-    let written = text("README.md");
-    let table = readme::table(&manifests);
+    let written = text("docs/findings.md");
+    let table = verdict_table::table(&manifests);
     assert_eq!(table.lines().filter(|l| l.contains("| agrees |") || l.contains("| differs |")).count(), 11, "{table}");
-    let made = readme::with_table(&written, &table).expect("README has a place for the table of verdicts");
+    let made = verdict_table::with_table(&written, &table).expect("docs/findings.md has a place for the table of verdicts");
     assert!(
         made == written,
-        "README's table of verdicts is not that of figures/*/expected.json; run `twofold bless`:\n{table}"
+        "the table of verdicts in docs/findings.md is not that of figures/*/expected.json; run `twofold bless`:\n{table}"
     );
 }
 
@@ -50,50 +50,60 @@ fn numbers() -> Numbers {
     toml::from_str(&text("docs/numbers.toml")).unwrap()
 }
 
-/// README's findings, without the generated table.
-fn findings() -> String {
-    let readme = text("README.md");
-    let (_, findings) = readme.split_once("## What was found").unwrap();
-    let (findings, _) = findings.split_once("## Any run").unwrap();
-    let (before, rest) = findings.split_once(readme::BEGIN).unwrap();
-    let (_, after) = rest.split_once(readme::END).unwrap();
-    let findings = format!("{before}{after}");
-    // tests/it/census.rs compares what the census and the audit say.
-    let (before, rest) = findings.split_once(census::BEGIN).unwrap();
-    let (_, after) = rest.split_once(census::END).unwrap();
-    let findings = format!("{before}{after}");
-    let (before, rest) = findings.split_once(audit::BEGIN).unwrap();
-    let (_, after) = rest.split_once(audit::END).unwrap();
+/// A page without what stands between two marks.
+fn without(page: &str, begin: &str, end: &str) -> String {
+    let (before, rest) = page.split_once(begin).unwrap();
+    let (_, after) = rest.split_once(end).unwrap();
     format!("{before}{after}")
+}
+
+/// Blocks of text with single spaces: how a page is wrapped does not matter.
+fn unwrapped(text: &str) -> Vec<String> {
+    text.split("\n\n").map(|block| block.split_whitespace().collect::<Vec<_>>().join(" ")).collect()
+}
+
+/// The prose of the pages of findings. Their generated tables are compared elsewhere.
+fn findings() -> String {
+    let findings = without(&text("docs/findings.md"), verdict_table::BEGIN, verdict_table::END);
+    let odds = without(&text("docs/census.md"), census::BEGIN, census::END);
+    let odds = without(&odds, audit::BEGIN, audit::END);
+    unwrapped(&format!("{findings}\n\n{odds}")).join("\n")
 }
 
 #[test]
 fn every_number_of_the_findings_is_named_in_the_file_of_numbers() {
     let Numbers { given, number } = numbers();
-    let mut left = findings();
+    let whole = findings();
+    let mut left = whole.clone();
     for quote in number.iter().flat_map(|n| &n.quotes) {
-        assert!(
-            left.contains(quote.as_str()) || findings().contains(quote.as_str()),
-            "README does not say \"{quote}\""
-        );
-        left = left.replace(quote.as_str(), "");
+        let quote = unwrapped(quote).join(" ");
+        assert!(whole.contains(&quote), "the findings do not say \"{quote}\"");
+        left = left.replace(&quote, "");
     }
     // Longest first, so that a short one does not eat a part of a long one.
-    let mut given = given;
+    let mut given: Vec<String> = given.iter().map(|g| unwrapped(g).join(" ")).collect();
     given.sort_by_key(|g| std::cmp::Reverse(g.len()));
     for g in &given {
         left = left.replace(g.as_str(), "");
     }
     // Links lead to files, whose names have numbers.
-    let prose: Vec<&str> = left.lines().filter(|l| !l.starts_with("![")).collect();
-    for line in prose {
+    for line in left.lines().filter(|l| !l.starts_with("![")) {
         let unnamed: Vec<&str> = line
             .split(|c: char| !(c.is_ascii_digit() || ".,".contains(c)))
             .map(|n| n.trim_matches(['.', ',']))
             .filter(|n| n.bytes().any(|b| b.is_ascii_digit()))
             .collect();
-        assert!(unnamed.is_empty(), "{unnamed:?} are in README but not in docs/numbers.toml: {line}");
+        assert!(unnamed.is_empty(), "{unnamed:?} are in the findings but not in docs/numbers.toml: {line}");
     }
+}
+
+#[test]
+fn readme_is_short() {
+    let readme = text("README.md");
+    assert!(readme.lines().count() <= 120, "{} lines", readme.lines().count());
+    assert!(readme.split_whitespace().count() <= 900, "{} words", readme.split_whitespace().count());
+    let long: Vec<&str> = readme.lines().filter(|l| l.chars().count() > 100 && !l.starts_with("![")).collect();
+    assert!(long.is_empty(), "{long:?}");
 }
 
 #[test]
@@ -124,7 +134,7 @@ fn the_commands_and_tests_behind_the_numbers_exist() {
 }
 
 #[test]
-fn futures_come_back_as_often_as_readme_says() {
+fn futures_come_back_as_often_as_the_findings_say() {
     use twofold::integrate::filippov::EventKind;
     use twofold::integrate::filippov::ExitRule;
     use twofold::integrate::{Schedule, StepCap, Tolerance};

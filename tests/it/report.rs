@@ -58,7 +58,7 @@ impl Bench {
         assemble(
             &visit_tree(&self.made(), &|_| true, &|path, place| MadeFile::read(path, place, &known)).unwrap().0,
             &read_tree(&self.expected(), &|_| true).unwrap().files,
-            &Program { figures: &known, readme: include_str!("../../README.md") },
+            &Program { figures: &known, findings: include_str!("../../docs/findings.md") },
         )
     }
 

@@ -381,7 +381,7 @@ pub fn json(answer: &Answer, about: &Value) -> Vec<u8> {
 /// If the file is anything else.
 pub fn from_json(bytes: &[u8]) -> Result<(Value, Answer), Malformed> {
     #[derive(Deserialize)]
-    struct File {
+    struct Written {
         about: Value,
         stop: Stop,
         facts: serde_json::Map<String, Value>,
@@ -400,7 +400,7 @@ pub fn from_json(bytes: &[u8]) -> Result<(Value, Answer), Malformed> {
         Value::String(s) if s == "-inf" => Some(f64::NEG_INFINITY),
         value => value.as_f64(),
     };
-    let file: File = serde_json::from_slice(bytes).map_err(|e| Malformed(e.to_string()))?;
+    let file: Written = serde_json::from_slice(bytes).map_err(|e| Malformed(e.to_string()))?;
     let mut tables = Vec::new();
     for t in file.tables {
         let mut table = Table::new(&t.name, t.columns.iter().map(|c| Column::new(&c.name, &c.unit, c.kind)));

@@ -541,7 +541,7 @@ impl Found {
     }
 }
 
-/// Stands before README's text about the census.
+/// Stands before the text about the census in docs/census.md.
 pub const BEGIN: &str = "<!-- census: what figures/census says; tests/it/census.rs compares it; do not edit -->";
 /// Stands after it.
 pub const END: &str = "<!-- end of census -->";
@@ -561,7 +561,7 @@ pub(super) fn percent(share: f64, interval: [f64; 2]) -> String {
     format!("{:.0} % [{:.0}, {:.0}]", 100.0 * share, 100.0 * interval[0], 100.0 * interval[1])
 }
 
-/// README's text about the census: the table of shares, the figures as groups, the tests. `reference` has the committed manifest of each
+/// The text about the census in docs/census.md: the table of shares, the figures as groups, the tests. `reference` has the committed manifest of each
 /// figure, as text.
 pub fn text(found: &[Found; 2], reference: impl Fn(&str) -> Option<&'static str>) -> String {
     use std::fmt::Write as _;

@@ -31,7 +31,7 @@ pub mod compare;
 pub mod draw;
 pub mod drawing;
 pub mod pipeline;
-pub mod readme;
+pub mod verdict_table;
 pub mod report;
 pub mod standing;
 pub mod study;

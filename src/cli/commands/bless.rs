@@ -11,7 +11,7 @@ use crate::cli::speak::print_json;
 use crate::cli::{CliError, Exit, in_pool, print};
 use crate::job::Desk;
 use crate::paper::pipeline::{compute, questions};
-use crate::paper::{figures, readme};
+use crate::paper::{figures, verdict_table};
 use crate::record::manifest::VERSION;
 use crate::record::{self, Manifest};
 
@@ -117,9 +117,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 const HEADER: &str = "# Why the reference pictures changed\n\nA line per `twofold bless`, oldest first: reason, then each picture \
                       with the first layer that changed.\n\n";
 
-/// Puts the verdicts into README, if there is one beside the references that has a place for them.
+/// Puts the verdicts into docs/findings.md, if it stands beside the references and has a place for them.
 fn write_table(expected: &Path) -> Result<(), CliError> {
-    let path = expected.join("..").join("README.md");
+    let path = expected.join("..").join("docs").join("findings.md");
     let Ok(written) = record::files::read_text(&path) else { return Ok(()) };
     let manifests: Vec<Manifest> = figures::all()
         .iter()
@@ -128,7 +128,7 @@ fn write_table(expected: &Path) -> Result<(), CliError> {
             Manifest::parse(&record::files::read_text(&path).ok()?, &path.display().to_string()).ok()
         })
         .collect();
-    if let Some(text) = readme::with_table(&written, &readme::table(&manifests)) {
+    if let Some(text) = verdict_table::with_table(&written, &verdict_table::table(&manifests)) {
         record::write(&path, text.as_bytes())?;
     }
     Ok(())

@@ -10,7 +10,7 @@ use crate::paper::{Figure, figures};
 use crate::record::{self, FileBytes, read_tree, visit_tree};
 use crate::report::{Links, MadeFile, Program, Report, archive, assemble, names, page};
 
-const README: &str = include_str!("../../../README.md");
+const FINDINGS: &str = include_str!("../../../docs/findings.md");
 
 /// Write a self-contained page about the figures in a folder, and beside it report.json, verdicts.json and RO-Crate metadata.
 ///
@@ -42,7 +42,7 @@ fn report(arguments: &Arguments) -> Result<Exit, CliError> {
     let (made, _) = visit_tree(folder, &|_| true, &|path, place| MadeFile::read(path, place, &known))
         .map_err(|e| CliError::Usage(format!("{e}; run `make figures` first, or name another --figures")))?;
     let report =
-        assemble(&made, &references(arguments.expected.as_deref())?, &Program { figures: &known, readme: README });
+        assemble(&made, &references(arguments.expected.as_deref())?, &Program { figures: &known, findings: FINDINGS });
     if report.figures.is_empty() {
         return Err(CliError::Usage(format!(
             "{}: no figure's pictures are in this folder; run `make figures` first, or name another --figures",

@@ -83,8 +83,8 @@ impl MadeFile {
 pub struct Program<'a> {
     /// The figures that it knows.
     pub figures: &'a [Figure],
-    /// Its README, whose findings the page repeats.
-    pub readme: &'a str,
+    /// Its docs/findings.md, whose findings the page repeats.
+    pub findings: &'a str,
 }
 
 /// Puts the report together: `made` are the files of the figures' folder, `committed` those of the references' folder
@@ -116,7 +116,7 @@ pub fn assemble(made: &[MadeFile], committed: &[FileBytes], program: &Program<'_
         figures,
         making,
         problems,
-        findings: prose::of_the_project(program.readme),
+        findings: prose::of_the_project(program.findings),
     }
 }
 

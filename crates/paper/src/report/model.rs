@@ -34,7 +34,7 @@ pub struct Report {
     pub making: Vec<Making>,
     /// What could not be read, a line each.
     pub problems: Vec<String>,
-    /// What the program's README says was found, as HTML; for the page alone.
+    /// What docs/findings.md says was found, as HTML; for the page alone.
     #[serde(skip)]
     pub findings: Vec<String>,
 }

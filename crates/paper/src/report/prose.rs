@@ -1,5 +1,5 @@
-//! Findings in sentences: those of the folder as it is, from its verdicts, and those of the published figures, from the README that this program
-//! was built with, whose numbers are tested.
+//! Findings in sentences: those of the folder as it is, from its verdicts, and those of the published
+//! figures, from the docs/findings.md that this program was built with, whose numbers are tested.
 
 use std::fmt::Write as _;
 
@@ -64,13 +64,12 @@ fn panel_name(picture: &str, reading: Option<Reading>, panel: &str) -> String {
     }
 }
 
-/// What the README says was found: its paragraphs that begin with a finding in bold, and its theorems, as HTML blocks.
-pub fn of_the_project(readme: &str) -> Vec<String> {
-    let section = readme.split("\n## ").find(|s| s.starts_with("What was found")).unwrap_or_default();
+/// What docs/findings.md says: its paragraphs that begin with a finding in bold, and its theorems, as HTML blocks.
+pub fn of_the_project(findings: &str) -> Vec<String> {
     let mut blocks = Vec::new();
     let mut heading = "";
-    for block in section.split("\n\n").map(str::trim) {
-        if let Some(text) = block.strip_prefix("### ") {
+    for block in findings.split("\n\n").map(str::trim) {
+        if let Some(text) = block.strip_prefix("## ") {
             heading = text;
         } else if block.starts_with("**") {
             blocks.push(format!("<p>{}</p>", inline(block)));
@@ -140,10 +139,10 @@ mod tests {
     }
 
     #[test]
-    fn the_readme_has_findings() {
-        let blocks = of_the_project(include_str!("../../../../README.md"));
+    fn the_page_has_findings() {
+        let blocks = of_the_project(include_str!("../../../../docs/findings.md"));
         assert!(blocks.len() >= 6, "{blocks:#?}");
-        assert!(blocks.iter().any(|b| b.contains("<strong>The singularity eats digits.</strong>")));
+        assert!(blocks.iter().any(|b| b.contains("<strong>Each visit to the singularity costs digits.</strong>")));
         assert!(blocks.last().unwrap().contains("<li>"));
         assert!(blocks.iter().all(|b| !b.contains("](") && !b.contains("**")), "{blocks:#?}");
     }

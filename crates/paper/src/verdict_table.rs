@@ -1,4 +1,4 @@
-//! The README's table of verdicts, from the committed manifests.
+//! The table of verdicts in docs/findings.md, from the committed manifests.
 
 use std::fmt::Write as _;
 
@@ -50,9 +50,9 @@ pub fn table(manifests: &[Manifest]) -> String {
     text
 }
 
-/// A README with its table replaced; `None` if it has no place for one.
-pub fn with_table(readme: &str, table: &str) -> Option<String> {
-    let (before, rest) = readme.split_once(BEGIN)?;
+/// A page with its table replaced; `None` if it has no place for one.
+pub fn with_table(page: &str, table: &str) -> Option<String> {
+    let (before, rest) = page.split_once(BEGIN)?;
     let (_, after) = rest.split_once(END)?;
     Some(format!("{before}{BEGIN}\n\n{table}\n\n{END}{after}"))
 }
