@@ -568,17 +568,22 @@ fn orbit(
     rows: &[&TableRow],
     name: &str,
 ) -> Check<Rc<Vec<Crossing>>> {
+    let at = |n: usize, what: &str| format!("{name}, crossing {}: {what}", n + 1);
+    // What can be refused without an orbit comes first.
+    let mut claimed = Vec::new();
+    for (n, row) in rows.iter().enumerate() {
+        for (b, axis, what) in [(&row.time, None, "time"), (&row.x, Some(0), "x"), (&row.z, Some(2), "z")] {
+            let b = ball(b, &at(n, what))?;
+            need(b.width() < Rational::tenth_to(7), at(n, &format!("{what}: the enclosure is narrower than 1e-7")))?;
+            claimed.push((n, b, axis, what));
+        }
+    }
     let ours = known.crossings(equation, &Patch::point(x, z), rows.len(), Settings::NARROW)?;
     for (n, (row, ours)) in rows.iter().zip(ours.iter()).enumerate() {
-        let at = |what: &str| format!("{name}, crossing {}: {what}", n + 1);
-        need(row.upward == ours.upward, at("the direction"))?;
-        for (claimed, ours, what) in
-            [(&row.time, &ours.time, "time"), (&row.x, &ours.states[0], "x"), (&row.z, &ours.states[2], "z")]
-        {
-            let claimed = ball(claimed, &at(what))?;
-            holds(&claimed, ours, &at(what))?;
-            need(claimed.width() < Rational::tenth_to(7), at("the enclosure is narrower than 1e-7"))?;
-        }
+        need(row.upward == ours.upward, at(n, "the direction"))?;
+    }
+    for (n, claimed, axis, what) in &claimed {
+        holds(claimed, axis.map_or(&ours[*n].time, |i: usize| &ours[*n].states[i]), &at(*n, what))?;
     }
     Ok(ours)
 }
@@ -717,54 +722,21 @@ impl Parallelogram {
 /// Crossings of y = 0 in a return: four downward ones.
 const RETURN: usize = 8;
 
-/// The checker's own proof that a set covers others (Zgliczynski & Gidea 2004, Definition 2): the ends come to either side, no part meets the other set's edges v = -1, 1.
-struct Covers {
-    ends: [Rc<Vec<Crossing>>; 2],
-    parts: Vec<Rc<Vec<Crossing>>>,
-}
-
-fn covers(known: &Known, equation: &Caricature, from: &Parallelogram, to: &[&Parallelogram]) -> Check<Covers> {
+/// One covering relation (Zgliczynski & Gidea 2004, Definition 2): the ends come to either side of the sets that are covered, no part meets their edges v = -1, 1.
+/// Whether the certificate's numbers hold what is found comes first: the parts take longest.
+fn covering(known: &Known, equation: &Caricature, sets: &[Parallelogram], c: &Covering) -> Check<Rational> {
     /// Parts shorter than this are not tried.
     const SHORTEST: f64 = 1.0 / 64.0;
+    let from = &sets[c.from];
+    let to: Vec<&Parallelogram> = c.to.iter().map(|k| &sets[*k]).collect();
     let image = |low: f64, high: f64| -> Check<Rc<Vec<Crossing>>> {
         let rows = known.crossings(equation, &from.part(low, high)?, RETURN, Settings::NARROW)?;
-        need(
-            rows.iter().enumerate().all(|(n, r)| r.upward == (n % 2 == 0)),
-            "directions alternate, the first is upward",
-        )?;
+        let alternate = rows.iter().enumerate().all(|(n, r)| r.upward == (n % 2 == 0));
+        need(alternate, "directions alternate, the first is upward")?;
         Ok(rows)
     };
-    let last = |rows: &[Crossing], to: &Parallelogram| -> Check<[Range; 2]> { to.see(&rows[RETURN - 1], true) };
-    let ends = [image(-1.0, -1.0)?, image(1.0, 1.0)?];
-    for to in to {
-        let sides = side(&last(&ends[0], to)?[0]) * side(&last(&ends[1], to)?[0]);
-        need(sides == -1, "the ends come to either side of the set that is covered")?;
-    }
-    let (mut parts, mut waiting) = (Vec::new(), vec![[-1.0, 1.0]]);
-    while let Some([low, high]) = waiting.pop() {
-        let rows = image(low, high)?;
-        let mut away = true;
-        for to in to {
-            let [u, v] = last(&rows, to)?;
-            away &= v.magnitude() < Rational::whole(1) || side(&u) != 0;
-        }
-        if away {
-            parts.push(rows);
-            continue;
-        }
-        need(high - low > SHORTEST, "no part leaves the set that is covered sideways")?;
-        let middle = 0.5 * (low + high);
-        waiting.extend([[middle, high], [low, middle]]);
-    }
-    Ok(Covers { ends, parts })
-}
-
-/// One covering relation: the checker's own, and whether the certificate's numbers hold what it finds.
-fn covering(known: &Known, equation: &Caricature, sets: &[Parallelogram], c: &Covering) -> Check<Rational> {
-    let to: Vec<&Parallelogram> = c.to.iter().map(|k| &sets[*k]).collect();
-    let ours = covers(known, equation, &sets[c.from], &to)?;
-    for (image, u) in c.ends.iter().zip([-1.0, 1.0]) {
-        need(image.part == [u, u], "the ends are those of the set")?;
+    for (end, u) in c.ends.iter().zip([-1.0, 1.0]) {
+        need(end.part == [u, u], "the ends are those of the set")?;
     }
     // The pieces leave nothing out.
     let mut before = -1.0;
@@ -773,27 +745,10 @@ fn covering(known: &Known, equation: &Caricature, sets: &[Parallelogram], c: &Co
         before = piece.part[1];
     }
     need(before == 1.0, "the pieces make up the set")?;
-    for (image, is_end) in c.pieces.iter().map(|p| (p, false)).chain(c.ends.iter().map(|e| (e, true))) {
+    let claimed: Vec<(&ImageOfPart, bool)> =
+        c.pieces.iter().map(|p| (p, false)).chain(c.ends.iter().map(|e| (e, true))).collect();
+    for (image, is_end) in &claimed {
         need(image.seen.len() == c.to.len(), "an image is seen from every set that is to be covered")?;
-        for u in image.part {
-            let rows = if u == -1.0 {
-                ours.ends[0].clone()
-            } else if u == 1.0 {
-                ours.ends[1].clone()
-            } else {
-                known.crossings(
-                    equation,
-                    &Patch { radii: [0.0; 2], ..sets[c.from].part(u, u)? },
-                    RETURN,
-                    Settings::NARROW,
-                )?
-            };
-            for (seen, to) in image.seen.iter().zip(&to) {
-                for (claimed, ours) in ranges(*seen)?.iter().zip(to.see(&rows[RETURN - 1], false)?) {
-                    holds(claimed, &ours, &format!("the image of u = {u}"))?;
-                }
-            }
-        }
         for (seen, k) in image.seen.iter().zip(&c.to) {
             let [u, v] = ranges(*seen)?;
             let fine = side(&u) != 0 || !is_end && v.magnitude() < Rational::whole(1);
@@ -802,18 +757,57 @@ fn covering(known: &Known, equation: &Caricature, sets: &[Parallelogram], c: &Co
     }
     let passage = &c.passage;
     need((1..=RETURN).contains(&passage.crossing), "the singularity is passed on the way")?;
+    let passes = [range(passage.x)?, range(passage.z)?];
+    for claimed in &passes {
+        need(claimed.magnitude() < Rational::tenth_to(4), "the passage claimed is within 1e-4")?;
+    }
+
+    for (claimed, _) in &claimed {
+        for u in claimed.part {
+            let rows = image(u, u)?;
+            for (seen, to) in claimed.seen.iter().zip(&to) {
+                for (claimed, ours) in ranges(*seen)?.iter().zip(to.see(&rows[RETURN - 1], false)?) {
+                    holds(claimed, &ours, &format!("the image of u = {u}"))?;
+                }
+            }
+        }
+    }
     let mut nearest = Rational::whole(0);
-    for rows in ours.parts.iter().chain(&ours.ends) {
+    let mut passing = |rows: &[Crossing]| -> Check {
         let crossing = &rows[passage.crossing - 1];
-        for (axis, claimed) in PLANE.into_iter().zip([passage.x, passage.z]) {
+        for (axis, claimed) in PLANE.into_iter().zip(&passes) {
             let size = crossing.states[axis].magnitude();
             need(size < Rational::tenth_to(4), "the singularity is passed within 1e-4")?;
-            nearest = nearest.max(size);
-            let claimed = range(claimed)?;
-            need(claimed.magnitude() < Rational::tenth_to(4), "the passage claimed is within 1e-4")?;
+            nearest = nearest.clone().max(size);
             let middle = crossing.set.centre()[axis].range(0.0).ok_or("a crossing is bounded")?;
-            holds(&claimed, &middle, "the passage")?;
+            holds(claimed, &middle, "the passage")?;
         }
+        Ok(())
+    };
+    let last = |rows: &[Crossing], to: &Parallelogram| -> Check<[Range; 2]> { to.see(&rows[RETURN - 1], true) };
+    let ends = [image(-1.0, -1.0)?, image(1.0, 1.0)?];
+    for to in &to {
+        let sides = side(&last(&ends[0], to)?[0]) * side(&last(&ends[1], to)?[0]);
+        need(sides == -1, "the ends come to either side of the set that is covered")?;
+    }
+    for rows in &ends {
+        passing(rows)?;
+    }
+    let mut waiting = vec![[-1.0, 1.0]];
+    while let Some([low, high]) = waiting.pop() {
+        let rows = image(low, high)?;
+        let mut away = true;
+        for to in &to {
+            let [u, v] = last(&rows, to)?;
+            away &= v.magnitude() < Rational::whole(1) || side(&u) != 0;
+        }
+        if away {
+            passing(&rows)?;
+            continue;
+        }
+        need(high - low > SHORTEST, "no part leaves the set that is covered sideways")?;
+        let middle = 0.5 * (low + high);
+        waiting.extend([[middle, high], [low, middle]]);
     }
     Ok(nearest)
 }
