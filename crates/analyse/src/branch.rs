@@ -18,8 +18,56 @@ pub trait ReturnMap {
     /// The return from `u` at the parameter's value `p`, with the derivative in u if it is asked for.
     ///
     /// # Errors
-    /// In words: why there is no return or no derivative.
-    fn returned(&self, u: &[f64], p: f64, derivative: bool) -> Result<Returned, String>;
+    /// Why there is no return or no derivative.
+    fn returned(&self, u: &[f64], p: f64, derivative: bool) -> Result<Returned, Trouble>;
+    /// The same, computed less accurately, with the derivative: the difference is at least the error of [`ReturnMap::returned`]. A map
+    /// that is computed exactly needs none.
+    ///
+    /// # Errors
+    /// Why there is no return or no derivative.
+    fn roughly(&self, u: &[f64], p: f64) -> Result<Returned, Trouble> {
+        self.returned(u, p, true)
+    }
+    /// The rest near `u` at the parameter's value `p`, and the eigenvalues there.
+    fn rest(&self, _u: &[f64], _p: f64) -> Option<(Vec<f64>, Vec<[f64; 2]>)> {
+        None
+    }
+}
+
+/// Why there is no closed orbit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trouble {
+    /// What kind of thing is in the way.
+    pub obstacle: Obstacle,
+    /// In words, with what to do.
+    pub said: String,
+}
+
+/// What is in the way of a closed orbit.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Obstacle {
+    /// It touches the switching surface.
+    Grazing,
+    /// It comes to where its future is a set.
+    SetValued,
+    /// The search comes to a point from which there is no loop, or one that is not told from a rest.
+    Point(Vec<f64>),
+    /// The search comes to an orbit that passes the plane in the other direction there.
+    Reversed,
+    /// Anything else.
+    Other,
+}
+
+impl From<String> for Trouble {
+    fn from(said: String) -> Self {
+        Self { obstacle: Obstacle::Other, said }
+    }
+}
+
+impl From<&str> for Trouble {
+    fn from(said: &str) -> Self {
+        said.to_owned().into()
+    }
 }
 
 /// A closed orbit with its stability.
@@ -37,6 +85,12 @@ pub struct Orbit {
     pub residual: f64,
     /// Newton iterations made.
     pub iterations: usize,
+    /// Diagonal of the box around it.
+    pub extent: f64,
+    /// Largest error of a multiplier.
+    pub multiplier_error: f64,
+    /// Events on the way (crossings of the switching surface, landings, departures), if the system is discontinuous.
+    pub events: usize,
     /// Its passages through the plane in the counted direction, the point first.
     pub same: Vec<Vec<f64>>,
     /// Its passages in the other direction.
@@ -49,9 +103,19 @@ impl Orbit {
         self.multipliers.first().map_or(0.0, |m| sqrt(m[0] * m[0] + m[1] * m[1]))
     }
 
-    /// Whether neighbours approach it.
-    pub fn attracts(&self) -> bool {
-        self.largest_modulus() < 1.0
+    /// What the multipliers say, within their error.
+    pub fn stability(&self) -> Stability {
+        let (largest, error) = (self.largest_modulus(), self.multiplier_error);
+        let isolated = self.multipliers.iter().all(|m| distance(*m, [1.0, 0.0]) > error);
+        if largest > 1.0 + error {
+            Stability::Unstable
+        } else if !isolated {
+            Stability::NotIsolated
+        } else if largest >= 1.0 - error {
+            Stability::Neutral
+        } else {
+            Stability::Stable
+        }
     }
 
     /// The rate per unit time at which neighbours approach it in the end, negative if they leave; none where they arrive in finite time
@@ -62,11 +126,41 @@ impl Orbit {
     }
 }
 
+/// What multipliers say of neighbours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stability {
+    /// All are within the unit circle: neighbours approach.
+    Stable,
+    /// One is beyond it: some leave.
+    Unstable,
+    /// One is 1 within its error, and none beyond the circle: other closed orbits are beside it, or it is at a fold.
+    NotIsolated,
+    /// One is on the circle within its error: linear terms do not tell.
+    Neutral,
+}
+
+impl Stability {
+    /// The word for it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Stability::Stable => "stable",
+            Stability::Unstable => "unstable",
+            Stability::NotIsolated => "not-isolated",
+            Stability::Neutral => "neutral",
+        }
+    }
+}
+
 /// Newton's method: when it is done and when it gives up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Newton {
-    /// Largest |P(u) - u| that counts as closed.
+    /// Largest |P(u) - u| that counts as closed, as a share of the orbit's extent.
     pub closed: f64,
+    /// The integration's error: an absolute one ...
+    pub atol: f64,
+    /// ... and a share of the state.
+    pub rtol: f64,
     /// Most iterations.
     pub iterations: usize,
 }
@@ -77,16 +171,47 @@ const SINGULAR: f64 = 1e-13;
 /// left is the error of the integration.
 const STALLED: f64 = 100.0;
 
-/// Whether Newton's method is done with this residual, having had that one before.
-fn settled(residual: f64, before: f64, newton: Newton) -> bool {
-    residual <= newton.closed || residual <= STALLED * newton.closed && residual >= 0.5 * before
+/// Trials to locate a change.
+const ITERATIONS: usize = 60;
+/// The least error of a multiplier.
+const ROUNDING: f64 = 1e-13;
+/// Where a multiplier is this near to 1, Newton's method goes on as long as it helps.
+const NEAR_ONE: f64 = 1e-3;
+/// A loop of at most so many times the integration's error is not told from a point.
+const POINT: f64 = 1e3;
+/// Whether Newton's method is done with this residual, having had that one before, `closed` being what counts as closed.
+fn settled(residual: f64, before: f64, closed: f64) -> bool {
+    residual <= closed || residual <= STALLED * closed && residual >= 0.5 * before
+}
+
+impl Newton {
+    /// The integration's error at `u`.
+    fn error(&self, u: &[f64]) -> f64 {
+        self.atol + self.rtol * largest(u)
+    }
+
+    /// What counts as closed for the return `r` of `u`.
+    ///
+    /// # Errors
+    /// If all of it is a point.
+    fn closed(&self, u: &[f64], r: &Returned) -> Result<f64, Trouble> {
+        if r.extent <= POINT * self.error(u) {
+            let said = "the search comes to a rest: its loop shrinks to a point".to_owned();
+            return Err(Trouble { obstacle: Obstacle::Point(u.to_vec()), said });
+        }
+        Ok((self.closed * r.extent).max(self.error(u)))
+    }
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]))
 }
 
 /// The closed orbit near `guess` at the parameter's value `p`.
 ///
 /// # Errors
 /// In words, with what to do.
-pub fn closed_orbit(map: &dyn ReturnMap, guess: &[f64], p: f64, newton: Newton) -> Result<Orbit, String> {
+pub fn closed_orbit(map: &dyn ReturnMap, guess: &[f64], p: f64, newton: Newton) -> Result<Orbit, Trouble> {
     let (n, axis) = (map.states(), map.axis());
     let mut u = guess.to_vec();
     let (mut best, mut before) = (f64::INFINITY, f64::INFINITY);
@@ -94,8 +219,8 @@ pub fn closed_orbit(map: &dyn ReturnMap, guess: &[f64], p: f64, newton: Newton) 
         let r = map.returned(&u, p, true)?;
         let difference: Vec<f64> = r.point.iter().zip(&u).map(|(a, b)| a - b).collect();
         let residual = sqrt(difference.iter().map(|d| d * d).sum());
-        if settled(residual, before, newton) {
-            return Ok(orbit(map, u, p, r, residual, iterations));
+        if settled(residual, before, newton.closed(&u, &r)?) {
+            return orbit(map, u, p, r, residual, iterations);
         }
         before = residual;
         best = best.min(residual);
@@ -111,15 +236,60 @@ pub fn closed_orbit(map: &dyn ReturnMap, guess: &[f64], p: f64, newton: Newton) 
         "Newton's method found no closed orbit near the start: after {} iterations the orbit misses itself by {best:e} at best; start \
          nearer, let the motion settle for longer, or check the number of returns",
         newton.iterations
-    ))
+    )
+    .into())
 }
 
-fn orbit(map: &dyn ReturnMap, u: Vec<f64>, p: f64, r: Returned, residual: f64, iterations: usize) -> Orbit {
+fn orbit(
+    map: &dyn ReturnMap,
+    u: Vec<f64>,
+    p: f64,
+    r: Returned,
+    residual: f64,
+    iterations: usize,
+) -> Result<Orbit, Trouble> {
+    if !r.passes {
+        let said =
+            "the orbit that the search comes to passes the plane in the other direction: choose another plane or start";
+        return Err(Trouble { obstacle: Obstacle::Reversed, said: said.into() });
+    }
     let multipliers = multipliers_of(&r.derivative, map.states(), map.axis());
     // The start is the orbit's first passage; the last return is the start again.
     let returns = r.same.len().saturating_sub(1);
     let same = std::iter::once(u.clone()).chain(r.same.into_iter().take(returns)).collect();
-    Orbit { parameter: p, point: u, period: r.time, multipliers, residual, iterations, same, opposite: r.opposite }
+    let multiplier_error = multiplier_error(map, &u, p, &multipliers, residual / r.extent, r.derivative_error);
+    Ok(Orbit {
+        parameter: p,
+        point: u,
+        period: r.time,
+        multipliers,
+        residual,
+        iterations,
+        extent: r.extent,
+        multiplier_error,
+        events: r.events,
+        same,
+        opposite: r.opposite,
+    })
+}
+
+/// The error of multipliers: by how much those of a less accurate map differ, and by how much they change over the distance by which
+/// the orbit's point is off (the residual over the distance of the nearest multiplier from 1), ten times as fast as they change over
+/// the orbit. Where a multiplier is 1 within the first part, the points beside are as good.
+fn multiplier_error(
+    map: &dyn ReturnMap,
+    u: &[f64],
+    p: f64,
+    multipliers: &[[f64; 2]],
+    residual: f64,
+    least: f64,
+) -> f64 {
+    let Ok(rough) = map.roughly(u, p) else { return f64::INFINITY };
+    let rough = multipliers_of(&rough.derivative, map.states(), map.axis());
+    let differences = multipliers.iter().zip(&rough).map(|(a, b)| distance(*a, *b)).fold(ROUNDING + least, f64::max);
+    let from_one = multipliers.iter().map(|m| distance(*m, [1.0, 0.0])).fold(1.0, f64::min);
+    let misplaced = if from_one > differences { (10.0 * residual / from_one).min(1.0) } else { 0.0 };
+    differences + misplaced
 }
 
 fn less_identity(derivative: &[f64], n: usize) -> Vec<f64> {
@@ -142,6 +312,16 @@ pub enum Change {
     Branching,
     /// A pair of complex multipliers leaves or enters the unit circle: a torus (Neimark-Sacker).
     Torus,
+    /// The orbit shrinks to an equilibrium whose eigenvalues are imaginary: a Hopf point, the branch's end.
+    Hopf,
+    /// The orbit shrinks to a point that is no Hopf point, as at a boundary equilibrium: the branch's end.
+    Vanishing,
+    /// The orbit comes to graze the switching surface: what follows is another return map (di Bernardo et al. 2008, ch. 6 to 8).
+    Grazing,
+    /// The orbits on both sides have other events: crossings, landings or departures (di Bernardo et al. 2008, ch. 7 and 8).
+    DiscontinuityInduced,
+    /// The orbit comes to where its future is a set.
+    SetValued,
 }
 
 impl Change {
@@ -152,6 +332,11 @@ impl Change {
             Change::Fold => "fold",
             Change::Branching => "branching",
             Change::Torus => "torus",
+            Change::Hopf => "hopf",
+            Change::Vanishing => "vanishing",
+            Change::Grazing => "grazing",
+            Change::DiscontinuityInduced => "discontinuity-induced",
+            Change::SetValued => "set-valued",
         }
     }
 }
@@ -161,9 +346,10 @@ impl Change {
 pub struct Bifurcation {
     /// Which.
     pub change: Change,
-    /// The parameter's value: where the multiplier is on the unit circle to Newton's accuracy, or between the two members.
+    /// The parameter's value.
     pub parameter: f64,
-    /// Half of what is not known of it.
+    /// Half of the interval around it in which the change lies: what is left of the bracket, and the errors of the integration and of Newton's
+    /// method.
     pub uncertainty: f64,
 }
 
@@ -177,6 +363,8 @@ pub enum End {
     TurnedBack,
     /// As many orbits as asked for.
     Enough,
+    /// The orbit shrinks to a point: which, the last bifurcation says.
+    Vanished,
     /// It cannot be followed: why.
     Lost(String),
     /// Asked to stop.
@@ -226,10 +414,7 @@ struct Scales {
 
 /// The branch from the orbit `first` on, as far as `course` says; `go_on` is told each orbit and may stop it.
 pub fn follow(map: &dyn ReturnMap, first: Orbit, course: &Course, go_on: &mut dyn FnMut(&Orbit) -> bool) -> Branch {
-    let scales = Scales {
-        state: 1.0 + first.point.iter().fold(0.0_f64, |a, b| a.max(b.abs())),
-        parameter: (course.to - course.from).abs(),
-    };
+    let scales = Scales { state: first.extent, parameter: (course.to - course.from).abs() };
     let towards = (course.to - course.from).signum();
     let mut branch = Branch { orbits: vec![first], bifurcations: Vec::new(), end: End::Enough };
     let mut step = 0.25 * course.longest;
@@ -254,19 +439,22 @@ pub fn follow(map: &dyn ReturnMap, first: Orbit, course: &Course, go_on: &mut dy
         let next = match next {
             Ok(next)
                 if !beyond
-                    && (next.iterations > MANY || jumps(last, &next))
+                    && (next.iterations > MANY || jumps(last, &next) || next.events != last.events)
                     && 0.5 * step >= SHORTEST * course.longest =>
             {
-                Err("too long a step".to_owned())
+                Err("too long a step".into())
             }
             other => other,
         };
         let next = match next {
             Ok(next) => next,
-            Err(why) => {
+            Err(trouble) => {
                 step *= 0.5;
                 if step < SHORTEST * course.longest {
-                    branch.end = End::Lost(why);
+                    let missed = 4.0 * step * scales.parameter;
+                    let (change, end) = ended(map, &branch.orbits, trouble, missed);
+                    branch.bifurcations.extend(change);
+                    branch.end = end;
                     return branch;
                 }
                 continue;
@@ -277,8 +465,7 @@ pub fn follow(map: &dyn ReturnMap, first: Orbit, course: &Course, go_on: &mut dy
             (next.parameter - last.parameter) / scales.parameter,
         );
         let length = sqrt(su.iter().map(|s| s * s).sum::<f64>() + sp * sp);
-        let folded = direction.as_ref().is_some_and(|(_, dp)| dp * sp < 0.0);
-        branch.bifurcations.extend(changes(map, last, &next, folded, course.newton));
+        branch.bifurcations.extend(changes(map, last, &next, &scales, course.newton));
         if length > 0.0 {
             direction = Some((su.iter().map(|s| s / length).collect(), sp / length));
         }
@@ -299,6 +486,71 @@ pub fn follow(map: &dyn ReturnMap, first: Orbit, course: &Course, go_on: &mut dy
     branch
 }
 
+/// An orbit of at most this share of the branch's largest extent is about to vanish, if there is none beyond it.
+const VANISHING: f64 = 0.1;
+
+/// What happens where the branch cannot be followed, and how it ends; the next member was looked for over `missed` of the parameter.
+fn ended(map: &dyn ReturnMap, orbits: &[Orbit], trouble: Trouble, missed: f64) -> (Option<Bifurcation>, End) {
+    let last = &orbits[orbits.len() - 1];
+    let here = |change| Some(Bifurcation { change, parameter: last.parameter, uncertainty: missed });
+    let largest = orbits.iter().map(|o| o.extent).fold(0.0, f64::max);
+    match trouble.obstacle {
+        Obstacle::Grazing => (here(Change::Grazing), End::Lost(trouble.said)),
+        Obstacle::SetValued => (here(Change::SetValued), End::Lost(trouble.said)),
+        _ if last.extent <= VANISHING * largest => (Some(vanishing(map, orbits, missed)), End::Vanished),
+        Obstacle::Reversed => {
+            let said = "the orbit comes to touch the plane and no longer passes it: choose another plane";
+            (None, End::Lost(said.into()))
+        }
+        _ => (None, End::Lost(trouble.said)),
+    }
+}
+
+/// Where a branch of shrinking orbits ends: at a Hopf point, if the rest within has a pair of imaginary eigenvalues there, with the
+/// frequency of the orbits (Kuznetsov 2004, sec. 3.4).
+fn vanishing(map: &dyn ReturnMap, orbits: &[Orbit], missed: f64) -> Bifurcation {
+    let last = &orbits[orbits.len() - 1];
+    let before = orbits.iter().rev().find(|o| o.extent > 1.5 * last.extent).unwrap_or(last);
+    // The extent grows like the root of the parameter's distance at a Hopf point, and in proportion to it where fields are
+    // discontinuous: the one end is a little nearer than the other.
+    let ratio = last.extent / before.extent;
+    let way = if ratio < 1.0 { (last.parameter - before.parameter) * ratio / (1.0 - ratio) } else { 0.0 };
+    let frequency = std::f64::consts::TAU / last.period;
+    let pair = |p: f64| -> Option<[f64; 2]> {
+        let (_, eigenvalues) = map.rest(&last.point, p)?;
+        let oscillating = eigenvalues.into_iter().filter(|l| l[1] > 0.0);
+        oscillating.min_by(|a, b| (a[1] - frequency).abs().total_cmp(&(b[1] - frequency).abs()))
+    };
+    let reach = 2.0 * way.abs() + missed;
+    let hopf = || {
+        let (mut a, mut b) = (last.parameter, last.parameter + if way == 0.0 { missed } else { reach.copysign(way) });
+        let (mut ga, mut gb) = (pair(a)?, pair(b)?);
+        // The secant method: the real part is smooth in the parameter.
+        for _ in 0..ITERATIONS {
+            if ga[0] == gb[0] {
+                break;
+            }
+            (a, b) = (b, b - gb[0] * (b - a) / (gb[0] - ga[0]));
+            (ga, gb) = (gb, pair(b)?);
+            if gb[0].abs() <= 1e-13 * gb[1] {
+                break;
+            }
+        }
+        let small = gb[0].abs() <= 1e-9 * gb[1];
+        let near = (b - last.parameter).abs() <= 4.0 * reach && (gb[1] - frequency).abs() <= 0.1 * frequency;
+        let slope = (ga[0] - gb[0]) / (a - b);
+        let rounding = if slope.is_finite() && slope != 0.0 { 1e-12 * gb[1] / slope.abs() } else { 0.0 };
+        let off = if slope.is_finite() && slope != 0.0 { gb[0].abs() / slope.abs() } else { (b - a).abs() };
+        let uncertainty = off + rounding + 1e-14 * b.abs();
+        (small && near).then_some(Bifurcation { change: Change::Hopf, parameter: b, uncertainty })
+    };
+    hopf().unwrap_or(Bifurcation {
+        change: Change::Vanishing,
+        parameter: last.parameter + 0.5 * way,
+        uncertainty: way.abs() + missed,
+    })
+}
+
 /// Whether multipliers differ so much that changes between these orbits might be missed.
 fn jumps(a: &Orbit, b: &Orbit) -> bool {
     let pairs = a.multipliers.iter().zip(&b.multipliers);
@@ -317,7 +569,7 @@ fn arclength(
     (du, dp): (&[f64], f64),
     scales: &Scales,
     newton: Newton,
-) -> Result<Orbit, String> {
+) -> Result<Orbit, Trouble> {
     let (n, axis) = (map.states(), map.axis());
     let (mut u, mut q, mut before) = (guess.to_vec(), p, f64::INFINITY);
     for iterations in 0..=newton.iterations {
@@ -326,8 +578,12 @@ fn arclength(
         let residual = sqrt(difference.iter().map(|d| d * d).sum());
         let along: f64 =
             (0..n).map(|i| du[i] * (u[i] - guess[i]) / scales.state).sum::<f64>() + dp * (q - p) / scales.parameter;
-        if settled(residual, before, newton) && along.abs() < 1e-6 {
-            return Ok(orbit(map, u, q, r, residual, iterations));
+        let done = settled(residual, before, newton.closed(&u, &r)?) && along.abs() < 1e-6;
+        // With a multiplier near 1 a small residual may still be far from an orbit: Newton's method goes on as long as it helps.
+        let near_one = |m: &[f64; 2]| distance(*m, [1.0, 0.0]) < NEAR_ONE;
+        let helps = residual > 0.0 && residual < 0.5 * before;
+        if done && !(helps && multipliers_of(&r.derivative, n, axis).iter().any(near_one)) {
+            return orbit(map, u, q, r, residual, iterations);
         }
         before = residual;
         // The derivative in the parameter by differences; its error only slows Newton's method down.
@@ -357,69 +613,196 @@ fn arclength(
 }
 
 /// Changes of stability between neighbours on a branch.
-fn changes(map: &dyn ReturnMap, a: &Orbit, b: &Orbit, folded: bool, newton: Newton) -> Vec<Bifurcation> {
+fn changes(map: &dyn ReturnMap, a: &Orbit, b: &Orbit, scales: &Scales, newton: Newton) -> Vec<Bifurcation> {
+    let between = |change| Bifurcation {
+        change,
+        parameter: 0.5 * (a.parameter + b.parameter),
+        uncertainty: 0.5 * (a.parameter - b.parameter).abs() + f64::EPSILON * a.parameter.abs(),
+    };
+    if a.events != b.events {
+        return vec![between(Change::DiscontinuityInduced)];
+    }
     let count = |o: &Orbit, test: &dyn Fn(&[f64; 2]) -> bool| o.multipliers.iter().filter(|m| test(m)).count();
     let below: &dyn Fn(&[f64; 2]) -> bool = &|m| m[1] == 0.0 && m[0] < -1.0;
     let above: &dyn Fn(&[f64; 2]) -> bool = &|m| m[1] == 0.0 && m[0] > 1.0;
     let outside: &dyn Fn(&[f64; 2]) -> bool = &|m| m[1] != 0.0 && m[0] * m[0] + m[1] * m[1] > 1.0;
     let mut found = Vec::new();
-    let between = |change| Bifurcation {
-        change,
-        parameter: 0.5 * (a.parameter + b.parameter),
-        uncertainty: 0.5 * (a.parameter - b.parameter).abs(),
-    };
     if count(a, below) != count(b, below) {
-        found.push(doubling(map, a, b, newton).unwrap_or_else(|| between(Change::PeriodDoubling)));
+        let at = locate(map, a, b, scales, newton, &|o| product(o, -1.0));
+        found.push(at.map_or_else(|| between(Change::PeriodDoubling), |at| at.transversal(Change::PeriodDoubling)));
     }
-    if folded {
-        found.push(between(Change::Fold));
-    } else if count(a, above) != count(b, above) {
-        found.push(between(Change::Branching));
+    if count(a, above) != count(b, above) {
+        let at = locate(map, a, b, scales, newton, &|o| product(o, 1.0));
+        found.push(at.map_or_else(|| between(Change::Branching), |at| at.fold_or_branching(map, a, b, scales, newton)));
     }
     if count(a, outside) != count(b, outside) {
-        found.push(between(Change::Torus));
+        let modulus = |o: &Orbit| {
+            let squares = o.multipliers.iter().filter(|m| m[1] != 0.0).map(|m| m[0] * m[0] + m[1] * m[1] - 1.0);
+            squares.min_by(|x, y| x.abs().total_cmp(&y.abs())).unwrap_or(f64::NAN)
+        };
+        let at = locate(map, a, b, scales, newton, &modulus);
+        found.push(at.map_or_else(|| between(Change::Torus), |at| at.transversal(Change::Torus)));
     }
     found
 }
 
-/// Where the real multiplier nearest to -1 passes it: by regula falsi (the Illinois variant, Dowell & Jarratt 1971).
-fn doubling(map: &dyn ReturnMap, a: &Orbit, b: &Orbit, newton: Newton) -> Option<Bifurcation> {
-    let test = |o: &Orbit| {
-        let real = o.multipliers.iter().filter(|m| m[1] == 0.0).map(|m| m[0] + 1.0);
-        real.min_by(|x, y| x.abs().total_cmp(&y.abs()))
-    };
-    let ((mut pa, mut ga), (mut pb, mut gb)) = ((a.parameter, test(a)?), (b.parameter, test(b)?));
-    if ga * gb > 0.0 || pa == pb {
+/// The product of all multipliers less `value`: it changes sign where one passes it, and stays smooth where others meet.
+fn product(o: &Orbit, value: f64) -> f64 {
+    let factors = o.multipliers.iter().map(|m| if m[1] == 0.0 { [m[0] - value, 0.0] } else { [m[0] - value, m[1]] });
+    // Complex factors come in pairs, beside each other.
+    factors.fold([1.0, 0.0], |p, f| [p[0] * f[0] - p[1] * f[1], p[0] * f[1] + p[1] * f[0]])[0]
+}
+
+/// A zero of a test function along a branch, between two members.
+struct Located {
+    /// The member nearest to it.
+    orbit: Orbit,
+    /// Its share of the way from the one to the other.
+    share: f64,
+    /// Change of the parameter over that of the test function, over the whole way.
+    slope: f64,
+    /// The test function's error there.
+    error: f64,
+}
+
+/// Where a test function is zero between two members: by regula falsi (the Illinois variant, Dowell & Jarratt 1971) along the chord.
+fn locate(
+    map: &dyn ReturnMap,
+    a: &Orbit,
+    b: &Orbit,
+    scales: &Scales,
+    newton: Newton,
+    test: &dyn Fn(&Orbit) -> f64,
+) -> Option<Located> {
+    let ((mut sa, mut ga), (mut sb, mut gb)) = ((0.0, test(a)), (1.0, test(b)));
+    let slope = (b.parameter - a.parameter) / (gb - ga);
+    if ga.is_nan() || gb.is_nan() || ga * gb > 0.0 || ga == gb {
         return None;
     }
-    let (mut point, mut last_side) = (b.point.clone(), 0);
-    for _ in 0..40 {
-        let p = pb - gb * (pb - pa) / (gb - ga);
-        let orbit = closed_orbit(map, &point, p, newton).ok()?;
-        let g = test(&orbit)?;
-        point = orbit.point;
-        let width = (pb - pa).abs();
-        if g.abs() < 1e-7 || width < 1e-9 * (1.0 + p.abs()) {
-            // How far p is from the zero, by the slope between the ends.
-            let off = (g * (pb - pa) / (gb - ga)).abs();
-            return Some(Bifurcation { change: Change::PeriodDoubling, parameter: p, uncertainty: off.min(width) });
-        }
+    let mut last_side = 0;
+    let mut nearest: Option<(Orbit, f64, f64)> = None;
+    for _ in 0..ITERATIONS {
+        let share = sb - gb * (sb - sa) / (gb - ga);
+        let orbit = member(map, a, b, share, scales, newton).ok()?;
+        let g = test(&orbit);
+        let error = sensitivity(&orbit);
+        let done = g.abs() <= error || (sb - sa).abs() <= 1e-9;
         let side = if g * gb > 0.0 { 1 } else { -1 };
         if side > 0 {
-            (pb, gb) = (p, g);
+            (sb, gb) = (share, g);
             ga *= if last_side > 0 { 0.5 } else { 1.0 };
         } else {
-            (pa, ga) = (p, g);
+            (sa, ga) = (share, g);
             gb *= if last_side < 0 { 0.5 } else { 1.0 };
         }
         last_side = side;
+        if nearest.as_ref().is_none_or(|(_, _, best)| g.abs() < best.abs()) {
+            nearest = Some((orbit, share, g));
+        }
+        if done {
+            break;
+        }
     }
-    None
+    let (orbit, share, g) = nearest?;
+    let error = g.abs() + sensitivity(&orbit);
+    Some(Located { orbit, share, slope, error })
+}
+
+/// By how much a product of multipliers, or a modulus, may be off.
+fn sensitivity(orbit: &Orbit) -> f64 {
+    let others = orbit.multipliers.iter().map(|m| 1.0 + sqrt(m[0] * m[0] + m[1] * m[1])).product::<f64>();
+    orbit.multiplier_error * others * orbit.multipliers.len() as f64
+}
+
+/// The member at a share of the way from `a` to `b`.
+fn member(
+    map: &dyn ReturnMap,
+    a: &Orbit,
+    b: &Orbit,
+    share: f64,
+    scales: &Scales,
+    newton: Newton,
+) -> Result<Orbit, Trouble> {
+    let guess: Vec<f64> = a.point.iter().zip(&b.point).map(|(a, b)| a + share * (b - a)).collect();
+    let chord: Vec<f64> = a.point.iter().zip(&b.point).map(|(a, b)| (b - a) / scales.state).collect();
+    let along = (b.parameter - a.parameter) / scales.parameter;
+    let length = sqrt(chord.iter().map(|c| c * c).sum::<f64>() + along * along);
+    let chord: Vec<f64> = chord.iter().map(|c| c / length).collect();
+    let p = a.parameter + share * (b.parameter - a.parameter);
+    arclength(map, &guess, p, (&chord, along / length), scales, newton)
+}
+
+impl Located {
+    /// A change at which the parameter goes on in proportion to the test function.
+    fn transversal(self, change: Change) -> Bifurcation {
+        let p = self.orbit.parameter;
+        // Twice: the slope is that of a chord.
+        let uncertainty = 2.0 * self.error * self.slope.abs() + f64::EPSILON * p.abs();
+        Bifurcation { change, parameter: p, uncertainty }
+    }
+
+    /// A fold if the members on both sides are on one side in the parameter.
+    fn fold_or_branching(
+        self,
+        map: &dyn ReturnMap,
+        a: &Orbit,
+        b: &Orbit,
+        scales: &Scales,
+        newton: Newton,
+    ) -> Bifurcation {
+        let p = self.orbit.parameter;
+        let beside = |by: f64| member(map, a, b, self.share + by, scales, newton).map(|o| o.parameter - p);
+        let (Ok(before), Ok(after)) = (beside(-0.5), beside(0.5)) else {
+            return self.transversal(Change::Branching);
+        };
+        if before * after <= 0.0 {
+            return self.transversal(Change::Branching);
+        }
+        // The parameter is largest or smallest: what it is off by over half of the way, in proportion to the square of the share that is
+        // left of it; and by how much it moves with the error of the return.
+        let size = 0.5 * (before.abs() + after.abs());
+        let left = self.error / (2.0 * self.error + self.sway(a, b));
+        let delta = 1e-6 * scales.parameter;
+        let moved = |q: f64| map.returned(&self.orbit.point, q, false).map(|r| r.point);
+        let off = match (moved(p + delta), moved(p - delta), map.roughly(&self.orbit.point, p), moved(p)) {
+            (Ok(up), Ok(down), Ok(rough), Ok(fine)) => {
+                let gap = |a: &[f64], b: &[f64]| sqrt(a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum());
+                let moves = gap(&up, &down) / (2.0 * delta);
+                (self.orbit.residual + gap(&rough.point, &fine) + newton.error(&self.orbit.point)) / moves
+            }
+            _ => f64::INFINITY,
+        };
+        let uncertainty = 4.0 * size * left * left + 4.0 * off + 4.0 * f64::EPSILON * p.abs();
+        Bifurcation {
+            change: Change::Fold,
+            parameter: p,
+            uncertainty: if off.is_finite() { uncertainty } else { size },
+        }
+    }
+
+    /// By how much the product of multipliers less 1 changes over half of the way.
+    fn sway(&self, a: &Orbit, b: &Orbit) -> f64 {
+        0.5 * (product(a, 1.0) - product(b, 1.0)).abs()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn once(point: Vec<f64>, derivative: Vec<f64>) -> Returned {
+        Returned {
+            same: vec![point.clone()],
+            point,
+            time: 1.0,
+            derivative,
+            opposite: Vec::new(),
+            extent: 1.0,
+            passes: true,
+            derivative_error: 0.0,
+            events: 0,
+        }
+    }
 
     /// The logistic map x -> p x (1 - x), as if it were a return map of the plane where the second state is zero.
     struct Logistic;
@@ -430,10 +813,10 @@ mod tests {
         fn axis(&self) -> usize {
             1
         }
-        fn returned(&self, u: &[f64], p: f64, _: bool) -> Result<Returned, String> {
+        fn returned(&self, u: &[f64], p: f64, _: bool) -> Result<Returned, Trouble> {
             let (x, point) = (u[0], vec![p * u[0] * (1.0 - u[0]), 0.0]);
             let derivative = vec![p * (1.0 - 2.0 * x), 0.0, 0.0, 0.0];
-            Ok(Returned { point: point.clone(), time: 1.0, derivative, same: vec![point], opposite: Vec::new() })
+            Ok(once(point, derivative))
         }
     }
 
@@ -446,14 +829,14 @@ mod tests {
         fn axis(&self) -> usize {
             1
         }
-        fn returned(&self, u: &[f64], p: f64, _: bool) -> Result<Returned, String> {
+        fn returned(&self, u: &[f64], p: f64, _: bool) -> Result<Returned, Trouble> {
             let (x, point) = (u[0], vec![u[0] + p - u[0] * u[0], 0.0]);
             let derivative = vec![1.0 - 2.0 * x, 0.0, 0.0, 0.0];
-            Ok(Returned { point: point.clone(), time: 1.0, derivative, same: vec![point], opposite: Vec::new() })
+            Ok(once(point, derivative))
         }
     }
 
-    const NEWTON: Newton = Newton { closed: 1e-12, iterations: 20 };
+    const NEWTON: Newton = Newton { closed: 1e-12, atol: 0.0, rtol: 0.0, iterations: 20 };
 
     #[test]
     fn the_logistic_map_doubles_at_three() {
@@ -466,7 +849,7 @@ mod tests {
         let [doubling] = &branch.bifurcations[..] else { panic!("{:?}", branch.bifurcations) };
         assert!(doubling.change == Change::PeriodDoubling && (doubling.parameter - 3.0).abs() < 1e-7, "{doubling:?}");
         for o in &branch.orbits {
-            assert_eq!(o.attracts(), o.parameter < 3.0);
+            assert_eq!(o.stability() == Stability::Stable, o.parameter < 3.0);
         }
     }
 
@@ -486,7 +869,7 @@ mod tests {
     fn what_does_not_close_is_told() {
         // p above 4 and a start from which the map runs away: no fixed point is near.
         let error = closed_orbit(&FoldMap, &[0.3, 0.0], -1.0, NEWTON).unwrap_err();
-        assert!(error.contains("start"), "{error}");
+        assert!(error.said.contains("start"), "{error:?}");
     }
 
     /// Zeros of a function f(x, p), given with its slope in x, as closed orbits; not defined where it is `None`.
@@ -498,11 +881,11 @@ mod tests {
         fn axis(&self) -> usize {
             1
         }
-        fn returned(&self, u: &[f64], p: f64, _: bool) -> Result<Returned, String> {
+        fn returned(&self, u: &[f64], p: f64, _: bool) -> Result<Returned, Trouble> {
             let [f, slope] = (self.0)(u[0], p).ok_or("nothing there")?;
             let point = vec![u[0] + f, 0.0];
             let derivative = vec![1.0 + slope, 0.0, 0.0, 0.0];
-            Ok(Returned { point: point.clone(), time: 1.0, derivative, same: vec![point], opposite: Vec::new() })
+            Ok(once(point, derivative))
         }
     }
 
@@ -515,6 +898,9 @@ mod tests {
             multipliers: multipliers.to_vec(),
             residual: 0.0,
             iterations: 0,
+            extent: 1.0,
+            multiplier_error: 0.0,
+            events: 0,
             same: Vec::new(),
             opposite: Vec::new(),
         }
@@ -527,12 +913,12 @@ mod tests {
         assert!((rate(&[[2.4, 3.2], [2.4, -3.2]]).unwrap() + std::f64::consts::LN_2).abs() < 1e-15);
         // Neighbours that arrive in finite time have none.
         assert_eq!((rate(&[[0.0; 2]; 2]), rate(&[])), (None, None));
-        assert!(with(0.0, &[[0.6, 0.7]]).attracts() && !with(0.0, &[[0.6, -0.9]]).attracts());
+        assert_eq!(with(0.0, &[[0.6, 0.7]]).stability(), Stability::Stable);
+        assert_eq!(with(0.0, &[[0.6, -0.9]]).stability(), Stability::Unstable);
     }
 
     #[test]
     fn what_counts_as_closed() {
-        let newton = Newton { closed: 1e-9, iterations: 20 };
         let cases = [
             (1e-9, f64::INFINITY, true),
             (1.1e-9, 1.0, false),
@@ -542,7 +928,7 @@ mod tests {
             (1.1e-7, 1.1e-7, false),
         ];
         for (residual, before, want) in cases {
-            assert_eq!(settled(residual, before, newton), want, "{residual} {before}");
+            assert_eq!(settled(residual, before, 1e-9), want, "{residual} {before}");
         }
     }
 
@@ -557,14 +943,14 @@ mod tests {
             fn axis(&self) -> usize {
                 2
             }
-            fn returned(&self, u: &[f64], _: f64, _: bool) -> Result<Returned, String> {
+            fn returned(&self, u: &[f64], _: f64, _: bool) -> Result<Returned, Trouble> {
                 let point = vec![u[0] + 1.0, u[1] + 2.0, 0.0];
                 let derivative = vec![1e8 + 1.0, 1e8, 0.0, 1e8, 1e8 + 1.0 + 1.5e-8, 0.0, 0.0, 0.0, 0.0];
-                Ok(Returned { point, time: 1.0, derivative, same: Vec::new(), opposite: Vec::new() })
+                Ok(once(point, derivative))
             }
         }
         let error = closed_orbit(&Rounded, &[0.0; 3], 0.0, NEWTON).unwrap_err();
-        assert!(error.contains("multiplier 1"), "{error}");
+        assert!(error.said.contains("multiplier 1"), "{error:?}");
     }
 
     #[test]
@@ -578,12 +964,12 @@ mod tests {
             fn axis(&self) -> usize {
                 1
             }
-            fn returned(&self, u: &[f64], p: f64, _: bool) -> Result<Returned, String> {
-                let once = Logistic.returned(u, p, true)?;
-                let twice = Logistic.returned(&once.point, p, true)?;
-                let derivative = vec![once.derivative[0] * twice.derivative[0], 0.0, 0.0, 0.0];
-                let same = vec![once.point, twice.point.clone()];
-                Ok(Returned { point: twice.point, time: 2.0, derivative, same, opposite: Vec::new() })
+            fn returned(&self, u: &[f64], p: f64, _: bool) -> Result<Returned, Trouble> {
+                let first = Logistic.returned(u, p, true)?;
+                let twice = Logistic.returned(&first.point, p, true)?;
+                let derivative = vec![first.derivative[0] * twice.derivative[0], 0.0, 0.0, 0.0];
+                let same = vec![first.point, twice.point.clone()];
+                Ok(Returned { time: 2.0, same, ..once(twice.point, derivative) })
             }
         }
         let p = 3.2;
@@ -595,14 +981,15 @@ mod tests {
         for (got, want) in orbit.same.iter().zip(ends) {
             assert!((got[0] - want).abs() < 1e-11, "{orbit:?}");
         }
-        assert!((orbit.multipliers[0][0] - (4.0 + 2.0 * p - p * p)).abs() < 1e-10 && orbit.attracts(), "{orbit:?}");
+        assert!((orbit.multipliers[0][0] - (4.0 + 2.0 * p - p * p)).abs() < 1e-10, "{orbit:?}");
+        assert_eq!(orbit.stability(), Stability::Stable);
     }
 
     #[test]
     fn steps_along_a_straight_branch_are_as_long_as_they_should_be() {
         // x = p, from 1 to 5: of the state's scale 2 and the parameter's 4.
         let line = Zeros(|x: f64, p: f64| Some([0.5 * (p - x), -0.5]));
-        let first = closed_orbit(&line, &[1.0, 0.0], 1.0, NEWTON).unwrap();
+        let first = Orbit { extent: 2.0, ..closed_orbit(&line, &[1.0, 0.0], 1.0, NEWTON).unwrap() };
         let course = Course { from: 1.0, to: 5.0, longest: 0.1, most: 200, newton: NEWTON };
         let branch = follow(&line, first, &course, &mut |_| true);
         assert_eq!(branch.end, End::Reached);
@@ -631,7 +1018,7 @@ mod tests {
     fn a_circle_of_orbits_is_gone_around_by_quick_newton_iterations() {
         // x^2 + p^2 = 25 from (5, 0) by the fold at p = 5 to (-5, 0).
         let circle = Zeros(|x: f64, p: f64| Some([0.1 * (25.0 - x * x - p * p), -0.2 * x]));
-        let first = closed_orbit(&circle, &[4.9, 0.0], 0.0, NEWTON).unwrap();
+        let first = Orbit { extent: 6.0, ..closed_orbit(&circle, &[4.9, 0.0], 0.0, NEWTON).unwrap() };
         let course = Course { from: 0.0, to: 6.0, longest: 0.05, most: 400, newton: NEWTON };
         let branch = follow(&circle, first, &course, &mut |_| true);
         assert_eq!(branch.end, End::TurnedBack);
@@ -717,25 +1104,66 @@ mod tests {
 
     #[test]
     fn changes_lie_between_the_members_that_differ() {
-        let of = |m: &[[f64; 2]], n: &[[f64; 2]], folded| -> Vec<(Change, f64, f64)> {
-            // Where the map cannot tell where a multiplier passes -1, doublings too.
+        let scales = Scales { state: 1.0, parameter: 1.0 };
+        let of = |m: &[[f64; 2]], n: &[[f64; 2]]| -> Vec<(Change, f64)> {
+            // Where the map cannot tell where a multiplier passes the circle.
             let nothing = Zeros(|_: f64, _: f64| None);
-            let found = changes(&nothing, &with(3.0, m), &with(8.0, n), folded, NEWTON);
-            found.iter().map(|b| (b.change, b.parameter, b.uncertainty)).collect()
+            let found = changes(&nothing, &with(3.0, m), &with(8.0, n), &scales, NEWTON);
+            assert!(found.iter().all(|b| (b.uncertainty - 2.5).abs() < 1e-12), "{found:?}");
+            found.iter().map(|b| (b.change, b.parameter)).collect()
         };
-        let one = |change| vec![(change, 5.5, 2.5)];
-        assert_eq!(of(&[[-0.9, 0.0]], &[[-1.1, 0.0]], false), one(Change::PeriodDoubling));
-        assert_eq!(of(&[[0.9, 0.0]], &[[1.1, 0.0]], false), one(Change::Branching));
-        assert_eq!(of(&[[0.9, 0.0]], &[[1.1, 0.0]], true), one(Change::Fold));
+        let one = |change| vec![(change, 5.5)];
+        assert_eq!(of(&[[-0.9, 0.0]], &[[-1.1, 0.0]]), one(Change::PeriodDoubling));
+        assert_eq!(of(&[[0.9, 0.0]], &[[1.1, 0.0]]), one(Change::Branching));
         let pair = |a: f64, b: f64| [[a, b], [a, -b]];
-        assert_eq!(of(&pair(0.1, 0.9), &pair(0.1, 1.1), false), one(Change::Torus));
-        assert_eq!(of(&pair(0.7, 0.6), &pair(0.8, 0.7), false), one(Change::Torus));
-        assert_eq!(of(&pair(0.7, -0.6), &pair(0.7, -0.7), false), []);
+        assert_eq!(of(&pair(0.1, 0.9), &pair(0.1, 1.1)), one(Change::Torus));
+        assert_eq!(of(&pair(0.7, 0.6), &pair(0.8, 0.7)), one(Change::Torus));
+        assert_eq!(of(&pair(0.7, -0.6), &pair(0.7, -0.7)), []);
         // A complex pair beyond the circle is neither below -1 nor above 1, and real multipliers make no torus.
-        assert_eq!(of(&pair(1.2, 0.1), &pair(-1.2, 0.1), false), []);
-        assert_eq!(of(&[[0.9, 0.0], [0.5, 0.0]], &[[0.7, 0.0], [0.6, 0.0]], false), []);
-        let both = of(&[[-0.9, 0.0], [0.9, 0.0]], &[[-1.1, 0.0], [1.1, 0.0]], false);
+        assert_eq!(of(&pair(1.2, 0.1), &pair(-1.2, 0.1)), []);
+        assert_eq!(of(&[[0.9, 0.0], [0.5, 0.0]], &[[0.7, 0.0], [0.6, 0.0]]), []);
+        let both = of(&[[-0.9, 0.0], [0.9, 0.0]], &[[-1.1, 0.0], [1.1, 0.0]]);
         assert_eq!(both.iter().map(|b| b.0).collect::<Vec<_>>(), [Change::PeriodDoubling, Change::Branching]);
+        // Orbits with other events are told, whatever their multipliers.
+        let other = Orbit { events: 2, ..with(8.0, &[[-1.1, 0.0]]) };
+        let nothing = Zeros(|_: f64, _: f64| None);
+        let found = changes(&nothing, &with(3.0, &[[-0.9, 0.0]]), &other, &scales, NEWTON);
+        assert_eq!(found.iter().map(|b| b.change).collect::<Vec<_>>(), [Change::DiscontinuityInduced]);
+    }
+
+    /// A return map x -> x + f of loops as large as x, with a rest at 0 of the eigenvalues p +- i.
+    struct Shrinking;
+    impl ReturnMap for Shrinking {
+        fn states(&self) -> usize {
+            2
+        }
+        fn axis(&self) -> usize {
+            1
+        }
+        fn returned(&self, u: &[f64], p: f64, _: bool) -> Result<Returned, Trouble> {
+            let x = u[0];
+            let derivative = vec![1.0 + p - 3.0 * x * x, 0.0, 0.0, 0.0];
+            let time = std::f64::consts::TAU;
+            let point = vec![x + x * (p - x * x), 0.0];
+            Ok(Returned { extent: x.abs(), passes: x > 0.0, time, ..once(point, derivative) })
+        }
+        fn rest(&self, _: &[f64], p: f64) -> Option<(Vec<f64>, Vec<[f64; 2]>)> {
+            Some((vec![0.0; 2], vec![[p, 1.0], [p, -1.0]]))
+        }
+    }
+
+    #[test]
+    fn a_branch_ends_where_its_orbits_shrink_to_a_hopf_point() {
+        let first = closed_orbit(&Shrinking, &[0.7, 0.0], 0.5, NEWTON).unwrap();
+        for to in [-0.5, -3.0] {
+            let course = Course { from: 0.5, to, longest: 0.1, most: 200, newton: NEWTON };
+            let branch = follow(&Shrinking, first.clone(), &course, &mut |_| true);
+            assert_eq!(branch.end, End::Vanished);
+            assert!(branch.orbits.iter().all(|o| o.parameter > -1e-12 && o.point[0] > 0.0), "{branch:?}");
+            let [hopf] = &branch.bifurcations[..] else { panic!("{:?}", branch.bifurcations) };
+            assert!(hopf.change == Change::Hopf && hopf.parameter.abs() <= hopf.uncertainty, "{hopf:?}");
+            assert!(hopf.uncertainty < 1e-10, "{hopf:?}");
+        }
     }
 
     #[test]
@@ -743,18 +1171,21 @@ mod tests {
         // The multiplier is -p^9: regula falsi without the Illinois variant's halving would take hundreds of trials.
         let ninth = |p: f64| p * p * p * (p * p * p) * (p * p * p);
         let curved = Zeros(|x: f64, p: f64| Some([(-ninth(p) - 1.0) * x, -ninth(p) - 1.0]));
+        let scales = Scales { state: 1.0, parameter: 1.0 };
+        let doubling = |a: &Orbit, b: &Orbit| {
+            let at = locate(&curved, a, b, &scales, NEWTON, &|o| product(o, -1.0))?;
+            Some(at.transversal(Change::PeriodDoubling))
+        };
         let at = |p: f64| closed_orbit(&curved, &[0.0, 0.0], p, NEWTON).unwrap();
         for (a, b) in [(0.5, 3.0), (3.0, 0.5)] {
-            let found = doubling(&curved, &at(a), &at(b), NEWTON).unwrap();
-            assert_eq!(found.change, Change::PeriodDoubling);
-            // The multiplier is at the circle to 1e-7 and its slope there is 9.
-            assert!((found.parameter - 1.0).abs() < 1.2e-8 && found.uncertainty < 1.2e-8, "{found:?}");
+            let found = doubling(&at(a), &at(b)).unwrap();
+            assert!((found.parameter - 1.0).abs() <= found.uncertainty && found.uncertainty < 1e-8, "{found:?}");
         }
         // Both on one side: what another multiplier did is not this one's doing.
-        assert_eq!(doubling(&curved, &at(0.5), &at(0.9), NEWTON), None);
-        assert_eq!(doubling(&curved, &at(1.5), &at(1.1), NEWTON), None);
+        assert_eq!(doubling(&at(0.5), &at(0.9)), None);
+        assert_eq!(doubling(&at(1.5), &at(1.1)), None);
         // A member that lies on the change itself is where it is.
-        let found = doubling(&curved, &at(1.0), &at(1.25), NEWTON).unwrap();
+        let found = doubling(&at(1.0), &at(1.25)).unwrap();
         assert!((found.parameter - 1.0).abs() < 1e-12, "{found:?}");
     }
 }

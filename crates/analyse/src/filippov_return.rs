@@ -7,7 +7,7 @@
 
 use nalgebra::SVector;
 
-use super::floquet::{Plane, Returned, Settings};
+use super::floquet::{Extent, Plane, Returned, Settings};
 use twofold_integrate::filippov::{
     self, EventKind, ExitRule, FilippovError, FilippovObserver, Mode, ModeEvent, Side, SlidingFlow,
 };
@@ -69,10 +69,14 @@ struct Watch<const N: usize> {
     opposite: Vec<Vec<f64>>,
     itinerary: Itinerary,
     set_valued: Option<(f64, Vec<f64>)>,
+    /// The box around what was seen.
+    extent: Option<Extent<N>>,
 }
 
 impl<const N: usize> FilippovObserver<N> for Watch<N> {
     fn step(&mut self, mode: Mode, step: &Step<'_, N>) -> Flow {
+        let extent = self.extent.get_or_insert_with(|| Extent::new(&step.x0));
+        extent.add(|i| step.x1[i]);
         for p in self.passages.through_plane(step, self.plane.axis, self.plane.value) {
             let (t, x) = (step.time(p.theta), step.at(p.theta));
             if p.upward != self.plane.upward {
@@ -109,10 +113,15 @@ struct Plain<const N: usize> {
     itinerary: Itinerary,
     same: Vec<Vec<f64>>,
     opposite: Vec<Vec<f64>>,
+    extent: f64,
+    /// Largest component seen.
+    largest: f64,
+    passes: bool,
 }
 
-/// Differences are taken over this share of 1 + |u|, and over a tenth and a hundredth of it where neighbours have other events.
+/// Differences are taken over this share of the orbit's extent, and over a tenth and a hundredth of it where neighbours have other events.
 const DIFFERENCE: f64 = 1e-5;
+const SHARES: [f64; 3] = [1.0, 0.1, 0.01];
 
 /// The return from `u`, a point of `plane`, after `returns` passages in its direction, with the derivative of the return map if it is asked for.
 ///
@@ -131,15 +140,17 @@ where
     for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
 {
     let base = plain(system, plane, returns, u, settings)?;
-    let mut rows = Vec::new();
+    let (mut rows, mut derivative_error) = (Vec::new(), 0.0);
     if derivative {
         let grazes = base
             .itinerary
             .iter()
             .any(|(kind, ..)| *kind == std::mem::discriminant(&EventKind::Grazing { side: Side::Plus }));
-        let size = DIFFERENCE * (1.0 + u.amax());
-        let columns = [1.0, 0.1, 0.01].iter().find_map(|share| {
+        let size = DIFFERENCE * base.extent;
+        let columns = SHARES.iter().find_map(|share| {
             let delta = share * size;
+            // Some roundings of every component, over the difference.
+            derivative_error = 16.0 * f64::EPSILON * base.largest / delta;
             columns(system, plane, returns, u, settings, &base, delta).transpose()
         });
         rows = match columns {
@@ -153,6 +164,10 @@ where
         derivative: rows,
         same: base.same,
         opposite: base.opposite,
+        extent: base.extent,
+        passes: base.passes,
+        derivative_error,
+        events: base.itinerary.len(),
     })
 }
 
@@ -212,6 +227,7 @@ where
         opposite: Vec::new(),
         itinerary: Vec::new(),
         set_valued: None,
+        extent: None,
     };
     let mut seen = watch();
     let end = filippov::run(system, *u, settings.longest_return, &engine, rule, &mut seen)?.within_budget()?;
@@ -234,7 +250,15 @@ where
     let dt = (plane.value - landed.x[plane.axis]) / f[plane.axis];
     let mut point = landed.x + f * dt;
     point[plane.axis] = plane.value;
+    let side = match system.switching(u) {
+        h if h > 0.0 => system.plus(u),
+        h if h < 0.0 => system.minus(u),
+        _ => f,
+    };
     Ok(Plain {
+        largest: seen.extent.as_ref().map_or(0.0, Extent::largest),
+        extent: seen.extent.map_or(0.0, |e| e.diagonal()),
+        passes: (side[plane.axis] > 0.0) == plane.upward,
         point,
         time: landed.t + dt,
         itinerary: seen.itinerary,
@@ -308,8 +332,13 @@ mod tests {
             let system = Quintic { edge: lowest - below, of: 1 };
             return_map(&system, plane, 1, &SVector::from([-2.0, 0.0]), &settings(1e-12), derivative)
         };
-        // Neighbours at 3e-5, 3e-6 and 3e-7 come 24 times as much lower, and all cross the surface; the map itself is there.
-        assert_eq!(of(1e-7, true), Err(Error::Grazing { distance: 0.01 * (1e-5 * 3.0) }));
+        // Neighbours at 5e-5, 5e-6 and 5e-7 come 24 times as much lower, and all cross the surface; the map itself is there.
+        let Err(Error::Grazing { distance }) = of(1e-7, true) else { panic!("it grazes") };
+        // Two wide, and as high as from the lowest point to the highest, at s^2 = (15 + sqrt 145)/10.
+        let s2 = 0.1 * (15.0 + twofold_num::elementary::sqrt(145.0));
+        let highest = -twofold_num::elementary::sqrt(s2) * (s2 - 1.0) * (s2 - 4.0);
+        let extent = twofold_num::elementary::sqrt(4.0 + (highest - lowest) * (highest - lowest));
+        assert!((distance / (1e-7 * extent) - 1.0).abs() < 0.05, "{distance} {extent}");
         assert!(of(1e-7, false).is_ok());
         // The nearest two do not.
         let r = of(2e-5, true).unwrap();

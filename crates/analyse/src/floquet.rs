@@ -118,6 +118,34 @@ struct Return<const N: usize> {
     derivative: SMatrix<f64, N, N>,
     same: Vec<Vec<f64>>,
     opposite: Vec<Vec<f64>>,
+    extent: f64,
+    passes: bool,
+}
+
+/// The box around a stretch of an orbit.
+pub(super) struct Extent<const N: usize> {
+    low: SVector<f64, N>,
+    high: SVector<f64, N>,
+}
+
+impl<const N: usize> Extent<N> {
+    pub(super) fn new(x: &SVector<f64, N>) -> Self {
+        Self { low: *x, high: *x }
+    }
+
+    pub(super) fn add(&mut self, x: impl Fn(usize) -> f64) {
+        for i in 0..N {
+            (self.low[i], self.high[i]) = (self.low[i].min(x(i)), self.high[i].max(x(i)));
+        }
+    }
+
+    pub(super) fn largest(&self) -> f64 {
+        self.low.amax().max(self.high.amax())
+    }
+
+    pub(super) fn diagonal(&self) -> f64 {
+        (self.high - self.low).norm()
+    }
 }
 
 /// The closed orbit that crosses `plane` `returns` times per turn in its direction, by Newton's method from `guess` (its component
@@ -188,6 +216,14 @@ pub struct Returned {
     pub same: Vec<Vec<f64>>,
     /// Passages in the other direction.
     pub opposite: Vec<Vec<f64>>,
+    /// Diagonal of the box around the orbit up to there: the size of the loop.
+    pub extent: f64,
+    /// Whether the motion passes the plane in its direction at the start, too.
+    pub passes: bool,
+    /// The rounding error of the derivative, if it is one of differences.
+    pub derivative_error: f64,
+    /// Events on the way.
+    pub events: usize,
 }
 
 /// The return from `u`, a point of `plane`, after `returns` passages in its direction, with the derivative of the return map: `tangent` is an
@@ -206,10 +242,11 @@ pub fn return_map<const N: usize, const M: usize, T: VectorField<M>>(
     if returns == 0 {
         return Err(Error::NoReturns);
     }
-    let Return { point, time, derivative, same, opposite } =
+    let Return { point, time, derivative, same, opposite, extent, passes } =
         returned::<N, M, T>(tangent, plane, returns, *u, settings)?;
     let derivative = (0..N * N).map(|k| derivative[(k / N, k % N)]).collect();
-    Ok(Returned { point: Failure::state(&point), time, derivative, same, opposite })
+    let point = Failure::state(&point);
+    Ok(Returned { point, time, derivative, same, opposite, extent, passes, derivative_error: 0.0, events: 0 })
 }
 
 fn returned<const N: usize, const M: usize, T: VectorField<M>>(
@@ -226,6 +263,8 @@ fn returned<const N: usize, const M: usize, T: VectorField<M>>(
     let mut t = 0.0;
     let (mut same, mut opposite) = (Vec::new(), Vec::new());
     let mut passages = Passages::default();
+    let mut extent = Extent::new(&u);
+    let passes = (tangent.eval(&state)[plane.axis] > 0.0) == plane.upward;
     stepper.restart(tangent, t, state, settings.longest_return, settings.max_step)?;
     while t < settings.longest_return {
         let step = stepper.step(tangent)?;
@@ -233,6 +272,10 @@ fn returned<const N: usize, const M: usize, T: VectorField<M>>(
         let found = passages.through_plane(&step, plane.axis, plane.value);
         let found: Vec<_> = found.iter().map(|p| (step.time(p.theta), step.at(p.theta), p.upward)).collect();
         (t, state) = (step.t1, step.x1);
+        found.iter().for_each(|(_, x, _)| extent.add(|i| x[i]));
+        if found.is_empty() {
+            extent.add(|i| state[i]);
+        }
         for (tc, at, upward) in found {
             let x: Vec<f64> = at.iter().take(N).copied().collect();
             if upward != plane.upward {
@@ -268,7 +311,8 @@ fn returned<const N: usize, const M: usize, T: VectorField<M>>(
                 let column = |k: usize| landing[N * (j + 1) + k];
                 column(i) - f[i] / f[plane.axis] * column(plane.axis)
             });
-            return Ok(Return { point, time: tc + dt, derivative, same, opposite });
+            let extent = extent.diagonal();
+            return Ok(Return { point, time: tc + dt, derivative, same, opposite, extent, passes });
         }
     }
     let _ = state;

@@ -9,10 +9,11 @@ use serde_json::Value;
 use super::answer::{Answer, Stop};
 use super::desk::Desk;
 use super::question::{JobError, Question};
+use super::rest::{self, Rest};
 use super::run::Run;
 use super::spec::{Observation, RunSpec, SpecError, SwitchSpec};
 use super::table::{Column, Entry, Table};
-use twofold_analyse::branch::{self, Course, End, Newton, Orbit, ReturnMap};
+use twofold_analyse::branch::{self, Course, End, Newton, Obstacle, Orbit, ReturnMap, Trouble};
 use twofold_analyse::filippov_return;
 use twofold_analyse::floquet::{self, Plane, Returned};
 use twofold_integrate::filippov::SlidingFlow;
@@ -27,7 +28,8 @@ use twofold_system::{Bound, Field, System, VectorField};
 /// through crossings and sliding; grazing and set-valued orbits are refused (see [`filippov_return`]).
 ///
 /// Tables: `orbit` (its passages through the plane), `branch` (a row per orbit) and `bifurcations` if a parameter is followed. Facts: `period`,
-/// `multipliers` (real, imaginary), `largest_modulus`, `rate`, `residual`, `iterations`, `returns`, `point`; `end` of the branch.
+/// `multipliers` (real, imaginary), `multiplier_error`, `stability`, `largest_modulus`, `rate`, `residual`, `iterations`, `returns`, `point`; `end` of the branch.
+/// Where the motion comes to a rest: the table `rest` and the fact `rest` alone.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ClosedOrbit {
     /// The system.
@@ -65,9 +67,15 @@ pub struct Along {
     pub most: usize,
 }
 
-/// Largest |P(u) - u| that counts as closed, in tolerances; and never less than [`LEAST_CLOSED`].
+/// Largest |P(u) - u| that counts as closed, in relative tolerances of the orbit's extent; and never less than [`LEAST_CLOSED`].
 const CLOSED: f64 = 100.0;
 const LEAST_CLOSED: f64 = 1e-10;
+/// Returns from which the loop's size is taken: the first may have been computed with too large an error.
+const SIZINGS: usize = 2;
+/// A search that has come to a rest to this share of its way has found the rest.
+const AT_REST: f64 = 1e-3;
+/// The map that is computed less accurately has so many times the error.
+const ROUGHLY: f64 = 10.0;
 /// Newton iterations.
 const ITERATIONS: usize = 30;
 /// Most returns that are looked for in a settled motion.
@@ -100,14 +108,28 @@ impl Question for ClosedOrbit {
 
     fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
         self.validate()?;
-        let (guess, returns) = self.guess(desk)?;
-        let map = Map { question: self, returns, failure: RefCell::new(None) };
-        let newton = Newton {
-            closed: (CLOSED * self.tolerance.atol.max(self.tolerance.rtol)).max(LEAST_CLOSED),
-            iterations: ITERATIONS,
+        let (guess, returns) = match self.guess(desk)? {
+            Guess::Loop { point, returns } => (point, returns),
+            Guess::Rest(rest) => return Ok(self.at_rest(&rest)),
         };
         let value = self.along.as_ref().map_or(0.0, |a| a.from);
-        let first = branch::closed_orbit(&map, &guess, value, newton).map_err(|why| map.error(why))?;
+        let mut map = Map { question: self, returns, tolerance: self.tolerance, failure: RefCell::new(None) };
+        // The absolute error is one of the loop's size, whatever its unit.
+        for _ in 0..SIZINGS {
+            let Ok(r) = map.returned(&guess, value, false) else { break };
+            map.tolerance.atol = self.tolerance.atol.min(self.tolerance.rtol * r.extent).max(f64::MIN_POSITIVE);
+        }
+        let Tolerance { rtol, atol } = map.tolerance;
+        let newton = Newton { closed: (CLOSED * rtol).max(LEAST_CLOSED), atol, rtol, iterations: ITERATIONS };
+        let first = match branch::closed_orbit(&map, &guess, value, newton) {
+            Ok(first) => first,
+            Err(trouble) => {
+                return match self.rest_instead(&trouble, &guess, value)? {
+                    Some(rest) => Ok(self.at_rest(&rest)),
+                    None => Err(map.error(trouble.said)),
+                };
+            }
+        };
         let mut answer = self.facts(&first, returns);
         let Some(along) = &self.along else { return Ok(answer) };
         let course =
@@ -131,7 +153,35 @@ impl Question for ClosedOrbit {
     }
 }
 
+/// Where the motion from the start settles.
+#[derive(Clone, Debug, PartialEq)]
+enum Guess {
+    /// Where Newton's method begins, in the equation's states, and the number of returns.
+    Loop {
+        point: Vec<f64>,
+        returns: usize,
+    },
+    Rest(Rest),
+}
+
 impl ClosedOrbit {
+    /// The rest that the search came to, if it came to one.
+    fn rest_instead(&self, trouble: &Trouble, guess: &[f64], value: f64) -> Result<Option<Rest>, JobError> {
+        let Obstacle::Point(point) = &trouble.obstacle else { return Ok(None) };
+        let (system, switch) = self.at(value)?;
+        let apart = |a: &[f64], b: &[f64]| sqrt(a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum());
+        let there = |r: &Rest| apart(&r.state, point) <= AT_REST * apart(&r.state, guess).max(apart(point, guess));
+        Ok(rest::near(&system, switch, point).filter(there))
+    }
+
+    /// The answer where there is a rest and no closed orbit.
+    fn at_rest(&self, rest: &Rest) -> Answer {
+        let columns = self.names().into_iter().map(|n| Column::numbers(&n)).collect::<Vec<_>>();
+        let mut table = Table::new("rest", columns);
+        table.push(rest.state.iter().map(|x| Entry::Number(*x)));
+        Answer::of_tables(vec![table]).with_fact("rest", rest)
+    }
+
     fn validate(&self) -> Result<(), JobError> {
         let wrong = |field, value: String, rule| Err(SpecError { field, value, rule }.into());
         let n = self.system.dimension();
@@ -196,8 +246,7 @@ impl ClosedOrbit {
         Ok((system, self.switch))
     }
 
-    /// Where Newton's method begins, in the equation's states, and the number of returns.
-    fn guess(&self, desk: &Desk<'_>) -> Result<(Vec<f64>, usize), JobError> {
+    fn guess(&self, desk: &Desk<'_>) -> Result<Guess, JobError> {
         let (system, switch) = self.at(self.along.as_ref().map_or(0.0, |a| a.from))?;
         let mut point = self.start.clone();
         let mut returns = self.returns;
@@ -218,9 +267,12 @@ impl ClosedOrbit {
                 schedule: Schedule::default(),
                 observe: Observation::Section { coordinate: self.plane.axis, value: self.plane.value },
             };
-            let settled = desk.ask(&Run(spec))?;
+            let settled = desk.ask(&Run(spec.clone()))?;
             if settled.stop == Stop::Interrupted {
                 return Err(JobError::Interrupted);
+            }
+            if let Some(rest) = rest::at_end(desk, &spec, &settled)? {
+                return Ok(Guess::Rest(rest));
             }
             let section = settled.table("section").ok_or_else(|| JobError::Other("a section was asked for".into()))?;
             let columns: Vec<&[f64]> = system.coordinates().iter().map(|name| section.numbers(name)).collect();
@@ -250,7 +302,7 @@ impl ClosedOrbit {
             Program::new(&system.tape().select([0])).evaluate(&point, &mut h);
             point.push(if h[0] > 0.0 { 1.0 } else { 0.0 });
         }
-        Ok((point, returns.unwrap_or(1)))
+        Ok(Guess::Loop { point, returns: returns.unwrap_or(1) })
     }
 
     /// States of the equation: a hysteretic switch has one more.
@@ -281,6 +333,8 @@ impl ClosedOrbit {
             .with_fact("point", &orbit.point)
             .with_fact("multipliers", &orbit.multipliers)
             .with_fact("largest_modulus", &orbit.largest_modulus())
+            .with_fact("multiplier_error", &orbit.multiplier_error)
+            .with_fact("stability", &orbit.stability())
             .with_fact("rate", &orbit.rate())
             .with_fact("residual", &orbit.residual)
             .with_fact("iterations", &orbit.iterations)
@@ -297,8 +351,7 @@ impl ClosedOrbit {
             .chain(numbered.map(|n| Column::numbers(&n)));
         let mut table = Table::new("branch", columns);
         for o in orbits {
-            let stability = if o.attracts() { "stable" } else { "unstable" };
-            let mut row: Vec<Entry> = vec![o.parameter.into(), o.period.into(), stability.into()];
+            let mut row: Vec<Entry> = vec![o.parameter.into(), o.period.into(), o.stability().word().into()];
             row.extend(o.point.iter().map(|x| Entry::Number(*x)));
             row.extend(
                 (0..multipliers).flat_map(|k| o.multipliers.get(k).map_or([f64::NAN; 2], |m| *m).map(Entry::Number)),
@@ -313,8 +366,21 @@ impl ClosedOrbit {
 struct Map<'a> {
     question: &'a ClosedOrbit,
     returns: usize,
+    tolerance: Tolerance,
     /// An error of the question that a return met: the words of the search do not hide it.
     failure: RefCell<Option<JobError>>,
+}
+
+/// Why a return was not computed.
+enum Failed {
+    Job(JobError),
+    Trouble(Trouble),
+}
+
+impl From<JobError> for Failed {
+    fn from(error: JobError) -> Self {
+        Self::Job(error)
+    }
 }
 
 impl Map<'_> {
@@ -323,13 +389,23 @@ impl Map<'_> {
     }
 
     /// By the variational equation.
-    fn smooth<const N: usize, const M: usize>(&self, field: &Field, u: &[f64]) -> Result<Returned, JobError> {
-        let tangent = field.variational(N).bind::<M>()?;
-        let u = SVector::<f64, N>::from_column_slice(u);
-        let found = floquet::return_map::<N, M, _>(&tangent, self.question.plane, self.returns, &u, &self.settings());
-        found.map_err(|error| match error {
-            floquet::Error::Integration(failure) => JobError::Other(without_tangents(failure, N).to_string()),
-            other => JobError::Other(other.to_string()),
+    fn smooth<const N: usize, const M: usize>(
+        &self,
+        field: &Field,
+        u: &[f64],
+        settings: &floquet::Settings,
+    ) -> Result<Returned, Failed> {
+        let tangent = field.variational(N).bind::<M>().map_err(JobError::from)?;
+        let start = SVector::<f64, N>::from_column_slice(u);
+        let found = floquet::return_map::<N, M, _>(&tangent, self.question.plane, self.returns, &start, settings);
+        found.map_err(|error| {
+            let (obstacle, said) = match error {
+                floquet::Error::Integration(failure) => (Obstacle::Other, without_tangents(failure, N).to_string()),
+                // From a rest, or beside one: whether it is, is looked at elsewhere.
+                floquet::Error::NoReturn { .. } => (Obstacle::Point(u.to_vec()), error.to_string()),
+                _ => (Obstacle::Other, error.to_string()),
+            };
+            Failed::Trouble(Trouble { obstacle, said })
         })
     }
 
@@ -338,38 +414,45 @@ impl Map<'_> {
         &self,
         system: &System,
         u: &[f64],
+        settings: &floquet::Settings,
         derivative: bool,
-    ) -> Result<Returned, JobError>
+    ) -> Result<Returned, Failed>
     where
         for<'b> SlidingFlow<'b, Bound<N>, N>: VectorField<M>,
     {
-        let u = SVector::<f64, N>::from_column_slice(u);
-        let system = system.bind::<N>()?;
-        filippov_return::return_map(&system, self.question.plane, self.returns, &u, &self.settings(), derivative)
-            .map_err(|e| JobError::Other(e.to_string()))
+        let start = SVector::<f64, N>::from_column_slice(u);
+        let system = system.bind::<N>().map_err(JobError::from)?;
+        let found =
+            filippov_return::return_map(&system, self.question.plane, self.returns, &start, settings, derivative);
+        found.map_err(|error| {
+            let obstacle = match error {
+                filippov_return::Error::Grazing { .. } => Obstacle::Grazing,
+                filippov_return::Error::SetValued { .. } => Obstacle::SetValued,
+                filippov_return::Error::NoReturn { .. } => Obstacle::Point(u.to_vec()),
+                _ => Obstacle::Other,
+            };
+            Failed::Trouble(Trouble { obstacle, said: error.to_string() })
+        })
     }
 
-    fn settings(&self) -> floquet::Settings {
-        floquet::Settings {
-            tolerance: self.question.tolerance,
-            longest_return: self.question.longest_return,
-            ..floquet::Settings::default()
-        }
+    fn settings(&self, tolerance: Tolerance) -> floquet::Settings {
+        floquet::Settings { tolerance, longest_return: self.question.longest_return, ..floquet::Settings::default() }
     }
 
-    fn find(&self, u: &[f64], p: f64, derivative: bool) -> Result<Returned, JobError> {
+    fn find(&self, u: &[f64], p: f64, tolerance: Tolerance, derivative: bool) -> Result<Returned, Failed> {
+        let settings = &self.settings(tolerance);
         let (system, switch) = self.question.at(p)?;
         let field = match switch {
             SwitchSpec::Filippov { .. } => {
                 return match u.len() {
-                    2 => self.discontinuous::<2, 3>(&system, u, derivative),
-                    3 => self.discontinuous::<3, 4>(&system, u, derivative),
-                    4 => self.discontinuous::<4, 5>(&system, u, derivative),
-                    5 => self.discontinuous::<5, 6>(&system, u, derivative),
-                    6 => self.discontinuous::<6, 7>(&system, u, derivative),
-                    7 => self.discontinuous::<7, 8>(&system, u, derivative),
-                    8 => self.discontinuous::<8, 9>(&system, u, derivative),
-                    n => Err(JobError::Other(format!("no closed orbits with {n} states"))),
+                    2 => self.discontinuous::<2, 3>(&system, u, settings, derivative),
+                    3 => self.discontinuous::<3, 4>(&system, u, settings, derivative),
+                    4 => self.discontinuous::<4, 5>(&system, u, settings, derivative),
+                    5 => self.discontinuous::<5, 6>(&system, u, settings, derivative),
+                    6 => self.discontinuous::<6, 7>(&system, u, settings, derivative),
+                    7 => self.discontinuous::<7, 8>(&system, u, settings, derivative),
+                    8 => self.discontinuous::<8, 9>(&system, u, settings, derivative),
+                    n => Err(JobError::Other(format!("no closed orbits with {n} states")).into()),
                 };
             }
             SwitchSpec::Smoothed { eps, transition } => Field::smoothed(&system, transition, eps),
@@ -378,15 +461,15 @@ impl Map<'_> {
             }
         };
         match u.len() {
-            2 => self.smooth::<2, 6>(&field, u),
-            3 => self.smooth::<3, 12>(&field, u),
-            4 => self.smooth::<4, 20>(&field, u),
-            5 => self.smooth::<5, 30>(&field, u),
-            6 => self.smooth::<6, 42>(&field, u),
-            7 => self.smooth::<7, 56>(&field, u),
-            8 => self.smooth::<8, 72>(&field, u),
-            9 => self.smooth::<9, 90>(&field, u),
-            n => Err(JobError::Other(format!("no closed orbits with {n} states"))),
+            2 => self.smooth::<2, 6>(&field, u, settings),
+            3 => self.smooth::<3, 12>(&field, u, settings),
+            4 => self.smooth::<4, 20>(&field, u, settings),
+            5 => self.smooth::<5, 30>(&field, u, settings),
+            6 => self.smooth::<6, 42>(&field, u, settings),
+            7 => self.smooth::<7, 56>(&field, u, settings),
+            8 => self.smooth::<8, 72>(&field, u, settings),
+            9 => self.smooth::<9, 90>(&field, u, settings),
+            n => Err(JobError::Other(format!("no closed orbits with {n} states")).into()),
         }
     }
 }
@@ -406,6 +489,28 @@ fn without_tangents(mut failure: Failure, states: usize) -> Failure {
     failure
 }
 
+impl Map<'_> {
+    fn tried(&self, u: &[f64], p: f64, tolerance: Tolerance, derivative: bool) -> Result<Returned, Trouble> {
+        if !u.iter().all(|x| x.is_finite()) {
+            return Err(format!(
+                "the search left the finite numbers; start nearer ({})",
+                Failure::NotFinite { t: 0.0, state: u.to_vec() }
+            )
+            .into());
+        }
+        self.find(u, p, tolerance, derivative).map_err(|failed| match failed {
+            Failed::Trouble(trouble) => trouble,
+            Failed::Job(error) => {
+                let said = error.to_string();
+                if !matches!(error, JobError::Other(_)) {
+                    *self.failure.borrow_mut() = Some(error);
+                }
+                said.into()
+            }
+        })
+    }
+}
+
 impl ReturnMap for Map<'_> {
     fn states(&self) -> usize {
         self.question.states()
@@ -415,20 +520,18 @@ impl ReturnMap for Map<'_> {
         self.question.plane.axis
     }
 
-    fn returned(&self, u: &[f64], p: f64, derivative: bool) -> Result<Returned, String> {
-        if !u.iter().all(|x| x.is_finite()) {
-            return Err(format!(
-                "the search left the finite numbers; start nearer ({})",
-                Failure::NotFinite { t: 0.0, state: u.to_vec() }
-            ));
-        }
-        self.find(u, p, derivative).map_err(|error| {
-            let said = error.to_string();
-            if !matches!(error, JobError::Other(_)) {
-                *self.failure.borrow_mut() = Some(error);
-            }
-            said
-        })
+    fn returned(&self, u: &[f64], p: f64, derivative: bool) -> Result<Returned, Trouble> {
+        self.tried(u, p, self.tolerance, derivative)
+    }
+
+    fn roughly(&self, u: &[f64], p: f64) -> Result<Returned, Trouble> {
+        let Tolerance { rtol, atol } = self.tolerance;
+        self.tried(u, p, Tolerance { rtol: ROUGHLY * rtol, atol: ROUGHLY * atol }, true)
+    }
+
+    fn rest(&self, u: &[f64], p: f64) -> Option<(Vec<f64>, Vec<[f64; 2]>)> {
+        let (system, switch) = self.question.at(p).ok()?;
+        rest::near(&system, switch, u).map(|r| (r.state, r.eigenvalues))
     }
 }
 
@@ -628,7 +731,10 @@ mod tests {
             let start = vec![4.0 * 0.5_f64.cos(), -4.0 * 0.5_f64.sin(), 1.0, 0.0];
             let settle = 1.0 + 2.0 * PI * (passages - 1.0);
             let question = ClosedOrbit { settle, start, ..question(system, SwitchSpec::tanh(1e-2), 1) };
-            question.guess(&Desk::quiet()).unwrap()
+            match question.guess(&Desk::quiet()).unwrap() {
+                Guess::Loop { point, returns } => (point, returns),
+                Guess::Rest(rest) => panic!("{rest:?}"),
+            }
         };
         for (apart, returns) in [(4.5e-3, 3), (5.5e-3, 1)] {
             let (point, found) = guess(apart, 6.0);
@@ -660,7 +766,8 @@ mod tests {
         for (x, phi) in [(0.5, 1.0), (-0.5, 0.0), (0.0, 0.0)] {
             let mut question = question(circle(3), switches()[1], 1);
             (question.start, question.plane.value) = (vec![x, 7.0, 8.0], 2.0);
-            assert_eq!(question.guess(&Desk::quiet()).unwrap(), (vec![x, 2.0, 8.0, phi], 1));
+            let guess = Guess::Loop { point: vec![x, 2.0, 8.0, phi], returns: 1 };
+            assert_eq!(question.guess(&Desk::quiet()).unwrap(), guess);
             assert_eq!((question.states(), question.names()), (4, ["x", "y", "a1", "phi"].map(String::from).to_vec()));
         }
         let phi = question(cases::smooth(&["x", "phi"], "x", &["phi", "-x"]), switches()[1], 1);

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use serde_json::json;
 
+use crate::analyse::branch::Stability;
 use crate::analyse::floquet::Plane;
 use crate::cli::ending;
 use crate::cli::exit::part_of;
@@ -12,6 +13,7 @@ use crate::cli::progress::Progress;
 use crate::cli::speak::{Delivery, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::job::orbit::Along;
+use crate::job::rest::{Rest, Stability as RestStability};
 use crate::job::spec::Observation;
 use crate::job::{Answer, ClosedOrbit, Desk, JobError, Question, Stop, encode};
 
@@ -155,6 +157,9 @@ fn along(text: &str) -> Result<Along, CliError> {
 /// The answer for people.
 fn text(question: &ClosedOrbit, answer: &Answer) -> Result<String, CliError> {
     let fact = |e| CliError::Job(JobError::Fact(e));
+    if answer.facts.contains_key("rest") {
+        return Ok(at_rest(question, &answer.fact("rest").map_err(fact)?));
+    }
     let period: f64 = answer.fact("period").map_err(fact)?;
     let point: Vec<f64> = answer.fact("point").map_err(fact)?;
     let multipliers: Vec<[f64; 2]> = answer.fact("multipliers").map_err(fact)?;
@@ -174,14 +179,20 @@ fn text(question: &ClosedOrbit, answer: &Answer) -> Result<String, CliError> {
     );
     line("period", format!("{period}"));
     line("point", names.iter().zip(&point).map(|(n, x)| format!("{n} = {x}")).collect::<Vec<_>>().join(", "));
-    let said = |m: &[f64; 2]| if m[1] == 0.0 { format!("{:.9}", m[0]) } else { format!("{:.9} {:+.9} i", m[0], m[1]) };
-    line("multipliers", multipliers.iter().map(said).collect::<Vec<_>>().join(", "));
+    let error: f64 = answer.fact("multiplier_error").map_err(fact)?;
+    line("multipliers", format!("{}, each +- {error:.1e}", complex(&multipliers)));
     line(
         "stability",
-        match rate {
-            None => "attracts in finite time (all multipliers are zero)".into(),
-            Some(rate) if rate > 0.0 => format!("attracts, by {rate:.6e} per unit time in the end"),
-            Some(rate) => format!("repels, by {:.6e} per unit time", -rate),
+        match (answer.fact::<Stability>("stability").map_err(fact)?, rate) {
+            (Stability::NotIsolated, _) => {
+                "neutral: a multiplier is 1 within its error; the orbit is not isolated, or at a fold".into()
+            }
+            (Stability::Neutral, _) => {
+                "neutral: a multiplier is on the unit circle within its error; linear terms do not decide".into()
+            }
+            (Stability::Stable, None) => "attracts in finite time (all multipliers are zero)".into(),
+            (Stability::Stable, Some(rate)) => format!("attracts, by {rate:.6e} per unit time in the end"),
+            (Stability::Unstable, rate) => format!("repels, by {:.6e} per unit time", -rate.unwrap_or(f64::NAN)),
         },
     );
     if let (Some(along), Some(branch)) = (&question.along, answer.table("branch")) {
@@ -203,12 +214,38 @@ fn text(question: &ClosedOrbit, answer: &Answer) -> Result<String, CliError> {
     Ok(out)
 }
 
+fn complex(numbers: &[[f64; 2]]) -> String {
+    let said = |m: &[f64; 2]| if m[1] == 0.0 { format!("{:.9}", m[0]) } else { format!("{:.9} {:+.9} i", m[0], m[1]) };
+    numbers.iter().map(said).collect::<Vec<_>>().join(", ")
+}
+
+/// The rest for people.
+fn at_rest(question: &ClosedOrbit, rest: &Rest) -> String {
+    let names = question.system.coordinates();
+    let state = names.iter().zip(&rest.state).map(|(n, x)| format!("{n} = {x}")).collect::<Vec<_>>().join(", ");
+    let stability = match (rest.stability, rest.rate()) {
+        (RestStability::Attracts, Some(rate)) => format!("attracts, by {rate:.6e} per unit time in the end"),
+        (RestStability::Attracts, None) => "attracts in finite time".into(),
+        (RestStability::Repels, Some(rate)) if rate < 0.0 => format!("repels, by {:.6e} per unit time", -rate),
+        (RestStability::Repels, _) => "repels".into(),
+        (RestStability::Neutral, _) => "neutral: linear terms do not decide".into(),
+    };
+    let numbers = if rest.eigenvalues.is_empty() { "none".into() } else { complex(&rest.eigenvalues) };
+    format!(
+        "{:<13} {state}\n{:<13} {numbers}\n{:<13} {stability}\nThe motion comes to a rest: there is no closed orbit near.\n",
+        rest.word(),
+        "eigenvalues",
+        "stability"
+    )
+}
+
 fn ended(answer: &Answer, name: &str) -> String {
     use crate::analyse::branch::End;
     match answer.fact::<End>("end") {
         Ok(End::Reached) => "the range's other end".into(),
         Ok(End::TurnedBack) => format!("it turned back and left the range of {name} where it came in"),
         Ok(End::Enough) => format!("{MOST_ORBITS} orbits"),
+        Ok(End::Vanished) => "the orbit shrinks to a point".into(),
         Ok(End::Lost(why)) => format!("it cannot be followed further: {why}"),
         Ok(End::Interrupted) => "interrupted".into(),
         Err(e) => e.to_string(),
