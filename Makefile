@@ -65,31 +65,31 @@ C := figures/census
 A := figures/audit
 census: ## go on with the census, the audit and the basins (hours; Ctrl-C keeps what is finished, and the next call goes on)
 	@$(CARGO) build --release --locked --bin twofold
-	@$(SWEEP) --t-end 1e4 --method dopri5 --over start.x=-60..60:25 --over start.y=0 --over start.z=-60..60:25 --out figures/basin/printed.parquet
-	@$(SWEEP) --t-end 1e4 --method dopri5 --reading reconstructed --over start.x=-3..3:25 --over start.y=0 --over start.z=-3..3:25 --out figures/basin/reconstructed.parquet
-	@$(SWEEP) --t-end 2e5 $(READINGS) $(INTERVALS) $(STARTS) --random 300 --out $(C)/fig7.parquet
-	@$(SWEEP) --t-end 2e5 $(READINGS) $(SIGMAS) $(STARTS) --random 300 --out $(C)/fig8.parquet
-	@$(SWEEP) $(PRINTED) $(METHODS) $(STARTS) --random 100 --out $(C)/methods-printed.parquet
-	@$(SWEEP) $(RECONSTRUCTED) $(METHODS) $(STARTS) --random 24 --out $(C)/methods.parquet
-	@$(SWEEP) $(PRINTED) $(TOLERANCES) $(STARTS) --random 28 --out $(C)/tolerances-printed.parquet
-	@$(SWEEP) $(RECONSTRUCTED) $(TOLERANCES) $(STARTS) --random 21 --out $(C)/tolerances.parquet
-	@$(SWEEP) $(TIGHT) $(PRINTED) $(STARTS) --random 30 --out $(C)/tight-printed.parquet
-	@$(SWEEP) $(TIGHT) $(RECONSTRUCTED) $(STARTS) --random 12 --out $(C)/tight.parquet
-	@$(SWEEP) --t-end 5e3 $(PRINTED) --restart 100 $(STARTS) --random 100 --out $(C)/ordinary-printed.parquet
-	@$(SWEEP) --t-end 2e4 $(RECONSTRUCTED) --restart 100 $(STARTS) --random 100 --out $(C)/ordinary-reconstructed.parquet
-	@$(SWEEP) --t-end 5e3 $(PRINTED) $(TAYLOR) $(STARTS) --random 100 --out $(C)/taylor-printed.parquet
-	@$(SWEEP) --t-end 2e4 $(RECONSTRUCTED) $(TAYLOR) $(STARTS) --random 100 --out $(C)/taylor-reconstructed.parquet
-	@$(SWEEP) --t-end 5e3 $(PRINTED) $(EXTENDED) $(STARTS) --random 12 --out $(C)/extended-printed.parquet
-	@$(SWEEP) --t-end 2e4 $(RECONSTRUCTED) $(EXTENDED) $(STARTS) --random 6 --out $(C)/extended-reconstructed.parquet
-	@$(SWEEP) --t-end 2e5 $(ALPHA) $(INTERVALS) $(STARTS) --random 30 --out $(A)/alpha7.parquet
-	@$(SWEEP) --t-end 2e5 $(ALPHA) $(SIGMAS) $(STARTS) --random 30 --out $(A)/alpha8.parquet
-	@$(SWEEP) --t-end 2e5 $(BETA) $(INTERVALS) $(STARTS) --random 30 --out $(A)/beta7.parquet
-	@$(SWEEP) --t-end 2e5 $(BETA) $(SIGMAS) $(STARTS) --random 30 --out $(A)/beta8.parquet
-	@$(SWEEP) --t-end 2e5 $(ALPHAS) $(HYSTERETIC) $(STARTS) --random 12 --out $(A)/alpha9.parquet
-	@$(SWEEP) --t-end 2e5 $(BETA) $(HYSTERETIC) $(STARTS) --random 12 --out $(A)/beta9.parquet
-	@$(SWEEP) --t-end 2e5 --method dopri5 $(CELLS) $(INTERVALS) $(STARTS) --random 6 --out $(A)/fig7.parquet
-	@$(SWEEP) --t-end 2e5 --method dopri5 $(CELLS) $(SIGMAS) $(STARTS) --random 6 --out $(A)/fig8.parquet
-	@$(SWEEP) --t-end 2e5 --method dopri5 $(HYSTERETIC) $(CELLS) $(STARTS) --random 2 --out $(A)/fig9.parquet
+	@$(SWEEP) --t-end 1e4 --method dopri5 --over start.x=-60..60:25 --over start.y=0 --over start.z=-60..60:25 --out figures/basin/printed.csv
+	@$(SWEEP) --t-end 1e4 --method dopri5 --reading reconstructed --over start.x=-3..3:25 --over start.y=0 --over start.z=-3..3:25 --out figures/basin/reconstructed.csv
+	@$(SWEEP) --t-end 2e5 $(READINGS) $(INTERVALS) $(STARTS) --random 300 --out $(C)/fig7.csv
+	@$(SWEEP) --t-end 2e5 $(READINGS) $(SIGMAS) $(STARTS) --random 300 --out $(C)/fig8.csv
+	@$(SWEEP) $(PRINTED) $(METHODS) $(STARTS) --random 100 --out $(C)/methods-printed.csv
+	@$(SWEEP) $(RECONSTRUCTED) $(METHODS) $(STARTS) --random 24 --out $(C)/methods.csv
+	@$(SWEEP) $(PRINTED) $(TOLERANCES) $(STARTS) --random 28 --out $(C)/tolerances-printed.csv
+	@$(SWEEP) $(RECONSTRUCTED) $(TOLERANCES) $(STARTS) --random 21 --out $(C)/tolerances.csv
+	@$(SWEEP) $(TIGHT) $(PRINTED) $(STARTS) --random 30 --out $(C)/tight-printed.csv
+	@$(SWEEP) $(TIGHT) $(RECONSTRUCTED) $(STARTS) --random 12 --out $(C)/tight.csv
+	@$(SWEEP) --t-end 5e3 $(PRINTED) --restart 100 $(STARTS) --random 100 --out $(C)/ordinary-printed.csv
+	@$(SWEEP) --t-end 2e4 $(RECONSTRUCTED) --restart 100 $(STARTS) --random 100 --out $(C)/ordinary-reconstructed.csv
+	@$(SWEEP) --t-end 5e3 $(PRINTED) $(TAYLOR) $(STARTS) --random 100 --out $(C)/taylor-printed.csv
+	@$(SWEEP) --t-end 2e4 $(RECONSTRUCTED) $(TAYLOR) $(STARTS) --random 100 --out $(C)/taylor-reconstructed.csv
+	@$(SWEEP) --t-end 5e3 $(PRINTED) $(EXTENDED) $(STARTS) --random 12 --out $(C)/extended-printed.csv
+	@$(SWEEP) --t-end 2e4 $(RECONSTRUCTED) $(EXTENDED) $(STARTS) --random 6 --out $(C)/extended-reconstructed.csv
+	@$(SWEEP) --t-end 2e5 $(ALPHA) $(INTERVALS) $(STARTS) --random 30 --out $(A)/alpha7.csv
+	@$(SWEEP) --t-end 2e5 $(ALPHA) $(SIGMAS) $(STARTS) --random 30 --out $(A)/alpha8.csv
+	@$(SWEEP) --t-end 2e5 $(BETA) $(INTERVALS) $(STARTS) --random 30 --out $(A)/beta7.csv
+	@$(SWEEP) --t-end 2e5 $(BETA) $(SIGMAS) $(STARTS) --random 30 --out $(A)/beta8.csv
+	@$(SWEEP) --t-end 2e5 $(ALPHAS) $(HYSTERETIC) $(STARTS) --random 12 --out $(A)/alpha9.csv
+	@$(SWEEP) --t-end 2e5 $(BETA) $(HYSTERETIC) $(STARTS) --random 12 --out $(A)/beta9.csv
+	@$(SWEEP) --t-end 2e5 --method dopri5 $(CELLS) $(INTERVALS) $(STARTS) --random 6 --out $(A)/fig7.csv
+	@$(SWEEP) --t-end 2e5 --method dopri5 $(CELLS) $(SIGMAS) $(STARTS) --random 6 --out $(A)/fig8.csv
+	@$(SWEEP) --t-end 2e5 --method dopri5 $(HYSTERETIC) $(CELLS) $(STARTS) --random 2 --out $(A)/fig9.csv
 
 .PHONY: returns
 returns: ## how many orbits that leave the repelling sliding region come back to the two-fold (minutes)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compute a sweep on HyperQueue: tasks are `twofold sweep ... --shard K/N --resume`, submitted again until each is done, then merged.
 
-    hq_sweep.py --server-dir DIR --parts 1000 --out map.parquet -- --t-end 2e5 --over params.alpha=1e-3..1:log:1000 ...
+    hq_sweep.py --server-dir DIR --parts 1000 --out map.csv -- --t-end 2e5 --over params.alpha=1e-3..1:log:1000 ...
 
 What follows -- are flags of `twofold sweep`. A part that was finished earlier is not computed again, so a driver, a worker or a whole
 cluster that was killed is started again with the same line.
@@ -39,7 +39,7 @@ class Parts:
         self.folder.mkdir(parents=True, exist_ok=True)
 
     def file(self, k: int) -> Path:
-        return self.folder / f"{k}.parquet"
+        return self.folder / f"{k}.csv"
 
     def unfinished(self) -> list[int]:
         # A part whose rows failed is finished: they are rows that say why. So files count, not exit codes.

@@ -93,7 +93,7 @@ def main() -> int:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     chance = random.Random(2013)
-    single, merged = folder / "single.parquet", folder / "merged.parquet"
+    single, merged = folder / "single.csv", folder / "merged.csv"
     started = time.time()
     subprocess.run([twofold, "sweep", *SWEEP, "--quiet", "--out", str(single)], check=True)
     print(f"single process: {time.time() - started:.0f} s, sha256 {digest(single)}", flush=True)
@@ -116,7 +116,7 @@ def main() -> int:
         return killed
 
     def finished() -> int:
-        return sum(1 for k in range(1, PARTS + 1) if (folder / f"merged.parquet.parts/{k}.parquet").exists())
+        return sum(1 for k in range(1, PARTS + 1) if (folder / f"merged.csv.parts/{k}.csv").exists())
 
     first = Cluster(folder / "first")
     run = begin(first)

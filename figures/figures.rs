@@ -49,7 +49,7 @@ figures! {
     basin: "basin/figure.rs", "basin/expected.json";
 }
 
-/// The sweeps whose rows are committed beside a figure: name and content of each Parquet file. Empty for figures that compute all they show.
+/// The sweeps whose rows are committed beside a figure: name and content of each CSV file. Empty for figures that compute all they show.
 pub fn data(id: &str) -> &'static [(&'static str, &'static [u8])] {
     match id {
         "census" => census::DATA,

@@ -3,7 +3,7 @@
 
 use twofold::job::spec::{FunnelSpec, Observation, RunSpec, SwitchSpec};
 use twofold::job::sweep::Rows;
-use twofold::job::{encode, parquet, simulate, store};
+use twofold::job::{encode, simulate, store};
 use twofold::paper::checkpoints::Checkpoints;
 use twofold::record::{Hash, Manifest};
 use twofold::render::{decode_png, png_size, read_provenance};
@@ -21,12 +21,11 @@ fn said<T, E: std::fmt::Display>(found: &Result<T, E>) -> String {
 }
 
 /// All of them, by name.
-pub const TARGETS: [(&str, Target); 10] = [
+pub const TARGETS: [(&str, Target); 9] = [
     ("spec", spec),
     ("system", system),
     ("manifest", manifest),
     ("csv", csv),
-    ("parquet", parquet),
     ("png", png),
     ("svg", picture),
     ("pdf", picture),
@@ -111,17 +110,6 @@ pub fn csv(bytes: &[u8]) -> String {
     }
     let lines: Vec<String> = text(bytes).unwrap_or_default().lines().map(str::to_owned).collect();
     format!("{} {} {}", said(&table), said(&Rows::from_csv(bytes)), said(&Rows::from_journal(&lines)))
-}
-
-/// A table as Parquet.
-pub fn parquet(bytes: &[u8]) -> String {
-    let table = parquet::from_parquet(bytes);
-    if let Ok((heading, table)) = &table {
-        let written = parquet::parquet(table, &heading.about);
-        let (_, again) = parquet::from_parquet(&written).expect("what is written can be read");
-        assert_eq!(encode::bits(&[again]), encode::bits(std::slice::from_ref(table)));
-    }
-    format!("{} {}", said(&table), said(&Rows::from_parquet(bytes)))
 }
 
 /// A picture: what it says of itself.

@@ -11,7 +11,7 @@
 set -u
 seconds=${1:-60}
 [ $# -eq 0 ] || shift
-[ $# -gt 0 ] || set -- spec system manifest csv parquet png svg pdf store certificate
+[ $# -gt 0 ] || set -- spec system manifest csv png svg pdf store certificate
 work=$PWD/target/fuzz-coverage
 only=${ONLY:-}
 mkdir -p "$work"
@@ -30,7 +30,7 @@ fi
 longest() {
     case $1 in
         spec | system | store) echo 16384 ;;
-        csv | parquet) echo 32768 ;;
+        csv) echo 32768 ;;
         *) echo 65536 ;;
     esac
 }

@@ -69,30 +69,30 @@ echo "kill -9 while making $figures ($length ms undisturbed): $killed killed, $f
 
 # A sweep keeps its finished rows in a journal, and goes on from there: killed until it is through, it makes the bytes of an undisturbed one.
 sweep="sweep --runs 160 --t-end 400 --threads 2 --quiet"
-"$program" $sweep --out "$work/whole.parquet" || complain "the undisturbed sweep"
+"$program" $sweep --out "$work/whole.csv" || complain "the undisturbed sweep"
 begun=$(date +%s%N)
 "$program" $sweep --out "$work/whole.csv" || complain "the undisturbed sweep"
 length=$((($(date +%s%N) - begun) / 1000000))
 killed=0 rounds=0 resumed=0
 while [ "$killed" -lt "$kills" ]; do
     rounds=$((rounds + 1))
-    rm -f "$work/cut.parquet" "$work/cut.parquet.journal"
+    rm -f "$work/cut.csv" "$work/cut.csv.journal"
     # At most so many kills a round: each leaves more rows behind, and then it finishes.
     k=0
     while [ "$k" -lt 6 ]; do
         k=$((k + 1))
         next
-        "$program" $sweep --resume --out "$work/cut.parquet" &
+        "$program" $sweep --resume --out "$work/cut.csv" &
         id=$!
         sleep "$(awk "BEGIN { print $((random / 65536 % (length / 2 + 20))) / 1000 }")"
         kill -KILL "$id" 2>/dev/null && killed=$((killed + 1))
         wait "$id" 2>/dev/null
-        [ -e "$work/cut.parquet" ] && break
+        [ -e "$work/cut.csv" ] && break
     done
-    [ -e "$work/cut.parquet.journal" ] && resumed=$((resumed + $(wc -l < "$work/cut.parquet.journal") - 1))
-    "$program" $sweep --resume --out "$work/cut.parquet" || complain "the sweep after the kills of round $rounds"
-    cmp -s "$work/cut.parquet" "$work/whole.parquet" || complain "the sweep of round $rounds differs"
-    [ ! -e "$work/cut.parquet.journal" ] || complain "the journal of round $rounds stays"
+    [ -e "$work/cut.csv.journal" ] && resumed=$((resumed + $(wc -l < "$work/cut.csv.journal") - 1))
+    "$program" $sweep --resume --out "$work/cut.csv" || complain "the sweep after the kills of round $rounds"
+    cmp -s "$work/cut.csv" "$work/whole.csv" || complain "the sweep of round $rounds differs"
+    [ ! -e "$work/cut.csv.journal" ] || complain "the journal of round $rounds stays"
 done
 echo "kill -9 of a sweep ($length ms undisturbed): $killed killed in $rounds sweeps, $resumed rows were taken from journals, every sweep came to the same bytes"
 

@@ -18,7 +18,7 @@ fn figures() -> std::io::Result<String> {
     // Pages and comparisons are made of answers; hashes are what answers are compared with.
     let above = ["crates/paper/src/report/", "crates/paper/src/compare/"];
     sources.add(root, "crates/paper/src", |file| !above.iter().any(|a| file.starts_with(a)))?;
-    let inputs = [".rs", ".parquet", ".csv", ".toml"];
+    let inputs = [".rs", ".csv", ".toml"];
     sources.add(root, "figures", |file| inputs.iter().any(|e| file.ends_with(e)) && !file.ends_with("/main.rs"))?;
     Ok(sources.digest())
 }

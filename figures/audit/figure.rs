@@ -19,21 +19,21 @@ use twofold::render::style;
 /// What is made for this figure: fig. 7's intervals, fig. 8's sigmas and fig. 9's hysteretic switch over alpha and beta, Dormand-Prince at NDSolve's
 /// tolerance; and the candidates, one exponent changed, by LSODA as the figures are.
 pub const DATA: &[(&str, &[u8])] = &[
-    ("fig7.parquet", include_bytes!("fig7.parquet")),
-    ("fig8.parquet", include_bytes!("fig8.parquet")),
-    ("fig9.parquet", include_bytes!("fig9.parquet")),
-    ("alpha7.parquet", include_bytes!("alpha7.parquet")),
-    ("alpha8.parquet", include_bytes!("alpha8.parquet")),
-    ("beta7.parquet", include_bytes!("beta7.parquet")),
-    ("beta8.parquet", include_bytes!("beta8.parquet")),
-    ("alpha9.parquet", include_bytes!("alpha9.parquet")),
-    ("beta9.parquet", include_bytes!("beta9.parquet")),
+    ("fig7.csv", include_bytes!("fig7.csv")),
+    ("fig8.csv", include_bytes!("fig8.csv")),
+    ("fig9.csv", include_bytes!("fig9.csv")),
+    ("alpha7.csv", include_bytes!("alpha7.csv")),
+    ("alpha8.csv", include_bytes!("alpha8.csv")),
+    ("beta7.csv", include_bytes!("beta7.csv")),
+    ("beta8.csv", include_bytes!("beta8.csv")),
+    ("alpha9.csv", include_bytes!("alpha9.csv")),
+    ("beta9.csv", include_bytes!("beta9.csv")),
 ];
 
 /// The printed and the reconstructed numbers of figs 7 and 8 are the census'.
 const CENSUS: [(&str, &[u8]); 2] = [
-    ("../census/fig7.parquet", include_bytes!("../census/fig7.parquet")),
-    ("../census/fig8.parquet", include_bytes!("../census/fig8.parquet")),
+    ("../census/fig7.csv", include_bytes!("../census/fig7.csv")),
+    ("../census/fig8.csv", include_bytes!("../census/fig8.csv")),
 ];
 
 /// The committed content of a file.
@@ -43,7 +43,7 @@ fn committed(name: &str) -> Result<Vec<u8>, JobError> {
 }
 
 fn table_of(bytes: &[u8]) -> Result<Table, JobError> {
-    Rows::from_parquet(bytes).map(|rows| rows.table()).map_err(|e| JobError::Other(format!("the audit's data: {e}")))
+    Rows::from_csv(bytes).map(|rows| rows.table()).map_err(|e| JobError::Other(format!("the audit's data: {e}")))
 }
 
 /// The candidates for what was meant, the printed numbers first: with as many runs of each panel for all, because fewer runs leave more room for what did
@@ -65,9 +65,9 @@ pub fn candidates_in(read: &dyn Fn(&str) -> Result<Vec<u8>, JobError>) -> Result
     let tables =
         |names: &[&str]| -> Result<Vec<Table>, JobError> { names.iter().map(|name| table_of(&read(name)?)).collect() };
     let sweeps = [
-        tables(&["../census/fig7.parquet", "alpha7.parquet", "beta7.parquet"])?,
-        tables(&["../census/fig8.parquet", "alpha8.parquet", "beta8.parquet"])?,
-        tables(&["alpha9.parquet", "beta9.parquet"])?,
+        tables(&["../census/fig7.csv", "alpha7.csv", "beta7.csv"])?,
+        tables(&["../census/fig8.csv", "alpha8.csv", "beta8.csv"])?,
+        tables(&["alpha9.csv", "beta9.csv"])?,
     ];
     let rules = &claims().rules;
     let all = audit::cells(&sweeps, audit::ALL, rules);
@@ -87,7 +87,7 @@ pub fn candidates_in(read: &dyn Fn(&str) -> Result<Vec<u8>, JobError>) -> Result
 const READINGS: [[f64; 2]; 2] = [[1e-3, 1e-5], [1e-1, 1e-5]];
 
 fn tables() -> Result<Vec<Table>, JobError> {
-    let [fig7, fig8, fig9] = ["fig7.parquet", "fig8.parquet", "fig9.parquet"].map(|name| table_of(&committed(name)?));
+    let [fig7, fig8, fig9] = ["fig7.csv", "fig8.csv", "fig9.csv"].map(|name| table_of(&committed(name)?));
     let cells = audit::cells(&[vec![fig7?], vec![fig8?], vec![fig9?]], audit::ALL, &claims().rules);
     Ok(vec![audit::cell_table(&cells), audit::candidate_table(&candidates()?[0])])
 }

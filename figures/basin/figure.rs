@@ -13,11 +13,11 @@ use twofold::render::sheet::*;
 use twofold::render::style;
 
 /// Starts on a square of the plane y = 0, followed to the same time.
-const PRINTED: &[u8] = include_bytes!("printed.parquet");
-const RECONSTRUCTED: &[u8] = include_bytes!("reconstructed.parquet");
+const PRINTED: &[u8] = include_bytes!("printed.csv");
+const RECONSTRUCTED: &[u8] = include_bytes!("reconstructed.csv");
 
 /// Both, under the files' names.
-pub const DATA: &[(&str, &[u8])] = &[("printed.parquet", PRINTED), ("reconstructed.parquet", RECONSTRUCTED)];
+pub const DATA: &[(&str, &[u8])] = &[("printed.csv", PRINTED), ("reconstructed.csv", RECONSTRUCTED)];
 
 /// Colours of the kinds, in the order of `Kind::ALL`.
 const COLOURS: [Colour; 6] = [style::BLUE, style::GREEN, style::SKY, style::VERMILLION, style::INK, style::FAINT];
@@ -30,7 +30,7 @@ fn data(reading: Reading) -> &'static [u8] {
 }
 
 fn tables(reading: Reading) -> Result<Vec<Table>, JobError> {
-    let rows = Rows::from_parquet(data(reading)).map_err(|e| JobError::Other(format!("the basin's data: {e}")))?;
+    let rows = Rows::from_csv(data(reading)).map_err(|e| JobError::Other(format!("the basin's data: {e}")))?;
     let end = rows.sweep().run().t_end;
     let table = rows.table();
     let mut found =

@@ -18,20 +18,20 @@ use twofold::render::style;
 /// tolerances; fig. 7(iii) to a shorter time by LSODA, and by the layer-resolved Taylor method with local errors of 1e-15, and of 1e-20 in double-double
 /// arithmetic.
 pub const DATA: &[(&str, &[u8])] = &[
-    ("fig7.parquet", include_bytes!("fig7.parquet")),
-    ("fig8.parquet", include_bytes!("fig8.parquet")),
-    ("methods-printed.parquet", include_bytes!("methods-printed.parquet")),
-    ("methods.parquet", include_bytes!("methods.parquet")),
-    ("tolerances-printed.parquet", include_bytes!("tolerances-printed.parquet")),
-    ("tolerances.parquet", include_bytes!("tolerances.parquet")),
-    ("tight-printed.parquet", include_bytes!("tight-printed.parquet")),
-    ("tight.parquet", include_bytes!("tight.parquet")),
-    ("ordinary-printed.parquet", include_bytes!("ordinary-printed.parquet")),
-    ("ordinary-reconstructed.parquet", include_bytes!("ordinary-reconstructed.parquet")),
-    ("taylor-printed.parquet", include_bytes!("taylor-printed.parquet")),
-    ("taylor-reconstructed.parquet", include_bytes!("taylor-reconstructed.parquet")),
-    ("extended-printed.parquet", include_bytes!("extended-printed.parquet")),
-    ("extended-reconstructed.parquet", include_bytes!("extended-reconstructed.parquet")),
+    ("fig7.csv", include_bytes!("fig7.csv")),
+    ("fig8.csv", include_bytes!("fig8.csv")),
+    ("methods-printed.csv", include_bytes!("methods-printed.csv")),
+    ("methods.csv", include_bytes!("methods.csv")),
+    ("tolerances-printed.csv", include_bytes!("tolerances-printed.csv")),
+    ("tolerances.csv", include_bytes!("tolerances.csv")),
+    ("tight-printed.csv", include_bytes!("tight-printed.csv")),
+    ("tight.csv", include_bytes!("tight.csv")),
+    ("ordinary-printed.csv", include_bytes!("ordinary-printed.csv")),
+    ("ordinary-reconstructed.csv", include_bytes!("ordinary-reconstructed.csv")),
+    ("taylor-printed.csv", include_bytes!("taylor-printed.csv")),
+    ("taylor-reconstructed.csv", include_bytes!("taylor-reconstructed.csv")),
+    ("extended-printed.csv", include_bytes!("extended-printed.csv")),
+    ("extended-reconstructed.csv", include_bytes!("extended-reconstructed.csv")),
 ];
 
 /// Files of the shorter runs, and how they were computed: in words, and in a picture.
@@ -45,7 +45,7 @@ const SHORTER: [(&str, &str, &str); 3] = [
 const COLOURS: [Colour; 6] = [style::BLUE, style::GREEN, style::SKY, style::VERMILLION, style::INK, style::FAINT];
 
 fn rows_of(bytes: &[u8]) -> Result<Rows, JobError> {
-    Rows::from_parquet(bytes).map_err(|e| JobError::Other(format!("the census' data: {e}")))
+    Rows::from_csv(bytes).map_err(|e| JobError::Other(format!("the census' data: {e}")))
 }
 
 /// The committed content of a file.
@@ -87,20 +87,15 @@ pub fn found_in(reading: Reading, read: &dyn Fn(&str) -> Result<Vec<u8>, JobErro
     let mut shorter = Vec::new();
     for (file, name, _) in SHORTER {
         for reading in Reading::ALL {
-            let rows = rows_of(&read(&format!("{file}-{}.parquet", reading.word()))?)?;
+            let rows = rows_of(&read(&format!("{file}-{}.csv", reading.word()))?)?;
             shorter.push(Shorter { name, end: rows.sweep().run().t_end, table: rows.table() });
         }
     }
     let data = Data {
-        fig7: table("fig7.parquet")?,
-        fig8: table("fig8.parquet")?,
-        methods: tables(&["methods-printed.parquet", "methods.parquet"])?,
-        tolerances: tables(&[
-            "tolerances-printed.parquet",
-            "tolerances.parquet",
-            "tight-printed.parquet",
-            "tight.parquet",
-        ])?,
+        fig7: table("fig7.csv")?,
+        fig8: table("fig8.csv")?,
+        methods: tables(&["methods-printed.csv", "methods.csv"])?,
+        tolerances: tables(&["tolerances-printed.csv", "tolerances.csv", "tight-printed.csv", "tight.csv"])?,
         shorter,
     };
     Ok(Found::of(reading, &data, &claims().rules))

@@ -10,7 +10,7 @@ use crate::job::sweep::Rows;
 use crate::record::Journal;
 use crate::record::files::write;
 
-/// Computes every row of these Parquet files (name, content) anew and compares it with the committed one. What was computed is kept in
+/// Computes every row of these CSV files (name, content) anew and compares it with the committed one. What was computed is kept in
 /// `folder` under the same names, with a journal until a file is whole, from which the next call goes on.
 ///
 /// # Errors
@@ -21,7 +21,7 @@ pub fn recompute(data: &[(&str, &[u8])], folder: &Path, threads: usize, progress
     let mut otherwise = Vec::new();
     for (name, bytes) in data {
         let unusable = |e: &dyn std::fmt::Display| CliError::Usage(format!("{name}: {e}"));
-        let committed = Rows::from_parquet(bytes).map_err(|e| unusable(&e))?;
+        let committed = Rows::from_csv(bytes).map_err(|e| unusable(&e))?;
         let file = folder.join(name);
         let (mut journal, lines) = Journal::open(&journal_of(&file))?;
         let mut rows = Rows::of(committed.sweep().clone());
@@ -48,7 +48,7 @@ pub fn recompute(data: &[(&str, &[u8])], folder: &Path, threads: usize, progress
             );
             return Err(CliError::Stopped { said, exit });
         }
-        write(&file, &rows.parquet())?;
+        write(&file, &rows.csv())?;
         journal.remove()?;
         otherwise.extend(
             committed

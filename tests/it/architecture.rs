@@ -16,7 +16,7 @@ const CRATES: [(&str, &[&str], &[&str]); 10] = [
     ("integrate", &["num", "system"], &[]),
     ("rigor", &["num", "system", "integrate"], &[]),
     ("analyse", &["num", "system", "integrate", "rigor"], &[]),
-    ("job", &["num", "system", "integrate", "rigor", "analyse"], &["csv", "parquet", "bytes", "zmij"]),
+    ("job", &["num", "system", "integrate", "rigor", "analyse"], &["csv", "zmij"]),
     ("render", &["num"], &["plotters", "plotters-backend", "tiny-skia", "pdf-writer", "png", "miniz_oxide"]),
     ("paper", &["num", "system", "integrate", "rigor", "analyse", "job", "render"], &["base64", "percent-encoding"]),
 ];

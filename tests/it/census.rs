@@ -27,7 +27,7 @@ fn on_disk(folder: &str) -> impl Fn(&str) -> Result<Vec<u8>, JobError> {
 }
 
 fn rows(name: &str) -> Rows {
-    Rows::from_parquet(&fs::read(path(name)).unwrap()).unwrap()
+    Rows::from_csv(&fs::read(path(name)).unwrap()).unwrap()
 }
 
 /// The rows' run is that of the figure's panels, but for what is varied; starts stay within the rules' shift.
@@ -35,7 +35,7 @@ fn rows(name: &str) -> Rows {
 fn the_sweeps_are_those_of_the_figures() {
     let all = figures::all();
     for (id, column) in [("fig7", "interval"), ("fig8", "sigma")] {
-        let rows = rows(&format!("figures/census/{id}.parquet"));
+        let rows = rows(&format!("figures/census/{id}.csv"));
         let figure = all.iter().find(|f| f.id == id).unwrap();
         let panels: Vec<_> = figure.pictures.iter().flat_map(|p| &p.panels).collect();
         let axes: Vec<String> = rows.sweep().axes().iter().map(|a: &Axis| a.coordinate.to_string()).collect();
@@ -82,7 +82,7 @@ fn make_census_goes_on_with_what_is_committed() {
             }
         }
         let name = name.unwrap_or_else(|| panic!("{line} names no file"));
-        let part = folder.path().join("part.parquet");
+        let part = folder.path().join("part.csv");
         let run = Command::new(env!("CARGO_BIN_EXE_twofold"))
             .arg("sweep")
             .args(kept)
@@ -91,7 +91,7 @@ fn make_census_goes_on_with_what_is_committed() {
             .output()
             .unwrap();
         assert!(run.status.success(), "{name}: {}", String::from_utf8_lossy(&run.stderr));
-        let asked = Rows::from_parquet(&fs::read(&part).unwrap()).unwrap();
+        let asked = Rows::from_csv(&fs::read(&part).unwrap()).unwrap();
         assert_eq!(asked.len(), 0);
         assert!(asked.sweep() == rows(name).sweep(), "make census asks for another sweep than {name} holds");
         found.push(name.to_owned());
@@ -101,7 +101,7 @@ fn make_census_goes_on_with_what_is_committed() {
         .iter()
         .flat_map(|figure| fs::read_dir(root.join("figures").join(figure)).unwrap())
         .map(|entry| entry.unwrap().path().strip_prefix(root).unwrap().display().to_string())
-        .filter(|name| name.ends_with(".parquet"))
+        .filter(|name| name.ends_with(".csv"))
         .collect();
     committed.sort();
     assert_eq!(found, committed);
@@ -111,10 +111,10 @@ fn make_census_goes_on_with_what_is_committed() {
 #[test]
 fn committed_rows_come_out_the_same() {
     for (name, wanted) in [
-        ("figures/census/fig7.parquet", vec![0, 7]),
-        ("figures/census/fig8.parquet", vec![1, 8]),
-        ("figures/basin/printed.parquet", vec![0, 312, 320]),
-        ("figures/basin/reconstructed.parquet", vec![5, 312]),
+        ("figures/census/fig7.csv", vec![0, 7]),
+        ("figures/census/fig8.csv", vec![1, 8]),
+        ("figures/basin/printed.csv", vec![0, 312, 320]),
+        ("figures/basin/reconstructed.csv", vec![5, 312]),
     ] {
         let rows = rows(name);
         for number in wanted {
@@ -131,7 +131,11 @@ fn the_page_says_what_the_census_says() {
     let page = fs::read_to_string(path("docs/census.md")).unwrap();
     let (_, rest) = page.split_once(census::BEGIN).expect("the page has a place for the census");
     let (said, _) = rest.split_once(census::END).expect("its text about the census ends");
-    assert!(said.trim() == text.trim(), "docs/census.md does not say what figures/census says:\n{}\n\n{text}\n", census::BEGIN);
+    assert!(
+        said.trim() == text.trim(),
+        "docs/census.md does not say what figures/census says:\n{}\n\n{text}\n",
+        census::BEGIN
+    );
 }
 
 #[test]
@@ -141,7 +145,11 @@ fn the_page_says_what_the_audit_says() {
     let page = fs::read_to_string(path("docs/census.md")).unwrap();
     let (_, rest) = page.split_once(audit::BEGIN).expect("the page has a place for the audit");
     let (said, _) = rest.split_once(audit::END).expect("its text about the audit ends");
-    assert!(said.trim() == text.trim(), "docs/census.md does not say what figures/audit says:\n{}\n\n{text}\n", audit::BEGIN);
+    assert!(
+        said.trim() == text.trim(),
+        "docs/census.md does not say what figures/audit says:\n{}\n\n{text}\n",
+        audit::BEGIN
+    );
 }
 
 #[test]
@@ -182,15 +190,15 @@ fn a_sweep_is_gone_on_with_for_more_draws() {
             .unwrap();
         (run.status.code(), String::from_utf8(run.stderr).unwrap())
     };
-    assert_eq!(sweep("2", "grown.parquet", &[]).0, Some(0));
-    assert_eq!(sweep("5", "whole.parquet", &[]).0, Some(0));
-    let (code, said) = sweep("5", "grown.parquet", &["--resume"]);
+    assert_eq!(sweep("2", "grown.csv", &[]).0, Some(0));
+    assert_eq!(sweep("5", "whole.csv", &[]).0, Some(0));
+    let (code, said) = sweep("5", "grown.csv", &["--resume"]);
     assert!(code == Some(0) && said.contains("4 rows are there, 6 to compute"), "{said}");
     let bytes = |name: &str| fs::read(folder.path().join(name)).unwrap();
-    assert!(bytes("grown.parquet") == bytes("whole.parquet"));
-    let (code, said) = sweep("3", "whole.parquet", &["--resume"]);
+    assert!(bytes("grown.csv") == bytes("whole.csv"));
+    let (code, said) = sweep("3", "whole.csv", &["--resume"]);
     assert!(code == Some(2) && said.contains("different sweeps"), "{said}");
-    assert!(bytes("grown.parquet") == bytes("whole.parquet"));
+    assert!(bytes("grown.csv") == bytes("whole.csv"));
 }
 
 /// A small sweep, two of whose three rows are there: what is committed need not be whole.
@@ -222,32 +230,32 @@ fn planted(line: &str) -> String {
 fn rows_that_come_out_the_same_pass_and_others_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let progress = Progress::new(true);
-    let committed = small(30.0).parquet();
+    let committed = small(30.0).csv();
     // Into a folder that is not there yet.
     let new = folder.path().join("figures").join("census");
-    recompute(&[("a.parquet", &committed)], &new, 1, &progress).unwrap();
-    assert_eq!(std::fs::read(new.join("a.parquet")).unwrap(), committed);
-    assert!(!journal_of(&new.join("a.parquet")).exists());
+    recompute(&[("a.csv", &committed)], &new, 1, &progress).unwrap();
+    assert_eq!(std::fs::read(new.join("a.csv")).unwrap(), committed);
+    assert!(!journal_of(&new.join("a.csv")).exists());
 
     // The same sweep with one row that ends elsewhere.
     let mut journal = small(30.0).journal();
     journal[2] = planted(&journal[2]);
     let forged = Rows::from_journal(&journal).unwrap();
-    let error = recompute(&[("b.parquet", &forged.parquet())], folder.path(), 1, &progress).unwrap_err();
+    let error = recompute(&[("b.csv", &forged.csv())], folder.path(), 1, &progress).unwrap_err();
     assert_eq!(error.exit(), Exit::CheckFailed);
     let text = error.to_string();
-    assert!(text.starts_with("1 committed rows") && text.contains("row 1 of b.parquet"), "{text}");
+    assert!(text.starts_with("1 committed rows") && text.contains("row 1 of b.csv"), "{text}");
 }
 
 #[test]
 fn a_journal_is_gone_on_with() {
     let folder = tempfile::tempdir().unwrap();
     let whole = small(30.0);
-    let (mut journal, _) = Journal::open(&journal_of(&folder.path().join("a.parquet"))).unwrap();
+    let (mut journal, _) = Journal::open(&journal_of(&folder.path().join("a.csv"))).unwrap();
     // A row that no computation gives: it stays, so it was not computed again.
     journal.append(&whole.journal_heading()).unwrap();
     journal.append(&planted(&whole.journal()[1])).unwrap();
     drop(journal);
-    let error = recompute(&[("a.parquet", &whole.parquet())], folder.path(), 1, &Progress::new(true)).unwrap_err();
-    assert!(error.to_string().contains("row 0 of a.parquet"), "{error}");
+    let error = recompute(&[("a.csv", &whole.csv())], folder.path(), 1, &Progress::new(true)).unwrap_err();
+    assert!(error.to_string().contains("row 0 of a.csv"), "{error}");
 }

@@ -130,7 +130,7 @@ fn numbers_go_into_files_that_are_named_for_them() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let run = ["run", "--quiet", "--system", "stick-slip", "--t-end", "3"];
-    for format in ["csv", "json", "parquet"] {
+    for format in ["csv", "json"] {
         let (named, asked) = (format!("named.{format}"), format!("asked-{format}"));
         good(at, &[&run[..], &["--out", &named]].concat());
         good(at, &[&run[..], &["--format", format, "--out", &asked]].concat());
@@ -146,7 +146,7 @@ fn numbers_go_into_files_that_are_named_for_them() {
         (&[&run[..], &["--format", "json"]].concat(), "a.csv", "the name says csv, but json is asked for"),
         (&scan, "a.svg", "`twofold scan --plot`"),
         (&scan, "a.json", "what is written is csv"),
-        (&sweep, "a.pdf", "csv or json or parquet"),
+        (&sweep, "a.pdf", "csv or json"),
         (&[&sweep[..], &["--json"]].concat(), "a.parquet", "the name says parquet"),
         (&orbit, "a.parquet", "text or csv or json"),
         (&exponent, "a.csv", "text or json"),

@@ -426,9 +426,9 @@ fn a_killed_sweep_goes_on_to_the_same_bytes() {
         let done = twofold(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
         assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
     };
-    let whole = file("whole.parquet");
+    let whole = file("whole.csv");
     run(&["--out", &whole]);
-    let cut = file("cut.parquet");
+    let cut = file("cut.csv");
     let arguments = sweep(&["--out", &cut]);
     for _ in 0..3 {
         let resumed: Vec<&str> = arguments.iter().map(String::as_str).chain(["--resume"]).collect();
@@ -439,11 +439,11 @@ fn a_killed_sweep_goes_on_to_the_same_bytes() {
     }
     run(&["--out", &cut, "--resume"]);
     assert!(fs::read(&whole).unwrap() == fs::read(&cut).unwrap());
-    let (a, b, c) = (file("a.csv"), file("b.parquet"), file("c.parquet"));
+    let (a, b, c) = (file("a.csv"), file("b.csv"), file("c.csv"));
     run(&["--out", &a, "--shard", "1/3"]);
     run(&["--out", &b, "--shard", "2/3"]);
     run(&["--out", &c, "--shard", "3/3"]);
-    let merged = file("merged.parquet");
+    let merged = file("merged.csv");
     assert_eq!(twofold(&["sweep", "merge", &c, &a, &b, "--out", &merged, "--quiet"]).status.code(), Some(0));
     assert!(fs::read(&whole).unwrap() == fs::read(&merged).unwrap());
     // Another sweep's file is refused.

@@ -53,7 +53,7 @@ const TABLE: &[(&str, &str, &[&str])] = &[
     (
         "",
         "run --system stick-slip --t-end 3",
-        &["--print-spec", "--format json", "--format parquet", "--out run.csv", "--quiet", "--spec nowhere.json"],
+        &["--print-spec", "--format json", "--out run.csv", "--quiet", "--spec nowhere.json"],
     ),
     ("", "run --system stick-slip --t-end 1", &["--horizon", "--horizon --method taylor-extended"]),
     (

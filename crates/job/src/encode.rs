@@ -144,7 +144,7 @@ pub fn from_bits(bytes: &[u8]) -> Result<Vec<Table>, Malformed> {
     Ok(tables)
 }
 
-/// What a file says about itself: a CSV file in its last line, a Parquet file in its metadata.
+/// What a file says about itself: a CSV file in its last line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Heading {

@@ -50,8 +50,6 @@ pub mod exponent;
 pub mod horizon;
 pub mod limit;
 pub mod orbit;
-#[cfg(feature = "parquet")]
-pub mod parquet;
 pub mod passage;
 mod plan;
 pub mod question;

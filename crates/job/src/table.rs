@@ -1,6 +1,6 @@
 //! Named columns with units: what every computation's numbers are laid out as.
 //!
-//! A [`Table`] is stored by column, because that is how it is hashed, drawn and written as Parquet; it is built row by row,
+//! A [`Table`] is stored by column, because that is how it is hashed and drawn; it is built row by row,
 //! because that is how computations yield.
 
 use std::collections::HashMap;

@@ -1,6 +1,6 @@
 //! The room of the program in which an unsafe attribute stands: names of the platform's library of mathematics, defined as our own functions.
 //!
-//! Some dependencies name such functions through the standard library: parquet (the size of bloom filters), indicatif (the time left beside a bar), num-bigint
+//! Some dependencies name such functions through the standard library: indicatif (the time left beside a bar), num-bigint
 //! (how much memory digits will take), plotters (ticks that are not used here), read-fonts (slanted and composite glyphs, which the embedded fonts do not have). None of it reaches a hash. Defined here, in the program itself, the linker has no need
 //! of the platform's, so that a program cannot compute differently where that library is another one; `tests/it/binary.rs` looks that none is asked for. What is unsafe about it
 //! is the promise that these names have the types and meanings that C gives them (C17, 7.12), which they have.

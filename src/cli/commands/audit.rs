@@ -25,10 +25,10 @@ use crate::record::{self, Hash, Manifest};
 /// out the same. 1: something did not.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  twofold audit fig7 fig8\n  twofold audit fig9 --segments 20 --seed 12345\n  twofold audit --json fig7\n  twofold audit census --segments 1\n  twofold audit my-sweep.parquet"
+    after_help = "Examples:\n  twofold audit fig7 fig8\n  twofold audit fig9 --segments 20 --seed 12345\n  twofold audit --json fig7\n  twofold audit census --segments 1\n  twofold audit my-sweep.csv"
 )]
 pub struct Arguments {
-    /// Figures, or files of rows (.parquet or .csv).
+    /// Figures, or files of rows (.csv).
     #[arg(required = true, value_name = "FIGURE|FILE")]
     what: Vec<String>,
     /// Stretches or rows that are recomputed, of each figure or file.
@@ -139,7 +139,7 @@ fn read(arguments: &Arguments, what: &str) -> Result<Subject, CliError> {
         Some(_) => Err(CliError::no_effect("--checkpoints", format!("{what} is made of rows and has none"))),
         None => Ok(()),
     };
-    if [".parquet", ".csv"].iter().any(|ending| what.to_ascii_lowercase().ends_with(ending)) {
+    if what.to_ascii_lowercase().ends_with(".csv") {
         no_checkpoints()?;
         let bytes = record::files::read(Path::new(what))?;
         return Ok(Subject::Rows(what.to_owned(), vec![(what.to_owned(), rows_of(what, &bytes)?)]));
@@ -172,8 +172,7 @@ fn read(arguments: &Arguments, what: &str) -> Result<Subject, CliError> {
 }
 
 fn rows_of(name: &str, bytes: &[u8]) -> Result<Rows, CliError> {
-    let read =
-        if name.to_ascii_lowercase().ends_with(".csv") { Rows::from_csv(bytes) } else { Rows::from_parquet(bytes) };
+    let read = Rows::from_csv(bytes);
     read.map_err(|e| CliError::Usage(format!("{}: {e}", harmless(name))))
 }
 

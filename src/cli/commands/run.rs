@@ -11,7 +11,6 @@ use crate::cli::flags::{RunFlags, Use};
 use crate::cli::progress::Progress;
 use crate::cli::speak::{Delivery, complain, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
-use crate::job::parquet::parquet;
 use crate::job::spec::{Method, SwitchSpec};
 use crate::job::{self, Desk, Horizon, JobError, Question, Run, Stop, encode, simulate};
 use crate::record::files::Growing;
@@ -50,8 +49,6 @@ enum Format {
     Csv,
     /// Spec, statistics, columns and rows.
     Json,
-    /// Apache Parquet, with what a CSV file says in its last line as metadata.
-    Parquet,
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
@@ -109,7 +106,6 @@ fn record(run: &Run, format: Format, out: Option<&Path>, progress: &Progress) ->
     let bytes = match format {
         Format::Csv => encode::csv_of_run(run, &answer),
         Format::Json => encode::json(&answer, &about),
-        Format::Parquet => parquet(&answer.tables[0], &about),
     };
     let stopped = if answer.stop == Stop::Interrupted { progress.asked_to_stop() } else { None };
     let Some(exit) = stopped else {

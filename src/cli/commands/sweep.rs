@@ -39,9 +39,9 @@ const DRAW_SEED: u64 = 2013;
     Values: a,b,c; FROM..TO:COUNT; FROM..TO:log:COUNT; STEP*COUNT; FROM..TO and FROM..TO:log drawn at random; seed=FIRST..LAST.\n\n\
     Examples:\n  \
     twofold sweep --alpha 0.1 --beta 1e-4 --restart 100 --t-end 1e5 --method dopri5 --out lottery.csv\n  \
-    twofold sweep --t-end 2e5 --over params.alpha=1e-3..1:log:13 --over interval=20,40,100 --out map.parquet\n  \
-    twofold sweep --t-end 2e5 --over method=lsoda,dopri5 --over shift.x=-1e-9..1e-9 --random 100 --shard 2/8 --out part2.parquet\n  \
-    twofold sweep merge part*.parquet --out whole.parquet"
+    twofold sweep --t-end 2e5 --over params.alpha=1e-3..1:log:13 --over interval=20,40,100 --out map.csv\n  \
+    twofold sweep --t-end 2e5 --over method=lsoda,dopri5 --over shift.x=-1e-9..1e-9 --random 100 --shard 2/8 --out part2.csv\n  \
+    twofold sweep merge part*.csv --out whole.csv"
 )]
 pub struct Arguments {
     #[command(subcommand)]
@@ -75,7 +75,7 @@ pub struct Arguments {
     /// Threads; 0 is one per core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
-    /// File to write instead of standard output (-): Parquet or JSON if its name ends in .parquet or .json, else CSV.
+    /// File to write instead of standard output (-): JSON if its name ends in .json, else CSV.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Spec, rows and counts as JSON.
@@ -96,10 +96,10 @@ enum Command {
 /// Parts of two versions of the numerics are refused. If rows are missing, what is there is written and the exit code is 1.
 #[derive(Debug, clap::Args)]
 struct Merge {
-    /// The parts: .parquet, .csv or .journal.
+    /// The parts: .csv or .journal.
     #[arg(required = true, value_name = "FILE")]
     parts: Vec<PathBuf>,
-    /// File to write instead of standard output (-): Parquet or JSON if its name ends in .parquet or .json, else CSV.
+    /// File to write instead of standard output (-): JSON if its name ends in .json, else CSV.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Spec, rows and counts as JSON.
@@ -266,7 +266,6 @@ fn read_rows(file: &Path) -> Result<Rows, CliError> {
     let ending = file.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let found = match ending.as_str() {
         "journal" => Rows::from_journal(&Journal::read(file)?),
-        "parquet" => Rows::from_parquet(&read(file)?),
         _ => Rows::from_csv(&read(file)?),
     };
     found.map_err(|e| CliError::Usage(format!("{}: {e}", file.display())))
@@ -304,7 +303,6 @@ fn merged(arguments: &Merge) -> Result<Exit, CliError> {
 enum Format {
     Csv,
     Json,
-    Parquet,
 }
 
 fn format(out: Option<&Path>, as_json: bool) -> Result<Format, CliError> {
@@ -315,7 +313,6 @@ fn bytes_of(rows: &Rows, format: Format) -> Vec<u8> {
     match format {
         Format::Csv => rows.csv(),
         Format::Json => json_of(rows),
-        Format::Parquet => rows.parquet(),
     }
 }
 

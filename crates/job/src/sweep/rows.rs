@@ -391,12 +391,6 @@ impl Rows {
         encode::csv(&self.table(), &self.about())
     }
 
-    /// The rows as Parquet.
-    #[cfg(feature = "parquet")]
-    pub fn parquet(&self) -> Vec<u8> {
-        crate::parquet::parquet(&self.table(), &self.about())
-    }
-
     /// The rows as lines of a journal, a heading first.
     pub fn journal(&self) -> Vec<String> {
         std::iter::once(self.journal_heading()).chain(self.lines.values().cloned()).collect()
@@ -414,16 +408,6 @@ impl Rows {
     /// If it is anything else, or was changed.
     pub fn from_csv(bytes: &[u8]) -> Result<Self, RowsError> {
         Self::of_table(encode::from_csv(bytes)?)
-    }
-
-    /// The rows of a Parquet file.
-    ///
-    /// # Errors
-    ///
-    /// If it is anything else, or was changed.
-    #[cfg(feature = "parquet")]
-    pub fn from_parquet(bytes: &[u8]) -> Result<Self, RowsError> {
-        Self::of_table(crate::parquet::from_parquet(bytes)?)
     }
 
     fn of_table((heading, table): (Heading, Table)) -> Result<Self, RowsError> {
