@@ -299,7 +299,7 @@ fn a_referee_finds_findings_rules_making_and_citation() {
         verdict["found"].as_str().unwrap()
     );
     assert!(text("findings").contains(&said), "{said} is not in: {}", text("findings"));
-    assert!(text("findings").contains("The singularity eats digits."));
+    assert!(text("findings").contains("Each visit to the singularity costs digits."));
     let thresholds = verdict["evidence"]["section"]["thresholds"].as_object().unwrap();
     for (name, value) in thresholds {
         assert!(
