@@ -156,12 +156,12 @@ fn the_page_says_what_the_audit_says() {
 fn the_book_says_what_other_limits_would_do() {
     let found = Reading::ALL.map(|reading| figures::census::found_in(reading, &on_disk("figures/census")).unwrap());
     let text = census::limits_text(&found);
-    let book = fs::read_to_string(path("docs/sweeps.md")).unwrap();
-    let (_, rest) = book.split_once(census::LIMITS_BEGIN).expect("docs/sweeps.md has a place for the limits");
+    let book = fs::read_to_string(path("docs/census-sweeps.md")).unwrap();
+    let (_, rest) = book.split_once(census::LIMITS_BEGIN).expect("docs/census-sweeps.md has a place for the limits");
     let (said, _) = rest.split_once(census::LIMITS_END).expect("its text about the limits ends");
     assert!(
         said.trim() == text.trim(),
-        "docs/sweeps.md does not say what figures/census says:\n{}\n\n{text}\n",
+        "docs/census-sweeps.md does not say what figures/census says:\n{}\n\n{text}\n",
         census::LIMITS_BEGIN
     );
 }

@@ -643,7 +643,7 @@ fn single_run(panel: &str, reading: Reading, reference: impl Fn(&str) -> Option<
     Some(picture.panels.iter().find(|p| p.label == label)?.verdict.as_ref()?.agrees)
 }
 
-/// Stands before the text about other limits in docs/sweeps.md.
+/// Stands before the text about other limits in docs/census-sweeps.md.
 pub const LIMITS_BEGIN: &str = "<!-- limits: what figures/census says; tests/it/census.rs compares it; do not edit -->";
 /// Stands after it.
 pub const LIMITS_END: &str = "<!-- end of limits -->";
