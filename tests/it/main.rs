@@ -22,6 +22,7 @@ mod ensemble;
 mod examples;
 mod faults;
 mod filippov;
+mod filippov_events;
 mod filippov_limit;
 mod flags;
 mod fuzz;

@@ -115,6 +115,15 @@ impl<const N: usize> Interpolant<N> for Dense<N> {
     fn degree(&self) -> usize {
         4
     }
+    fn bernstein(&self) -> Option<[SVector<f64, N>; 5]> {
+        let Self { h, x0, x1, k: [k1, k3, k4, k5, k6, k7] } = self;
+        let r2 = x1 - x0;
+        let r3 = k1 * *h - r2;
+        let r4 = r2 - k7 * *h - r3;
+        let r5 = (k1 * D1 + k3 * D3 + k4 * D4 + k5 * D5 + k6 * D6 + k7 * D7) * *h;
+        let middle = r2 * 0.5 + r3 / 3.0 + (r4 + r5) / 6.0;
+        Some([SVector::zeros(), k1 * (0.25 * h), middle, r2 - k7 * (0.25 * h), r2])
+    }
     /// The distance from the chord: theta (1 - theta) [r3 + theta r4 + theta (1 - theta) r5].
     fn reach(&self, coordinate: usize) -> f64 {
         let [k1, k3, k4, k5, k6, k7] = self.k.each_ref().map(|k| k[coordinate]);
@@ -190,7 +199,8 @@ impl<const N: usize> Stepper<N> for Dopri5<N> {
         if !finite(&x) || !finite(&self.fsal) {
             return Err(Failure::NotFinite { t, state: Failure::state(&x) });
         }
-        self.h = self.first_step(field).min(max_step);
+        // Not below what advances the time: the error test then decides.
+        self.h = self.first_step(field).max(2.0 * f64::EPSILON * t.abs()).min(max_step);
         Ok(())
     }
 

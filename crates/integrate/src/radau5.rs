@@ -136,6 +136,12 @@ impl<const N: usize> Interpolant<N> for Collocation<N> {
     fn degree(&self) -> usize {
         3
     }
+    fn bernstein(&self) -> Option<[SVector<f64, N>; 5]> {
+        let [p1, p2, p3] = &self.p;
+        // theta^k has the coefficients C(i, k)/C(4, k).
+        let at = |a: f64, b: f64, c: f64| p1 * a + p2 * b + p3 * c;
+        Some([SVector::zeros(), at(0.25, 0.0, 0.0), at(0.5, 1.0 / 6.0, 0.0), at(0.75, 0.5, 0.25), at(1.0, 1.0, 1.0)])
+    }
     /// The polynomial's distance from its start, term by term.
     fn reach(&self, coordinate: usize) -> f64 {
         self.p.iter().map(|p| p[coordinate].abs()).sum()
@@ -356,7 +362,8 @@ impl<const N: usize> Stepper<N> for Radau5<N> {
         if !finite(&x) || !finite(&self.derivative) {
             return Err(Failure::NotFinite { t, state: Failure::state(&x) });
         }
-        self.h = self.first_step(field).min(max_step);
+        // Not below what advances the time: the error test then decides.
+        self.h = self.first_step(field).max(2.0 * f64::EPSILON * t.abs()).min(max_step);
         Ok(())
     }
 

@@ -4,6 +4,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::step::Step;
 use twofold_num::elementary::cos;
+use twofold_num::{Dual, Interval};
 
 /// The zero of `f` in [a, b], f(a) and f(b) of opposite sign or one of them zero, to the last bits of the bracket.
 ///
@@ -257,6 +258,182 @@ pub fn first_zero(f: impl Fn(f64) -> f64, start: Start) -> Option<Zero> {
         }
     };
     first_in(&reduced, 0.0, 1.0, 0)
+}
+
+/// A number on a piece of a step with its derivative by the fraction of the step, both enclosed.
+pub type Enclosed = Dual<Interval, 1>;
+
+/// The first zero on (0, 1] of a function of the state along `step`, `f` at a fraction of the step and `enclosed` over a set of states. None is
+/// missed at which the function has structure that the interpolant in f64 can show, however close two of them are.
+///
+/// The dense output is enclosed on a piece of the step by its Bernstein coefficients, the function and its derivative along it by interval
+/// arithmetic; a piece is passed where the function is proved to have no zero, or to be monotone without change of sign, and halved
+/// otherwise (Moore 1966; Neumaier 1990, ch. 5; of the same kind is Park & Barton 1996). Where a zero is found, [`first_zero`] has the
+/// last word on its place if it finds the same one.
+pub fn first_zero_along<const N: usize>(
+    step: &Step<'_, N>,
+    f: &dyn Fn(f64) -> f64,
+    enclosed: &dyn Fn(&SVector<Enclosed, N>) -> Enclosed,
+    start: Start,
+) -> Option<Zero> {
+    let Some(coefficients) = step.interpolant.bernstein() else { return first_zero(f, start) };
+    let piece = Piece::whole(step.x0, coefficients);
+    match scan(piece.clone(), f, enclosed, start) {
+        Scan::Nothing => None,
+        Scan::Unknown => first_zero(f, start),
+        Scan::Crossing(a, b) => match first_zero(f, start) {
+            Some(Zero::Crossing(theta)) if a <= theta && theta <= b => Some(Zero::Crossing(theta)),
+            // An excursion to the other side that is no deeper than the rounding of the states is none.
+            Some(Zero::Touch(theta)) if (theta - b).abs() <= TOUCH && piece.touches(step.at(theta), enclosed) => {
+                Some(Zero::Touch(theta))
+            }
+            _ => {
+                let (fa, fb) = (f(a), f(b));
+                // At a zero of the start, or within rounding of one, the left end has no sign of its own.
+                let fa = if fa == 0.0 || (fa > 0.0) == (fb > 0.0) { -fb } else { fa };
+                Some(Zero::Crossing(if fb == 0.0 { b } else { brent(f, a, b, fa, fb) }))
+            }
+        },
+        Scan::Touch(at) => match first_zero(f, start) {
+            Some(Zero::Touch(theta)) if (theta - at).abs() <= TOUCH => Some(Zero::Touch(theta)),
+            _ => Some(Zero::Touch(at)),
+        },
+    }
+}
+
+/// Two places of one touch, at which f differs from zero by rounding, are no farther apart: the root of the rounding.
+const TOUCH: f64 = 1e-6;
+/// Rounding of a state, relative to the largest of the step.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
+/// Pieces narrower than this are not halved: near the spacing of the fractions.
+const NARROWEST: f64 = 8.0 * f64::EPSILON;
+/// A zero of second order at the start is left with this fraction: before it the function is below the rounding of its values at 1.
+const AFTER_TANGENCY: f64 = 1.5e-8;
+/// Enclosures made for one step at most.
+const MOST_PIECES: usize = 50_000;
+
+/// What [`scan`] found first.
+enum Scan {
+    Nothing,
+    /// The function changes sign between these two fractions.
+    Crossing(f64, f64),
+    Touch(f64),
+    /// More pieces than [`MOST_PIECES`] were needed.
+    Unknown,
+}
+
+/// A piece of a step, as Bernstein coefficients of the state and of its derivative by the fraction of the step.
+#[derive(Clone)]
+struct Piece<const N: usize> {
+    a: f64,
+    b: f64,
+    x: [SVector<f64, N>; 5],
+    slope: [SVector<f64, N>; 4],
+    /// Rounding of the states of the whole step, and of their derivatives.
+    rounding: [SVector<f64, N>; 2],
+}
+
+impl<const N: usize> Piece<N> {
+    fn whole(x0: SVector<f64, N>, c: [SVector<f64, N>; 5]) -> Self {
+        let slope = std::array::from_fn(|i| (c[i + 1] - c[i]) * 4.0);
+        let x = c.map(|c| x0 + c);
+        let largest = |c: &[SVector<f64, N>]| c.iter().fold(SVector::zeros(), |m: SVector<f64, N>, c| m.sup(&c.abs()));
+        let rounding = [largest(&x) * ROUNDING, largest(&slope) * (4.0 * f64::EPSILON)];
+        Self { a: 0.0, b: 1.0, x, slope, rounding }
+    }
+
+    /// The two parts before and after `a + part (b - a)`, by de Casteljau's subdivision.
+    fn split(&self, part: f64) -> [Self; 2] {
+        fn parts<const N: usize, const K: usize>(c: &[SVector<f64, N>; K], part: f64) -> [[SVector<f64, N>; K]; 2] {
+            let (mut work, mut left, mut right) = (*c, *c, *c);
+            for k in 0..K {
+                left[k] = work[0];
+                right[K - 1 - k] = work[K - 1 - k];
+                for i in 0..K - 1 - k {
+                    work[i] = work[i] * (1.0 - part) + work[i + 1] * part;
+                }
+            }
+            [left, right]
+        }
+        let middle = self.a + part * (self.b - self.a);
+        let ([x, x1], [slope, slope1]) = (parts(&self.x, part), parts(&self.slope, part));
+        [Self { b: middle, x, slope, ..*self }, Self { a: middle, x: x1, slope: slope1, ..*self }]
+    }
+
+    /// The states on it with their derivatives; the rounding of the coefficients is included.
+    fn states(&self) -> SVector<Enclosed, N> {
+        let [of_x, of_slope] = &self.rounding;
+        SVector::from_fn(|i, _| Dual {
+            value: hull(&self.x, i, of_x[i]),
+            partials: [hull(&self.slope, i, of_slope[i])],
+        })
+    }
+
+    /// Whether the function is zero at the state `x` of the step as far as its rounding lets tell.
+    fn touches(&self, x: SVector<f64, N>, enclosed: &dyn Fn(&SVector<Enclosed, N>) -> Enclosed) -> bool {
+        let [of_x, _] = &self.rounding;
+        enclosed(&SVector::from_fn(|i, _| Dual::constant(hull(&[x], i, of_x[i])))).value.contains(0.0)
+    }
+}
+
+/// The numbers between the i-th components, widened by `rounding`.
+fn hull<const N: usize>(c: &[SVector<f64, N>], i: usize, rounding: f64) -> Interval {
+    let (low, high) = c.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), c| (l.min(c[i]), h.max(c[i])));
+    Interval::new(low - rounding, high + rounding).unwrap_or(Interval::ENTIRE)
+}
+
+/// The first zero from the left. Up to the piece that is looked at the function keeps the sign that it has behind its start.
+fn scan<const N: usize>(
+    whole: Piece<N>,
+    f: &dyn Fn(f64) -> f64,
+    enclosed: &dyn Fn(&SVector<Enclosed, N>) -> Enclosed,
+    start: Start,
+) -> Scan {
+    let sign = match start {
+        Start::Away => f(0.0),
+        Start::Simple(slope) => slope,
+        Start::Double(curvature) => curvature,
+    };
+    let mut waiting = vec![match start {
+        Start::Double(_) => {
+            let [_, rest] = whole.split(AFTER_TANGENCY);
+            rest
+        }
+        _ => whole,
+    }];
+    let changed = |s: f64| {
+        let v = f(s);
+        v == 0.0 || (v > 0.0) != (sign > 0.0)
+    };
+    for _ in 0..MOST_PIECES {
+        let Some(piece) = waiting.pop() else { return Scan::Nothing };
+        let (a, b) = (piece.a, piece.b);
+        let at = enclosed(&piece.states());
+        if !at.value.contains(0.0) {
+            // What rounding lets end on the other side of zero begins there.
+            if at.value.is_positive() != (sign > 0.0) {
+                return if a > 0.0 { Scan::Crossing((a - NARROWEST).max(0.0), a) } else { Scan::Unknown };
+            }
+            continue;
+        }
+        let slope = at.partials[0];
+        if slope.is_positive() || slope.is_negative() {
+            // Away from zero; or towards it, as far as its sign at the end says.
+            if slope.is_positive() != (sign > 0.0) && changed(b) {
+                return Scan::Crossing(a, b);
+            }
+            continue;
+        }
+        if b - a > NARROWEST {
+            let [left, right] = piece.split(0.5);
+            waiting.extend([right, left]);
+        } else if changed(b) {
+            return Scan::Crossing(a, b);
+        } else if at.value.is_bounded() && (a > 0.0 || start == Start::Away) {
+            return Scan::Touch(0.5 * (a + b));
+        }
+    }
+    Scan::Unknown
 }
 
 fn first_in(q: &dyn Fn(f64) -> f64, a: f64, b: f64, depth: usize) -> Option<Zero> {

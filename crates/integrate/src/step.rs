@@ -22,6 +22,10 @@ pub trait Interpolant<const N: usize> {
     fn reach(&self, _coordinate: usize) -> f64 {
         f64::INFINITY
     }
+    /// The Bernstein coefficients, less the state at the start, of an interpolant that is a polynomial of degree 4 or less.
+    fn bernstein(&self) -> Option<[SVector<f64, N>; 5]> {
+        None
+    }
     /// Whether the coordinate is known to grow all along the step, or to fall all along it.
     fn is_monotone(&self, _coordinate: usize) -> bool {
         false

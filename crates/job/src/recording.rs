@@ -337,6 +337,7 @@ fn event_cells<const D: usize>(event: &ModeEvent<D>) -> [Entry; 9] {
         EventKind::LeftByTangency { to } => ("left-by-tangency", Some(to), [none; 4], None),
         EventKind::StartedOnSurface => ("started-on-surface", None, [none; 4], None),
         EventKind::EnteredRepelling => ("entered-repelling", None, [none; 4], None),
+        EventKind::Accumulation { leg } => ("accumulation", None, [leg, none, none, none], None),
         EventKind::TwoFoldReached { leg, error } => ("two-fold-reached", None, [leg, error, none, none], None),
         EventKind::Exit { to, time, arc, rule } => ("exit", Some(to), [none, none, time, arc], Some(rule)),
         EventKind::ExitAtBoundary { to, time, arc, rule } => {
@@ -416,6 +417,7 @@ fn event_of<const D: usize>(events: &Table, row: usize, at: &Sample<D>) -> Optio
         "started-on-surface" => EventKind::StartedOnSurface,
         "entered-repelling" => EventKind::EnteredRepelling,
         "two-fold-reached" => EventKind::TwoFoldReached { leg: number("leg"), error: number("error") },
+        "accumulation" => EventKind::Accumulation { leg: number("leg") },
         "exit" => EventKind::Exit { to: side()?, time: number("time"), arc: number("arc"), rule: rule()? },
         "exit-at-boundary" => {
             EventKind::ExitAtBoundary { to: side()?, time: number("time"), arc: number("arc"), rule: rule()? }
@@ -500,6 +502,7 @@ mod tests {
                 EventKind::StartedOnSurface,
                 EventKind::EnteredRepelling,
                 EventKind::TwoFoldReached { leg: 0.25, error: 1e-9 },
+                EventKind::Accumulation { leg: 1e-11 },
                 EventKind::Exit { to: side, time: 0.3, arc: 0.7, rule },
                 EventKind::ExitAtBoundary { to: side, time: 0.1, arc: 0.2, rule },
             ]

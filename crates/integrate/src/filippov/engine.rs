@@ -8,9 +8,9 @@ use super::two_fold::{AlongCurve, SlidingAtTwoFold};
 use super::{EventKind, ExitRule, FilippovError, FilippovObserver, FilippovSummary, Mode, ModeEvent, Settings, Side};
 use crate::dopri5::Dopri5;
 use crate::driver::Watch;
-use crate::roots::{Start, Zero, brent, first_zero};
+use crate::roots::{Enclosed, Start, Zero, brent, first_zero_along};
 use crate::step::{Failure, Flow, Interpolant, Statistics, Step, Stepper, StopReason, Tolerance, finite};
-use twofold_num::Dual;
+use twofold_num::{Arithmetic, Dual, Interval};
 use twofold_system::filippov::{TwoFold, gradient, lie_derivatives, two_fold};
 use twofold_system::{PiecewiseSmooth, VectorField, variables};
 
@@ -67,6 +67,8 @@ pub(super) struct Origin<const N: usize> {
 pub(super) enum Departure<const N: usize> {
     /// Wherever the state is.
     Anywhere,
+    /// On the surface, up to the rounding of what found it.
+    OnSurface,
     /// At a two-fold.
     TwoFold(Option<Box<SlidingAtTwoFold<N>>>),
     /// On the surface, in the repelling region.
@@ -111,12 +113,18 @@ where
         t_end,
         events: 0,
         statistics: Statistics { highest_order: 5, ..Statistics::default() },
-        zeno: Zeno::default(),
+        accumulation: Accumulation::default(),
+        size: x0.abs(),
+        speed: SVector::zeros(),
         stop: None,
         steps_until_watch: STEPS_BETWEEN_WATCHES,
     };
     let mut state = match departure {
-        Departure::Anywhere => engine.start()?,
+        Departure::Anywhere if !near_surface(system, &x0) => {
+            let side = if system.switching(&x0) > 0.0 { Side::Plus } else { Side::Minus };
+            State::Free { side, start: FlightStart::Away }
+        }
+        Departure::Anywhere | Departure::OnSurface => engine.start()?,
         Departure::TwoFold(Some(local)) => State::TwoFold(local),
         Departure::TwoFold(None) => return Err(engine.non_transversal("the two-fold is degenerate")),
         Departure::Repelling => engine.enter_repelling(None)?,
@@ -139,9 +147,29 @@ where
             State::Free { side, start } => engine.fly(side, start)?,
             State::Sliding(sliding) => engine.slide::<M>(sliding)?,
             State::TwoFold(local) => engine.depart(&local)?,
+            State::Rest => {
+                let (x, t_end) = (engine.x, engine.t_end);
+                engine.take(Mode::SlidingAttracting, t_end, x, &Truncated { inner: &Standing(x), end: 1.0 });
+                State::Rest
+            }
             State::SetValued(mode) => return Ok(engine.summary(mode, StopReason::SetValued)),
         };
     }
+}
+
+/// Whether h is zero at `x` as far as the rounding of `x` and of h's evaluation can tell: by interval arithmetic.
+pub(super) fn near_surface<P: PiecewiseSmooth<N>, const N: usize>(system: &P, x: &SVector<f64, N>) -> bool {
+    let around = x.map(|v| {
+        let (low, high) = if v == 0.0 { (0.0, 0.0) } else { (v.next_down(), v.next_up()) };
+        Interval::new(low, high).unwrap_or(Interval::ENTIRE)
+    });
+    let h = system.switching(&around);
+    system.switching(x) == 0.0 || h.is_bounded() && h.contains(0.0)
+}
+
+/// `t`, or the end if that is within rounding: no step leads from the one to the other.
+pub(super) fn up_to(t_end: f64, t: f64) -> f64 {
+    if t_end - t <= LIMITS.end * t_end.abs() { t_end } else { t }
 }
 
 /// How a flight begins: what is known of the growth of |h|.
@@ -221,7 +249,10 @@ impl<const N: usize> TwoFoldAhead<N> {
         self.tried_at = size;
         // From far away Newton's method may have found another two-fold: trust only the latest answer.
         if let Ok(TwoFold { point, .. }) = two_fold(system, x)
-            && self.local.as_ref().is_none_or(|l| (l.point - point).amax() > LIMITS.same_point * (1.0 + point.amax()))
+            && self
+                .local
+                .as_ref()
+                .is_none_or(|l| (l.point - point).amax() > LIMITS.same_point * x.amax().max(point.amax()))
         {
             self.local = SlidingAtTwoFold::at(system, point);
         }
@@ -229,9 +260,14 @@ impl<const N: usize> TwoFoldAhead<N> {
 }
 
 enum State<const N: usize> {
-    Free { side: Side, start: FlightStart },
+    Free {
+        side: Side,
+        start: FlightStart,
+    },
     Sliding(Sliding),
     TwoFold(Box<SlidingAtTwoFold<N>>),
+    /// At a point of the surface where zero lies between the two fields: the motion stays there.
+    Rest,
     SetValued(Option<Mode>),
 }
 
@@ -241,30 +277,81 @@ impl<const N: usize> State<N> {
             State::Free { side, .. } => Some((*side).into()),
             State::Sliding(s) => Some(s.mode()),
             State::TwoFold(_) => None,
+            State::Rest => Some(Mode::SlidingAttracting),
             State::SetValued(mode) => *mode,
         }
     }
 }
 
-/// Watches for accumulating crossings.
-#[derive(Clone, Copy, Debug, Default)]
-struct Zeno {
+/// The flights since the last that was longer than the one before the last: whether they come together in a point.
+///
+/// Crossings accumulate at t* if from some flight on the durations fall geometrically, each flight against the last one on its own side
+/// (Goebel, Sanfelice & Teel 2012, sec. 2.2; Or & Ames 2011). Flights near a grazing are short, too, but one at a time.
+#[derive(Clone, Debug)]
+struct Accumulation<const N: usize> {
     in_a_row: u64,
+    /// Duration of the first of them.
     first: f64,
-    last: f64,
+    /// Durations of the last flights and the states in which they ended, the latest first.
+    last: [(f64, SVector<f64, N>); ZENO_FLIGHTS + 2],
 }
 
-impl Zeno {
-    /// A flight took `duration`. Whether flights have been shrinking for so long and so far that they accumulate.
-    fn flight(&mut self, duration: f64, t: f64) -> bool {
-        if self.in_a_row > 0 && duration <= self.last {
+impl<const N: usize> Default for Accumulation<N> {
+    fn default() -> Self {
+        Self { in_a_row: 0, first: 0.0, last: [(0.0, SVector::zeros()); ZENO_FLIGHTS + 2] }
+    }
+}
+
+impl<const N: usize> Accumulation<N> {
+    /// A flight took `duration` and ended at (t, x). The time and the point at which crossings accumulate, if they do and the time left
+    /// until then is below what is resolved.
+    fn flight(&mut self, duration: f64, t: f64, x: SVector<f64, N>) -> Option<(f64, SVector<f64, N>)> {
+        self.last.rotate_right(1);
+        self.last[0] = (duration, x);
+        if duration < self.last[2].0 {
             self.in_a_row += 1;
         } else {
-            (self.in_a_row, self.first) = (1, duration);
+            (self.in_a_row, self.first) = (0, duration);
         }
-        self.last = duration;
-        self.in_a_row >= LIMITS.zeno_flights
-            && (duration < LIMITS.zeno_ratio * self.first || duration <= LIMITS.zeno_resolution * t.abs())
+        if self.in_a_row < ZENO_FLIGHTS as u64 {
+            return None;
+        }
+        let ratios = (0..ZENO_FLIGHTS).map(|i| self.last[i].0 / self.last[i + 2].0);
+        let (low, high) = ratios.fold((f64::INFINITY, 0.0_f64), |(l, h), r| (l.min(r), h.max(r)));
+        let left = (self.last[0].0 + self.last[1].0) * high / (1.0 - high);
+        // A NaN is no accumulation.
+        let geometric = high - low <= LIMITS.zeno_spread * (1.0 - high) && left <= LIMITS.zeno_left * t.abs();
+        geometric.then(|| (left, x + (x - self.last[2].1) * (high / (1.0 - high))))
+    }
+}
+
+impl<const N: usize> Accumulation<N> {
+    /// The tolerances of the next flight. Its height is of the order of the square of its duration, and may be far below the absolute
+    /// tolerance.
+    fn tolerance(&self, of_the_run: Tolerance) -> Tolerance {
+        let shrunk = self.last[0].0 / self.first;
+        if self.in_a_row == 0 || shrunk.is_nan() || shrunk > LIMITS.zeno_shrunk {
+            return of_the_run;
+        }
+        Tolerance { atol: of_the_run.atol * shrunk * shrunk, ..of_the_run }
+    }
+}
+
+/// Flights in a row whose durations have one ratio, before it is taken for the ratio of all that follow.
+const ZENO_FLIGHTS: usize = 8;
+
+/// A motion that does not move.
+struct Standing<const N: usize>(SVector<f64, N>);
+
+impl<const N: usize> Interpolant<N> for Standing<N> {
+    fn at(&self, _: f64) -> SVector<f64, N> {
+        self.0
+    }
+    fn degree(&self) -> usize {
+        0
+    }
+    fn bernstein(&self) -> Option<[SVector<f64, N>; 5]> {
+        Some([SVector::zeros(); 5])
     }
 }
 
@@ -276,7 +363,7 @@ const CHORDS: usize = 16;
 
 /// The numbers by which the engine decides what rounding blurs. None is a tolerance of the motion; those are in [`Settings`].
 struct Limits {
-    /// A first Lie derivative below this share of |grad h| |f| is zero: some fifty roundings.
+    /// A first Lie derivative below this share of its terms, and of its change over the size of the run, is zero: some fifty roundings.
     lie: f64,
     /// A two-fold is looked for where both Lie derivatives are below so many of those ...
     near_two_fold: f64,
@@ -286,19 +373,24 @@ struct Limits {
     touch_steps: usize,
     /// ... as long as they move it by less than this fraction of the step.
     touch_range: f64,
-    /// Flights in a row, each shorter than the one before, that may be the beginning of an accumulation ...
-    zeno_flights: u64,
-    /// ... and are one when the last is below this share of the first ...
-    zeno_ratio: f64,
-    /// ... or below so many spacings of the numbers at the present time.
-    zeno_resolution: f64,
+    /// The ratios of durations in an accumulation differ by less than this share of their distance from 1 ...
+    zeno_spread: f64,
+    /// ... and the rest of it is shorter than this share of the time.
+    zeno_left: f64,
+    /// Flights that are shorter than this share of the first of such a row are integrated with smaller absolute tolerances.
+    zeno_shrunk: f64,
+    /// A field is zero at a point of the surface below this share of the speed of the motion before: a root of the rounding, for fields that
+    /// are no smoother than sqrt(|h|) there.
+    rest: f64,
+    /// The end of a run is reached within so many spacings of the numbers there.
+    end: f64,
     /// A sliding step that advances time by no more than this share of it is idle ...
     idle: f64,
     /// ... and so many of them are arrival at a degenerate point.
     idle_steps: u32,
     /// Closer to a two-fold than so many tolerances there is nothing to integrate.
     blur: f64,
-    /// Sliding restarts on the surface when it has drifted off by this ...
+    /// Sliding restarts on the surface when it has drifted off by this share of the state ...
     drift: f64,
     /// ... or by so many absolute tolerances, whichever is more.
     drift_in_tolerances: f64,
@@ -315,9 +407,11 @@ const LIMITS: Limits = Limits {
     same_point: 1e-9,
     touch_steps: 4,
     touch_range: 1e-3,
-    zeno_flights: 8,
-    zeno_ratio: 1e-8,
-    zeno_resolution: 16.0 * f64::EPSILON,
+    zeno_spread: 0.1,
+    zeno_left: 1e-10,
+    zeno_shrunk: 0.1,
+    rest: 1e-7,
+    end: 4.0 * f64::EPSILON,
     idle: 4.0 * f64::EPSILON,
     idle_steps: 32,
     blur: 300.0,
@@ -366,7 +460,11 @@ struct Engine<'a, P, const N: usize> {
     t_end: f64,
     events: u64,
     statistics: Statistics,
-    zeno: Zeno,
+    accumulation: Accumulation<N>,
+    /// The largest |x_i| of the run so far: rounding in a state is relative to it.
+    size: SVector<f64, N>,
+    /// The largest mean speed of a step so far, by components.
+    speed: SVector<f64, N>,
     stop: Option<StopReason>,
     steps_until_watch: u32,
 }
@@ -404,7 +502,13 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let (plus, minus) = (self.system.plus(x), self.system.minus(x));
         let (p, q) = lie_derivatives::<P, Dual<f64, N>, N>(self.system, &variables(x));
         let along = |d: &Dual<f64, N>, f: &SVector<f64, N>| (0..N).map(|i| d.partials[i] * f[i]).sum::<f64>();
-        let slope = gradient(self.system, x).norm();
+        let slope = gradient(self.system, x);
+        // Rounding of the sum that is the Lie derivative, and of the state that it is taken at.
+        let zero = |d: &Dual<f64, N>, f: &SVector<f64, N>| {
+            let terms = (0..N).flat_map(|i| [(slope[i] * f[i]).abs(), d.partials[i].abs() * self.size[i]]);
+            // A derivative that does not exist says nothing.
+            LIMITS.lie * terms.filter(|term| term.is_finite()).sum::<f64>()
+        };
         Lie {
             p: p.value,
             q: q.value,
@@ -412,8 +516,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             mm: along(&q, &minus),
             pm: along(&p, &minus),
             mp: along(&q, &plus),
-            zero_p: LIMITS.lie * slope * plus.norm(),
-            zero_q: LIMITS.lie * slope * minus.norm(),
+            zero_p: zero(&p, &plus),
+            zero_q: zero(&q, &minus),
         }
     }
 
@@ -429,6 +533,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     fn take(&mut self, mode: Mode, t1: f64, x1: SVector<f64, N>, interpolant: &dyn Interpolant<N>) {
         if t1 > self.t {
             let step = Step { t0: self.t, t1, x0: self.x, x1, interpolant };
+            self.size = self.size.zip_map(&x1, |s, x| s.max(x.abs()));
+            self.speed = self.speed.zip_map(&((x1 - self.x) / (t1 - self.t)), |s, v| s.max(v.abs()));
             if self.observer.step(mode, &step) == Flow::Stop {
                 self.stop.get_or_insert(StopReason::Observer);
             }
@@ -440,13 +546,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         }
     }
 
-    /// The mode at the start of a run.
+    /// The mode at the start of a run on the surface.
     fn start(&mut self) -> Result<State<N>, FilippovError> {
-        let h = self.system.switching(&self.x);
-        if h.abs() > self.settings.surface {
-            let side = if h > 0.0 { Side::Plus } else { Side::Minus };
-            return Ok(State::Free { side, start: FlightStart::Away });
-        }
         self.x = project(self.system, &self.x);
         let l = self.lie(&self.x);
         if let Some(local) = self.two_fold_here(&l) {
@@ -472,6 +573,72 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         Ok(state)
     }
 
+    /// The present state, where the Lie derivatives decide nothing: a rest, if zero lies between the fields there.
+    fn degenerate(&mut self, from: Option<Mode>, what: &'static str) -> Result<State<N>, FilippovError> {
+        let below = self.speed * LIMITS.rest;
+        if !self.rests_at(&self.x, &below) {
+            return Err(self.non_transversal(what));
+        }
+        let mode = Mode::SlidingAttracting;
+        let kind = match from {
+            Some(Mode::Plus) => EventKind::Landing { from: Side::Plus },
+            Some(Mode::Minus) => EventKind::Landing { from: Side::Minus },
+            _ => EventKind::StartedOnSurface,
+        };
+        if from != Some(mode) {
+            self.event(kind, from, Some(mode));
+        }
+        Ok(State::Rest)
+    }
+
+    /// Whether a convex combination of the two fields at `x` is zero, each component up to `below`: then Filippov's set of velocities holds
+    /// zero, and the motion may stay (Filippov 1988, sec. 19).
+    fn rests_at(&self, x: &SVector<f64, N>, below: &SVector<f64, N>) -> bool {
+        let (plus, minus) = (self.system.plus(x), self.system.minus(x));
+        // The combination nearest to zero, each component in units of its own size.
+        let scaled = |v: SVector<f64, N>| {
+            SVector::<f64, N>::from_fn(|i, _| {
+                let size = plus[i].abs().max(minus[i].abs());
+                if size > 0.0 { v[i] / size } else { 0.0 }
+            })
+        };
+        let (apart, base) = (scaled(plus - minus), scaled(minus));
+        let square = apart.norm_squared();
+        let weight = if square > 0.0 { (-apart.dot(&base) / square).clamp(0.0, 1.0) } else { 0.0 };
+        let mean = minus + (plus - minus) * weight;
+        let rounding = |i: usize| 4.0 * f64::EPSILON * plus[i].abs().max(minus[i].abs());
+        (0..N).all(|i| mean[i].abs() <= below[i].max(rounding(i)))
+    }
+
+    /// Crossings accumulate at `point`, `left` after the present moment: what follows, if the motion stays there.
+    fn accumulate(
+        &mut self,
+        side: Side,
+        left: f64,
+        point: SVector<f64, N>,
+        duration: f64,
+    ) -> Result<State<N>, FilippovError> {
+        let (crossings, point) = (self.accumulation.in_a_row, project(self.system, &point));
+        // As far as the fields change over what is left of the accumulation, they are not known at its end.
+        let change = |f: &dyn Fn(&SVector<f64, N>) -> SVector<f64, N>| (f(&self.x) - f(&point)).abs();
+        let (plus, minus) = (change(&|x| self.system.plus(x)), change(&|x| self.system.minus(x)));
+        let below = plus.zip_map(&minus, |a, b| 10.0 * a.max(b));
+        if !self.rests_at(&point, &below) {
+            return Err(FilippovError::Zeno {
+                t: self.t,
+                state: Failure::state(&self.x),
+                crossings,
+                last: duration,
+                accumulates: self.t + left,
+            });
+        }
+        let straight = Straight { system: self.system, from: self.x, to: point };
+        self.take(side.into(), up_to(self.t_end, self.t + left).min(self.t_end), point, &straight);
+        let rest = Mode::SlidingAttracting;
+        self.event(EventKind::Accumulation { leg: left }, Some(side.into()), Some(rest));
+        Ok(State::Rest)
+    }
+
     /// A two-fold at the present state, if both Lie derivatives are almost zero there.
     fn two_fold_here(&self, l: &Lie) -> Option<SlidingAtTwoFold<N>> {
         let near = LIMITS.near_two_fold * l.zero_p.max(l.zero_q);
@@ -479,7 +646,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             return None;
         }
         let local = SlidingAtTwoFold::near(self.system, &self.x)?;
-        ((local.point - self.x).norm() <= LIMITS.same_point * local.radius.min(1.0)).then_some(local)
+        ((local.point - self.x).norm() <= LIMITS.same_point * local.radius.min(self.size.norm())).then_some(local)
     }
 
     /// The state is in the repelling region: ask the rule.
@@ -515,7 +682,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     /// Free flight until the surface or the end.
     fn fly(&mut self, side: Side, start: FlightStart) -> Result<State<N>, FilippovError> {
         let flow = FreeFlow { system: self.system, side };
-        let mut method = Dopri5::<N>::new(self.settings.tolerance);
+        let mut method = Dopri5::<N>::new(self.accumulation.tolerance(self.settings.tolerance));
         let (t_start, mut start) = (self.t, start);
         method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step)?;
         let landed = loop {
@@ -528,7 +695,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 FlightStart::Tangent(second) => Start::Double(0.5 * second * length * length),
             };
             start = FlightStart::Away;
-            match first_zero(height, at_start) {
+            let enclosed = |x: &SVector<Enclosed, N>| self.system.switching(x).scale(side.sign());
+            match first_zero_along(&step, &height, &enclosed, at_start) {
                 None => {
                     let (t1, x1) = (step.t1, step.x1);
                     self.take(side.into(), t1, x1, step.interpolant);
@@ -553,7 +721,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                             theta = moved;
                         }
                     }
-                    let (t1, x1) = (step.time(theta), project(self.system, &step.at(theta)));
+                    let (t1, x1) = (up_to(self.t_end, step.time(theta)), project(self.system, &step.at(theta)));
                     self.take(side.into(), t1, x1, &Truncated { inner: step.interpolant, end: theta });
                     break Some(zero);
                 }
@@ -568,20 +736,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             None => Ok(State::Free { side, start: FlightStart::Away }),
             Some(zero) => {
                 let duration = self.t - t_start;
-                if self.zeno.flight(duration, self.t) {
-                    let Zeno { in_a_row, first, last } = self.zeno;
-                    // A geometric series with the mean ratio of these flights.
-                    let ratio = twofold_num::elementary::pow(
-                        (last / first).max(f64::MIN_POSITIVE),
-                        1.0 / (in_a_row - 1) as f64,
-                    );
-                    return Err(FilippovError::Zeno {
-                        t: self.t,
-                        state: Failure::state(&self.x),
-                        crossings: in_a_row,
-                        last,
-                        accumulates: self.t + last * ratio / (1.0 - ratio).max(f64::EPSILON),
-                    });
+                if let Some((left, point)) = self.accumulation.flight(duration, self.t, self.x) {
+                    return self.accumulate(side, left, point, duration);
                 }
                 self.land(side, matches!(zero, Zero::Touch(_)))
             }
@@ -604,8 +760,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             Side::Minus => (-l.q, l.zero_q, -l.mm, l.p, l.zero_p, l.pp),
         };
         if own >= -own_zero || (touch && own_second > 0.0) {
-            if own_second <= 0.0 {
-                return Err(self.non_transversal("a tangency from an invisible or degenerate side (a cusp)"));
+            if own_second.is_nan() || own_second <= 0.0 {
+                return self.degenerate(from, "a tangency from an invisible or degenerate side (a cusp)");
             }
             self.event(EventKind::Grazing { side }, from, from);
             let start = if own > own_zero { FlightStart::Transversal(own) } else { FlightStart::Tangent(own_second) };
@@ -625,7 +781,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             self.event(EventKind::Crossing { to: other }, from, Some(other.into()));
             return Ok(State::Free { side: other, start });
         }
-        self.zeno = Zeno::default();
+        self.accumulation = Accumulation::default();
         self.event(EventKind::Landing { from: side }, from, Some(Mode::SlidingAttracting));
         Ok(State::Sliding(Sliding::ATTRACTING))
     }
@@ -655,7 +811,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             let x1 = project(system, &without_clock(&z1));
             let t1 = match end {
                 Some((_, SlidingEnd::Time)) => self.t_end,
-                _ => (t_base + z1[N]).min(self.t_end),
+                _ => up_to(self.t_end, t_base + z1[N]).min(self.t_end),
             };
             sliding.time += t1 - self.t;
             if sliding.plan.is_some() {
@@ -663,14 +819,16 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             }
             let clock = (step.x0[N], z1[N]);
             let interpolant = InPhysicalTime { system, inner: step.interpolant, end: theta, clock };
-            let drift = system.switching(&without_clock(&z1)).abs();
+            let off = without_clock::<N, M>(&z1);
+            let drift = system.switching(&off).abs();
             idle = if t1 - self.t <= LIMITS.idle * t1.abs() { idle + 1 } else { 0 };
             self.take(mode, t1, x1, &interpolant);
             if let Some((_, end)) = end {
                 break Some(end);
             }
             if idle >= LIMITS.idle_steps {
-                return Err(self.non_transversal(DEGENERATE_END));
+                self.count(method.statistics());
+                return self.degenerate(Some(mode), DEGENERATE_END);
             }
             if self.stop.is_some() || method.statistics().steps > self.settings.max_steps {
                 break Some(SlidingEnd::Time);
@@ -687,7 +845,10 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                     break self.arrive(fold.point, leg, error, mode);
                 }
             }
-            if drift > LIMITS.drift.max(LIMITS.drift_in_tolerances * self.settings.tolerance.atol) {
+            // The size of h where the state is off by so much.
+            let Tolerance { atol, .. } = self.settings.tolerance;
+            let allowed = self.size.map(|size| (LIMITS.drift * size).max(LIMITS.drift_in_tolerances * atol));
+            if drift > gradient(system, &off).abs().dot(&allowed) {
                 t_base = self.t;
                 method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY)?;
             }
@@ -742,7 +903,11 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 }
             }
             let margin = |s| sliding.margins(system, &without_clock(&step.at(s)))[i];
-            if let Some(zero) = first_zero(margin, start) {
+            let enclosed = |z: &SVector<Enclosed, M>| {
+                let (p, q) = lie_derivatives(system, &SVector::<Enclosed, N>::from_fn(|j, _| z[j]));
+                if i == 0 { p.scale(-direction) } else { q.scale(direction) }
+            };
+            if let Some(zero) = first_zero_along(step, &margin, &enclosed, start) {
                 propose(zero.theta(), SlidingEnd::Fold(side));
             }
         }
@@ -795,7 +960,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let l = self.lie(&self.x);
         let from = Some(sliding.mode());
         if l.p.abs() <= l.zero_p && l.q.abs() <= l.zero_q {
-            return Err(self.non_transversal(DEGENERATE_END));
+            return self.degenerate(from, DEGENERATE_END);
         }
         if sliding.repelling {
             // The edge of the repelling region is an invisible fold: only the other side is left to go to.
@@ -824,7 +989,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
 
     /// The future at a two-fold.
     fn depart(&mut self, local: &SlidingAtTwoFold<N>) -> Result<State<N>, FilippovError> {
-        self.zeno = Zeno::default();
+        self.accumulation = Accumulation::default();
         let [pp, _, _, mm] = local.second;
         let growth = |side: Side| match side {
             Side::Plus => pp,

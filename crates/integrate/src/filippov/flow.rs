@@ -99,6 +99,18 @@ impl<const N: usize> Interpolant<N> for Truncated<'_, N> {
     fn degree(&self) -> usize {
         self.inner.degree()
     }
+    /// De Casteljau's subdivision.
+    fn bernstein(&self) -> Option<[SVector<f64, N>; 5]> {
+        let mut work = self.inner.bernstein()?;
+        let mut left = work;
+        for k in 0..5 {
+            left[k] = work[0];
+            for i in 0..4 - k {
+                work[i] += (work[i + 1] - work[i]) * self.end;
+            }
+        }
+        Some(left)
+    }
 }
 
 /// A step of the sliding flow seen in physical time: finds the rescaled time for a physical one, and projects.

@@ -123,6 +123,11 @@ pub enum EventKind {
     StartedOnSurface,
     /// The run started in the repelling region, or a graze led there: the future is a set.
     EnteredRepelling,
+    /// Crossings accumulated (Zeno) at a point where the motion stays: zero lies between the two fields there.
+    Accumulation {
+        /// How long before it the last crossing was that was computed; from there on the durations are a geometric series.
+        leg: f64,
+    },
     /// Came to a two-fold.
     TwoFoldReached {
         /// Duration of the closed-form last leg.
@@ -197,8 +202,6 @@ pub struct Settings {
     pub tolerance: Tolerance,
     /// The longest step in free flight. Sliding steps are measured in rescaled time and have no cap.
     pub max_step: f64,
-    /// A state with |h| at most this counts as being on the surface (at the start of a run).
-    pub surface: f64,
     /// Distance from a two-fold, as a fraction of its radius, at which the closed-form last leg begins; never less than 300 times
     /// what the tolerances resolve.
     pub leg: f64,
@@ -215,7 +218,6 @@ impl Default for Settings {
         Self {
             tolerance: Tolerance { rtol: 1e-12, atol: 1e-12 },
             max_step: f64::INFINITY,
-            surface: 1e-12,
             leg: 1e-7,
             departure: 1e-3,
             max_events: 1_000_000,

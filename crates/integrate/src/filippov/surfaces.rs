@@ -12,13 +12,14 @@
 
 use nalgebra::SVector;
 
-use super::engine::{Departure, Origin, run_from};
+use super::engine::{Departure, Origin, near_surface, run_from, up_to};
 use super::exit::Chooser;
 use super::flow::{SlidingFlow, Truncated, project};
 use super::{EventKind, ExitRule, FilippovError, FilippovObserver, FilippovSummary, Mode, ModeEvent, Settings, Side};
 use crate::driver::Watch;
-use crate::roots::{Start, first_zero};
-use crate::step::{Failure, Flow, Statistics, Step, StopReason, finite};
+use crate::roots::{Enclosed, Start, first_zero_along};
+use crate::step::{Failure, Flow, Statistics, Step, StopReason, Tolerance, finite};
+use twofold_num::Arithmetic;
 use twofold_system::filippov::{Region, gradient, lie_derivatives, region, sliding_field};
 use twofold_system::{PiecewiseSmooth, VectorField};
 
@@ -26,8 +27,8 @@ use twofold_system::{PiecewiseSmooth, VectorField};
 /// negative.
 pub type Faces<P> = [[P; 2]; 2];
 
-/// Nearer to a surface than this, relative to the state, is on it: two surfaces at once are their intersection.
-pub const INTERSECTION: f64 = 1e-9;
+/// Nearer to a point of both surfaces than so many tolerances of the motion is at their intersection.
+pub const INTERSECTION: f64 = 100.0;
 
 /// Runs the Filippov motion of a system with two switching surfaces from (0, x0) to `t_end`. `M` is `N + 1` and is inferred. The modes that the
 /// observer is told are those of the surface that was met last (at the start: the first one, unless the run starts on the second).
@@ -56,21 +57,21 @@ where
     if !finite(&x0) {
         return Err(Failure::NotFinite { t: 0.0, state: Failure::state(&x0) }.into());
     }
-    let near = |surface: usize, x: &SVector<f64, N>| {
-        let face = &faces[surface][0];
-        let (h, slope) = (face.switching(x), gradient(face, x).norm());
-        h.abs() <= INTERSECTION * (1.0 + x.amax()) * slope || h == 0.0
+    let near = |x: &SVector<f64, N>| {
+        let Tolerance { rtol, atol } = settings.tolerance;
+        let reach = x.map(|v| INTERSECTION * (atol + rtol * v.abs()));
+        intersection_within(faces, x, &reach)
     };
     let mut chooser = Chooser::new(rule);
     let (mut t, mut x) = (0.0, x0);
-    let mut active = usize::from(near(1, &x));
+    let mut active = usize::from(near_surface(&faces[1][0], &x));
     let mut arrived = None;
     // Set where the other surface was crossed in sliding on this one: the state is on both.
     let mut passed: Option<Passage> = None;
     let (mut events, mut statistics) = (0, Statistics { highest_order: 5, ..Statistics::default() });
     loop {
         let other = 1 - active;
-        if passed.is_none() && near(active, &x) && near(other, &x) {
+        if passed.is_none() && near(&x) {
             return Err(FilippovError::Intersection { t, state: Failure::state(&x) });
         }
         let below = passed.map_or(faces[other][0].switching(&x) < 0.0, |passage| passage.to == Side::Minus);
@@ -84,19 +85,16 @@ where
             passed: passed.map(|passage| passage.to),
             left: passed.map(|passage| passage.rate),
             hit: None,
+            t_end,
         };
         let left = Settings {
             max_events: settings.max_events.saturating_sub(events),
             max_steps: settings.max_steps.saturating_sub(statistics.steps),
-            // What was found to be on the surface is on it, in whatever units h is measured.
-            surface: if arrived.is_some() || passed.is_some() {
-                settings.surface.max(4.0 * face.switching(&x).abs())
-            } else {
-                settings.surface
-            },
             ..*settings
         };
-        let origin = Origin { t, x, departure: Departure::Anywhere };
+        // What was found to be on the surface is on it.
+        let found = arrived.is_some() || passed.is_some();
+        let origin = Origin { t, x, departure: if found { Departure::OnSurface } else { Departure::Anywhere } };
         let summary = run_from(face, origin, t_end, &left, &mut chooser, &mut guard, watch)?;
         let hit = guard.hit;
         events += summary.events;
@@ -105,7 +103,7 @@ where
         let Some(Hit { t: when, x: place, mode, from, wanted }) = hit else {
             return Ok(whole(summary, statistics));
         };
-        let both = mode.slides() || near(active, &place);
+        let both = mode.slides() || near(&place);
         let passage = if mode == Mode::SlidingAttracting { Passage::at(faces, active, from, &place) } else { None };
         if both && passage.is_none() {
             return Err(FilippovError::Intersection { t: when, state: Failure::state(&place) });
@@ -133,6 +131,28 @@ where
             None => (active, arrived) = (other, Some(from)),
         }
     }
+}
+
+/// Whether both functions are zero at a point near `x`, to first order: the nearest one in units of `reach` is within that.
+fn intersection_within<P: PiecewiseSmooth<N>, const N: usize>(
+    faces: &Faces<P>,
+    x: &SVector<f64, N>,
+    reach: &SVector<f64, N>,
+) -> bool {
+    let [h, k] = [0, 1].map(|i| faces[i][0].switching(x));
+    // Gradients in those units, of length 1 each.
+    let [(g, h), (l, k)] = [(0, h), (1, k)].map(|(i, value)| {
+        let slope = gradient(&faces[i][0], x).component_mul(reach);
+        let length = slope.norm();
+        (slope / length, value / length)
+    });
+    if h == 0.0 && k == 0.0 {
+        return true;
+    }
+    // |u|^2 of the shortest u with g.u = -h and l.u = -k.
+    let cosine = g.dot(&l);
+    let across = h - cosine * k;
+    k * k + across * across / (1.0 - cosine * cosine) <= 1.0
 }
 
 /// The other surface crossed in sliding.
@@ -197,6 +217,7 @@ struct Guard<'a, P, const N: usize> {
     /// Set until the first step of such a run: how fast it leaves the other surface.
     left: Option<f64>,
     hit: Option<Hit<N>>,
+    t_end: f64,
 }
 
 impl<P: PiecewiseSmooth<N>, const N: usize> FilippovObserver<N> for Guard<'_, P, N> {
@@ -205,14 +226,16 @@ impl<P: PiecewiseSmooth<N>, const N: usize> FilippovObserver<N> for Guard<'_, P,
             return Flow::Stop;
         }
         let height = |theta: f64| self.sign * self.guarded.switching(&step.at(theta));
+        let enclosed = |x: &SVector<Enclosed, N>| self.guarded.switching(x).scale(self.sign);
+        let first = |start| first_zero_along(step, &height, &enclosed, start).map(|zero| zero.theta());
         let zero = match self.left.take() {
-            Some(rate) => first_zero(height, Start::Simple(rate * step.length())).map(|zero| zero.theta()),
+            Some(rate) => first(Start::Simple(rate * step.length())),
             // Rounding may have carried the step before over the surface.
             None if height(0.0) <= 0.0 => Some(0.0),
-            None => first_zero(height, Start::Away).map(|zero| zero.theta()),
+            None => first(Start::Away),
         };
         let Some(end) = zero else { return self.observer.step(mode, step) };
-        let (t, x) = (step.time(end), project(self.guarded, &step.at(end)));
+        let (t, x) = (up_to(self.t_end, step.time(end)), project(self.guarded, &step.at(end)));
         let cut = Step { t1: t, x1: x, interpolant: &Truncated { inner: step.interpolant, end }, ..*step };
         let wanted = t <= step.t0 || self.observer.step(mode, &cut) == Flow::Continue;
         let from = if self.sign > 0.0 { Side::Plus } else { Side::Minus };
