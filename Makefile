@@ -104,7 +104,7 @@ second-opinion: ## the first theorem proved by CAPD, another group's library: ma
 	@CAPD="$(CAPD)" sh proofs/capd/run.sh
 
 .PHONY: forge
-forge: ## forge every number of every certificate, alone and in groups, and write proofs/forgeries.md (half an hour)
+forge: ## forge every number of every certificate, alone and in groups, and write proofs/forgeries.md (some twenty minutes)
 	@$(CARGO) test --release --locked --test it verify:: -- --ignored --nocapture > target/forge.log || { cat target/forge.log; exit 1; }
 	@{ printf '# Forged certificates\n\nWritten by `make forge` (tests/it/verify.rs). Numbers of forgeries; every one that is certainly false is refused.\n\n'; \
 	grep '^|' target/forge.log; } > proofs/forgeries.md
