@@ -30,6 +30,7 @@ mod golden;
 mod inspect;
 mod law;
 mod layered;
+mod long_term;
 mod misprint;
 mod odepack;
 mod properties;

@@ -17,7 +17,8 @@ fn golden_table_of_verdicts_is_that_of_the_references() {
     let written = text("docs/findings.md");
     let table = verdict_table::table(&manifests);
     assert_eq!(table.lines().filter(|l| l.contains("| agrees |") || l.contains("| differs |")).count(), 11, "{table}");
-    let made = verdict_table::with_table(&written, &table).expect("docs/findings.md has a place for the table of verdicts");
+    let made =
+        verdict_table::with_table(&written, &table).expect("docs/findings.md has a place for the table of verdicts");
     assert!(
         made == written,
         "the table of verdicts in docs/findings.md is not that of figures/*/expected.json; run `twofold bless`:\n{table}"

@@ -31,11 +31,11 @@ pub mod compare;
 pub mod draw;
 pub mod drawing;
 pub mod pipeline;
-pub mod verdict_table;
 pub mod report;
 pub mod standing;
 pub mod study;
 pub mod verdict;
+pub mod verdict_table;
 pub mod wording;
 
 use serde::{Deserialize, Serialize};
