@@ -58,14 +58,3 @@ pub fn data(id: &str) -> &'static [(&'static str, &'static [u8])] {
         _ => &[],
     }
 }
-
-/// The checkpoints of a figure's long runs ([`Checkpoints`](twofold::paper::checkpoints::Checkpoints)), as text, for `twofold audit`. None for figures without such runs.
-pub fn checkpoints(id: &str) -> Option<&'static str> {
-    match id {
-        "fig7" => Some(include_str!("fig7/checkpoints.json")),
-        "fig8" => Some(include_str!("fig8/checkpoints.json")),
-        "fig9" => Some(include_str!("fig9/checkpoints.json")),
-        "lottery" => Some(include_str!("lottery/checkpoints.json")),
-        _ => None,
-    }
-}

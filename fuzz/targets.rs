@@ -4,7 +4,6 @@
 use twofold::job::spec::{FunnelSpec, Observation, RunSpec, SwitchSpec};
 use twofold::job::sweep::Rows;
 use twofold::job::{encode, simulate, store};
-use twofold::paper::checkpoints::Checkpoints;
 use twofold::record::{Hash, Manifest};
 use twofold::render::{decode_png, png_size, read_provenance};
 use twofold::system::{Definition, PiecewiseSmooth, System};
@@ -84,7 +83,7 @@ pub fn system(bytes: &[u8]) -> String {
     said(&system.check())
 }
 
-/// A manifest, and a file of checkpoints.
+/// A manifest.
 pub fn manifest(bytes: &[u8]) -> String {
     let Some(text) = text(bytes) else { return "no text".into() };
     let found = Manifest::parse(text, "a file");
@@ -92,13 +91,7 @@ pub fn manifest(bytes: &[u8]) -> String {
         let again = Manifest::parse(std::str::from_utf8(&manifest.to_json()).unwrap(), "written again").unwrap();
         assert_eq!(again, *manifest);
     }
-    let points = Checkpoints::parse(text);
-    if let Ok(points) = &points {
-        let again = Checkpoints::parse(std::str::from_utf8(&points.to_json()).unwrap()).unwrap();
-        assert_eq!(again, *points);
-        let _ = points.tree();
-    }
-    format!("{} {}", said(&found), said(&points))
+    said(&found)
 }
 
 /// A table as CSV, the rows of a sweep, and a sweep's journal.

@@ -206,16 +206,10 @@ const TABLE: &[(&str, &str, &[&str])] = &[
         &["--json", "--quiet", "--threads 2000", "--expected nowhere"],
     ),
     (
-        "",
-        "audit fig7 --segments 1",
-        &["--segments 2", "--seed 7 --json", "--threads 2000", "--json", "--checkpoints nowhere.json"],
-    ),
-    (
         "sweep --t-end 30 --runs 12 --out s.csv",
-        "audit s.csv --segments 1",
-        &["--all", "--seed 3 --json", "--checkpoints nowhere.json", "--make points.json"],
+        "audit s.csv --rows 1",
+        &["--all", "--rows 2", "--seed 3 --json", "--threads 2000"],
     ),
-    ("", "audit fig7 --segments 1", &["--make nowhere/points.json"]),
     (
         // So many rows that the time left is said now and then.
         "sweep --t-end 3000 --runs 6 --out s.csv",

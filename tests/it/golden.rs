@@ -6,7 +6,6 @@ use std::path::Path;
 
 use twofold::cli::in_pool;
 use twofold::job::Desk;
-use twofold::paper::checkpoints::{self, Checkpoints};
 use twofold::paper::figures;
 use twofold::paper::pipeline::{compute, compute_with_tables, questions};
 use twofold::paper::{Alterations, Figure};
@@ -69,26 +68,6 @@ fn golden_shortened_figures_have_the_committed_hashes() {
     }
     let found: Vec<(&str, &str)> = found.iter().map(|(name, hash)| (name.as_str(), hash.as_str())).collect();
     assert_eq!(found, SHORTENED);
-}
-
-/// The checkpoints of the long figures are of today's runs and lead to their root, and one stretch of each figure comes out the same (`twofold audit` takes more).
-#[test]
-fn golden_checkpoints_are_those_of_the_references() {
-    for figure in figures::all() {
-        let runs = checkpoints::runs(&figure);
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("figures").join(figure.id).join("checkpoints.json");
-        let Ok(text) = fs::read_to_string(path) else { continue };
-        assert!(!runs.is_empty(), "{} has no long runs", figure.id);
-        let points = Checkpoints::parse(&text).unwrap();
-        points.confirm(&figure, &manifest(&figure)).unwrap_or_else(|doubt| {
-            panic!("{0}: {doubt}; make them anew: twofold audit {0} --make figures/{0}/checkpoints.json", figure.id)
-        });
-        let cheap: Vec<_> =
-            points.places().into_iter().filter(|p| !points.runs[p.run].panel.starts_with('c')).collect();
-        for place in checkpoints::choose(&cheap, 1, &points.root, 1) {
-            assert_eq!(points.recompute(&figure, place, &()).unwrap(), Ok(()));
-        }
-    }
 }
 
 #[test]

@@ -24,7 +24,6 @@ use {
 
 pub mod audit;
 pub mod census;
-pub mod checkpoints;
 pub mod claim;
 pub mod claims;
 pub mod compare;

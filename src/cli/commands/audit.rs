@@ -1,6 +1,7 @@
-//! `twofold audit`: parts of a long computation, chosen by chance, computed again.
+//! `twofold audit`: rows of sweeps, chosen by chance, computed again.
 
-use std::path::{Path, PathBuf};
+use std::collections::BTreeSet;
+use std::path::Path;
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -9,47 +10,39 @@ use super::chosen;
 use crate::cli::progress::{Progress, Tally};
 use crate::cli::speak::{harmless, print_json};
 use crate::cli::{CliError, Exit, in_pool, print};
+use crate::job::JobError;
 use crate::job::sweep::{Row, Rows};
-use crate::job::{Desk, JobError, Run};
-use crate::paper::checkpoints::{self, Checkpoints, Doubt, Place, choose};
-use crate::paper::{Figure, figures};
+use crate::num::random::RandomStream;
+use crate::paper::figures;
 use crate::record::hash::canonical_json;
-use crate::record::merkle::{Tree, leaf};
-use crate::record::{self, Hash, Manifest};
+use crate::record::{self, Hash};
 
-/// Check full-length figures and sweeps in seconds: recompute parts of them, chosen by chance, bit for bit.
+/// Check sweeps in seconds: recompute some of their rows, chosen by chance, bit for bit.
 ///
-/// Of a figure with long runs (fig7, fig8, fig9, lottery): its checkpoints are put together to their tree, whose root must be the one that this program
-/// was built with; random stretches are recomputed from their checkpoints. Of a figure made of sweeps (census, audit, basin) and of any file that `twofold
-/// sweep` wrote: random rows are recomputed. Which ones follows from the root of the tree over checkpoints or rows, and from --seed. Exit code 0: all came
-/// out the same. 1: something did not.
+/// Of a figure made of sweeps (census, audit, basin) and of any file that `twofold sweep` wrote. Which rows are
+/// recomputed follows from the digest of all of them and from --seed. Exit code 0: all came out the same. 1: something
+/// did not.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  twofold audit fig7 fig8\n  twofold audit fig9 --segments 20 --seed 12345\n  twofold audit --json fig7\n  twofold audit census --segments 1\n  twofold audit my-sweep.csv"
+    after_help = "Examples:\n  twofold audit census --rows 1\n  twofold audit basin --rows 20 --seed 12345\n  twofold audit my-sweep.csv --json"
 )]
 pub struct Arguments {
     /// Figures, or files of rows (.csv).
     #[arg(required = true, value_name = "FIGURE|FILE")]
     what: Vec<String>,
-    /// Stretches or rows that are recomputed, of each figure or file.
+    /// Rows that are recomputed, of each figure or file.
     #[arg(long, value_name = "N", default_value_t = 8)]
-    segments: usize,
+    rows: usize,
     /// Another choice of them: a number that only you know makes sure that nobody chose them for you.
     #[arg(long, value_name = "SEED", default_value_t = 0)]
     seed: u64,
     /// Recompute all of them.
-    #[arg(long, conflicts_with_all = ["segments", "seed"])]
+    #[arg(long, conflicts_with_all = ["rows", "seed"])]
     all: bool,
-    /// Other checkpoints of the figure [default: those that this program was built with].
-    #[arg(long, value_name = "FILE", conflicts_with = "make")]
-    checkpoints: Option<PathBuf>,
-    /// Compute a figure whole, twice, once in stretches, and write its checkpoints to FILE (figures/NAME/checkpoints.json).
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["all", "segments", "seed", "json"])]
-    make: Option<PathBuf>,
     /// Threads; 0 is one per core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
-    /// What was found, with each stretch's path to the root, as JSON on standard output.
+    /// What was found, row by row, as JSON on standard output.
     #[arg(long)]
     json: bool,
     /// No progress on standard error.
@@ -57,33 +50,12 @@ pub struct Arguments {
     quiet: bool,
 }
 
-/// What is audited.
-enum Subject {
-    /// A figure with long runs.
-    Runs(Box<LongRuns>),
-    /// A figure or file, and the sweeps that it is made of by name.
-    Rows(String, Vec<(String, Rows)>),
-}
-
-/// A figure, and what is said of it.
-struct LongRuns {
-    figure: Figure,
-    points: Checkpoints,
-    /// The root that its checkpoints must have.
-    root: Hash,
-    reference: Manifest,
-}
-
-/// Whether a stretch could be computed, and whether it came out the same.
-type Recomputed = Result<Result<(), Doubt>, JobError>;
+/// The sweeps of a file or figure, by name.
+type Sweeps = Vec<(String, Rows)>;
 
 /// What came of it.
 struct Report {
     name: String,
-    /// The root of the tree over stretches or rows.
-    root: Hash,
-    /// What is counted.
-    unit: &'static str,
     recomputed: usize,
     of: usize,
     wrong: Vec<String>,
@@ -92,28 +64,18 @@ struct Report {
 
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let progress = Progress::new(arguments.quiet);
-    if let Some(file) = &arguments.make {
-        return make(arguments, file, &progress);
-    }
     // Everything is read before the first second of computing is spent.
-    let mut subjects = Vec::new();
-    for what in &arguments.what {
-        subjects.push(read(arguments, what)?);
-    }
+    let subjects = arguments.what.iter().map(|what| read(what)).collect::<Result<Vec<_>, _>>()?;
     let mut reports = Vec::new();
-    for subject in &subjects {
-        let report = match subject {
-            Subject::Runs(runs) => stretches(arguments, runs, &progress)?,
-            Subject::Rows(name, sweeps) => recheck(arguments, name, sweeps, &progress)?,
-        };
+    for (name, sweeps) in arguments.what.iter().zip(&subjects) {
+        let report = recheck(arguments, name, sweeps, &progress)?;
         if !arguments.json {
             for wrong in &report.wrong {
                 print(&format!("{}: DIFFERS: {}", report.name, harmless(wrong)))?;
             }
             if report.wrong.is_empty() {
-                let Report { name, root, unit, recomputed, of, .. } = &report;
-                let root = root.as_str();
-                print(&format!("{name}: {recomputed} of {of} {unit} recomputed, all the same; root {root}"))?;
+                let Report { name, recomputed, of, .. } = &report;
+                print(&format!("{name}: {recomputed} of {of} rows recomputed, all the same"))?;
             }
         }
         reports.push(report);
@@ -124,51 +86,28 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             .iter()
             .map(|r| {
                 json!({
-                    "name": r.name, "root": r.root, "unit": r.unit, "recomputed": r.recomputed, "of": r.of,
+                    "name": r.name, "recomputed": r.recomputed, "of": r.of,
                     "wrong": r.wrong, "parts": r.parts,
                 })
             })
             .collect();
-        print_json(&json!({ "format": "twofold-audit", "version": 1, "all_the_same": sound, "findings": found }))?;
+        print_json(&json!({ "format": "twofold-audit", "version": 2, "all_the_same": sound, "findings": found }))?;
     }
     Ok(if sound { Exit::Fine } else { Exit::CheckFailed })
 }
 
-fn read(arguments: &Arguments, what: &str) -> Result<Subject, CliError> {
-    let no_checkpoints = || match &arguments.checkpoints {
-        Some(_) => Err(CliError::no_effect("--checkpoints", format!("{what} is made of rows and has none"))),
-        None => Ok(()),
-    };
+fn read(what: &str) -> Result<Sweeps, CliError> {
     if what.to_ascii_lowercase().ends_with(".csv") {
-        no_checkpoints()?;
         let bytes = record::files::read(Path::new(what))?;
-        return Ok(Subject::Rows(what.to_owned(), vec![(what.to_owned(), rows_of(what, &bytes)?)]));
+        return Ok(vec![(what.to_owned(), rows_of(what, &bytes)?)]);
     }
     let figure = chosen(&[what.to_owned()])?.remove(0);
     let sweeps = figures::data(figure.id);
-    if !sweeps.is_empty() {
-        no_checkpoints()?;
-        let read = |(file, bytes): &(&str, &[u8])| Ok(((*file).to_owned(), rows_of(file, bytes)?));
-        return Ok(Subject::Rows(what.to_owned(), sweeps.iter().map(read).collect::<Result<_, CliError>>()?));
+    if sweeps.is_empty() {
+        let id = figure.id;
+        return Err(CliError::Usage(format!("{id} is not made of sweeps; `twofold check {id}` recomputes all of it")));
     }
-    let built_in = figures::checkpoints(figure.id).ok_or_else(|| {
-        CliError::Usage(format!(
-            "{0} has no runs so long that parts of them must do; `twofold check {0}` recomputes all of it",
-            figure.id
-        ))
-    })?;
-    let parsed = |text: &str, name: &str| {
-        Checkpoints::parse(text).map_err(|e| CliError::Usage(format!("{}: {e}", harmless(name))))
-    };
-    let committed = parsed(built_in, &format!("the built-in checkpoints of {what}"))?;
-    let points = match &arguments.checkpoints {
-        Some(file) => parsed(&record::files::read_text(file)?, &file.display().to_string())?,
-        None => committed.clone(),
-    };
-    let reference = figures::reference(figure.id)
-        .ok_or_else(|| CliError::Usage(format!("no reference is committed for {}", figure.id)))?;
-    let reference = Manifest::parse(reference, &format!("the built-in reference of {}", figure.id))?;
-    Ok(Subject::Runs(Box::new(LongRuns { figure, points, root: committed.root, reference })))
+    sweeps.iter().map(|(file, bytes)| Ok(((*file).to_owned(), rows_of(file, bytes)?))).collect()
 }
 
 fn rows_of(name: &str, bytes: &[u8]) -> Result<Rows, CliError> {
@@ -176,50 +115,17 @@ fn rows_of(name: &str, bytes: &[u8]) -> Result<Rows, CliError> {
     read.map_err(|e| CliError::Usage(format!("{}: {e}", harmless(name))))
 }
 
-fn stretches(arguments: &Arguments, runs: &LongRuns, progress: &Progress) -> Result<Report, CliError> {
-    let LongRuns { figure, points, root, reference } = runs;
-    let places = points.places();
-    let mut report = Report {
-        name: figure.id.to_owned(),
-        root: points.root.clone(),
-        unit: "stretches",
-        recomputed: 0,
-        of: places.len(),
-        wrong: Vec::new(),
-        parts: Vec::new(),
-    };
-    if let Err(doubt) = points.confirm(figure, reference) {
-        report.wrong.push(doubt.to_string());
-        return Ok(report);
+/// So many of the first `of` numbers, each once, in order, as `digest` and `seed` choose them.
+fn choose(of: usize, count: usize, digest: &Hash, seed: u64) -> Vec<usize> {
+    let from_digest = u64::from_str_radix(&digest.as_str()[..16], 16).unwrap_or(0);
+    let mut random = RandomStream::new(from_digest, seed);
+    let mut rest: Vec<usize> = (0..of).collect();
+    let mut chosen = BTreeSet::new();
+    while chosen.len() < count && !rest.is_empty() {
+        let at = ((random.uniform() * rest.len() as f64) as usize).min(rest.len() - 1);
+        chosen.insert(rest.swap_remove(at));
     }
-    if points.root != *root {
-        report.wrong.push(format!("the root is {}, and not {}", points.root.as_str(), root.as_str()));
-    }
-    let wanted = if arguments.all { places } else { choose(&places, arguments.segments, &points.root, arguments.seed) };
-    let tally = Tally::counting(progress, "stretches", wanted.len() as u64);
-    let found: Vec<(Place, Recomputed)> = in_pool(arguments.threads, || {
-        let one = |place: &Place| {
-            let found = points.recompute(figure, *place, &());
-            tally.done(!matches!(found, Ok(Ok(()))));
-            (*place, found)
-        };
-        wanted.par_iter().with_max_len(1).map(one).collect()
-    })?;
-    tally.finish();
-    report.recomputed = found.len();
-    let tree = points.tree();
-    for (place, found) in found {
-        let found = found?;
-        let run = &points.runs[place.run];
-        let before = place.stretch.checked_sub(1).map(|i| &run.ends[i]);
-        report.parts.push(json!({
-            "picture": run.picture, "panel": run.panel, "stretch": place.stretch + 1, "same": found.is_ok(),
-            "leaf": [json!(run.spec), json!(before), json!(run.ends[place.stretch])],
-            "path": tree.path(points.leaf_number(place)),
-        }));
-        report.wrong.extend(found.err().map(|doubt| doubt.to_string()));
-    }
-    Ok(report)
+    chosen.into_iter().collect()
 }
 
 fn recheck(
@@ -230,15 +136,13 @@ fn recheck(
 ) -> Result<Report, CliError> {
     let rows: Vec<(usize, Row)> =
         sweeps.iter().enumerate().flat_map(|(i, (_, rows))| rows.iter().map(move |row| (i, row))).collect();
-    // A leaf says of which sweep, under which version of the numerics, a row is.
-    let leaf_of = |(sweep, row): &(usize, Row)| {
-        let rows = &sweeps[*sweep].1;
-        leaf(&canonical_json(&(rows.sweep().hash(), row.line())))
+    let wanted = if arguments.all {
+        (0..rows.len()).collect()
+    } else {
+        // Of which sweep a row is belongs to it.
+        let said: Vec<_> = rows.iter().map(|(sweep, row)| (sweeps[*sweep].1.sweep().hash(), row.line())).collect();
+        choose(rows.len(), arguments.rows, &Hash::of(&canonical_json(&said)), arguments.seed)
     };
-    let tree = Tree::of(rows.iter().map(leaf_of).collect());
-    let numbers: Vec<usize> = (0..rows.len()).collect();
-    let wanted =
-        if arguments.all { numbers } else { choose(&numbers, arguments.segments, tree.root(), arguments.seed) };
     let tally = Tally::new(progress, wanted.len() as u64);
     let found: Vec<(usize, Result<Row, JobError>)> = in_pool(arguments.threads, || {
         let one = |number: &usize| {
@@ -250,52 +154,16 @@ fn recheck(
         wanted.par_iter().with_max_len(1).map(one).collect()
     })?;
     tally.finish();
-    let mut report = Report {
-        name: name.to_owned(),
-        root: tree.root().clone(),
-        unit: "rows",
-        recomputed: found.len(),
-        of: rows.len(),
-        wrong: Vec::new(),
-        parts: Vec::new(),
-    };
+    let mut report =
+        Report { name: name.to_owned(), recomputed: found.len(), of: rows.len(), wrong: Vec::new(), parts: Vec::new() };
     for (number, again) in found {
         let ((sweep, row), again) = (&rows[number], again?);
         let (file, same) = (&sweeps[*sweep].0, row.line() == again.line());
-        report.parts.push(json!({ "file": file, "row": row.number(), "same": same, "path": tree.path(number) }));
+        report.parts.push(json!({ "file": file, "row": row.number(), "same": same }));
         if !same {
             let number = row.number();
             report.wrong.push(format!("row {number} of {file} is {}, and comes out as {}", row.line(), again.line()));
         }
     }
     Ok(report)
-}
-
-/// Computes a figure's long runs whole and in stretches, and writes their checkpoints.
-fn make(arguments: &Arguments, file: &Path, progress: &Progress) -> Result<Exit, CliError> {
-    let [name] = &arguments.what[..] else {
-        return Err(CliError::Usage("--make writes the checkpoints of one figure: name one".into()));
-    };
-    let figure = chosen(std::slice::from_ref(name))?.remove(0);
-    let runs = checkpoints::runs(&figure);
-    if runs.is_empty() {
-        return Err(CliError::no_effect("--make", format!("{name} has no runs that can be cut into stretches")));
-    }
-    let stretches = checkpoints::STRETCHES / runs.len() as u64;
-    record::files::try_place(file)?;
-    let desk = Desk::new(None, progress);
-    let found: Vec<Result<checkpoints::Checked, JobError>> = in_pool(arguments.threads, || {
-        runs.par_iter()
-            .with_max_len(1)
-            .map(|run| {
-                let answer = desk.ask(&Run(run.2.clone()))?;
-                checkpoints::cut(*run, stretches, &answer, &())
-            })
-            .collect()
-    })?;
-    let runs = found.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let points = Checkpoints::of(figure.id, runs);
-    record::write(file, &points.to_json())?;
-    print(&format!("{name}: {} stretches, root {}", points.places().len(), points.root.as_str()))?;
-    Ok(Exit::Fine)
 }

@@ -15,7 +15,6 @@ pub mod folder;
 pub mod hash;
 pub mod journal;
 pub mod manifest;
-pub mod merkle;
 
 pub use files::{FileError, write};
 pub use folder::{FileBytes, Tree, read_tree, visit_tree};
