@@ -64,6 +64,21 @@ pub(super) mod control {
     pub const GROW: f64 = 10.0;
 }
 
+/// Detection of stiffness, Hairer & Wanner (1996), sec. IV.2, with the numbers of their DOPRI5: stages 6 and 7 belong to one time, so
+/// h |k7 - k6| / |x7 - x6| estimates h |lambda|, which is near the boundary of the stability region where that bounds the step.
+mod stiffness {
+    /// The boundary of the stability region on the negative axis.
+    pub const BOUNDARY: f64 = 3.25;
+    /// Steps at the boundary before the equation is called stiff, ...
+    pub const AT_IT: u32 = 15;
+    /// ... unless so many in a row are not.
+    pub const INSIDE: u32 = 6;
+    /// Steps between two looks where none was at the boundary lately.
+    pub const EVERY: u64 = 64;
+    /// Differences of the stages below this share of the tolerances, squared, are rounding.
+    pub const ROUNDING: f64 = 1e-6;
+}
+
 /// The Dormand-Prince stepper.
 #[derive(Clone, Debug)]
 pub struct Dopri5<const N: usize> {
@@ -80,6 +95,9 @@ pub struct Dopri5<const N: usize> {
     /// log2 of the square of the last accepted step's error, for the PI controller.
     pub(super) last_log: f64,
     pub(super) dense: Dense<N>,
+    /// Steps found at the boundary of the stability region, and steps inside it since the last.
+    at_boundary: u32,
+    inside: u32,
 }
 
 /// The interpolant of one step, Hairer et al. (1993), sec. II.6: what it is made of. Most steps are never looked into, so its
@@ -150,6 +168,27 @@ impl<const N: usize> Dopri5<N> {
             h: 0.0,
             last_log: control::LEAST_LOG,
             dense: Dense { h: 0.0, x0: zero, x1: zero, k: [zero; 6] },
+            at_boundary: 0,
+            inside: 0,
+        }
+    }
+
+    /// Whether the steps are bounded by stability, not by accuracy: an implicit method is then better.
+    pub fn is_stiff(&self) -> bool {
+        self.at_boundary >= stiffness::AT_IT
+    }
+
+    /// Looks at a step for [`Dopri5::is_stiff`]: the differences of its last two stages and of their derivatives times h.
+    fn look_for_stiffness(&mut self, apart: &SVector<f64, N>, derivatives: &SVector<f64, N>) {
+        let x1 = self.x;
+        let [states, derivatives] = [apart, derivatives].map(|d| self.mean_square(d, |i| x1[i].abs()));
+        if states > stiffness::ROUNDING && derivatives > stiffness::BOUNDARY * stiffness::BOUNDARY * states {
+            (self.at_boundary, self.inside) = (self.at_boundary + 1, 0);
+        } else {
+            self.inside += 1;
+            if self.inside >= stiffness::INSIDE {
+                self.at_boundary = 0;
+            }
         }
     }
 
@@ -220,8 +259,8 @@ impl<const N: usize> Stepper<N> for Dopri5<N> {
             let k3 = field.eval(&(x0 + k1 * (h * A31) + k2 * (h * A32)));
             let k4 = field.eval(&(x0 + k1 * (h * A41) + k2 * (h * A42) + k3 * (h * A43)));
             let k5 = field.eval(&(x0 + k1 * (h * A51) + k2 * (h * A52) + k3 * (h * A53) + k4 * (h * A54)));
-            let k6 =
-                field.eval(&(x0 + k1 * (h * A61) + k2 * (h * A62) + k3 * (h * A63) + k4 * (h * A64) + k5 * (h * A65)));
+            let x6 = x0 + k1 * (h * A61) + k2 * (h * A62) + k3 * (h * A63) + k4 * (h * A64) + k5 * (h * A65);
+            let k6 = field.eval(&x6);
             // The increment by itself: one rounding at the size of the state, not five.
             let x1 = x0 + (k1 * (h * A71) + k3 * (h * A73) + k4 * (h * A74) + k5 * (h * A75) + k6 * (h * A76));
             let k7 = field.eval(&x1);
@@ -256,6 +295,9 @@ impl<const N: usize> Stepper<N> for Dopri5<N> {
                 self.x = x1;
                 self.fsal = k7;
                 self.statistics.steps += 1;
+                if self.at_boundary > 0 || self.statistics.steps.is_multiple_of(stiffness::EVERY) {
+                    self.look_for_stiffness(&(x1 - x6), &((k7 - k6) * h));
+                }
                 return Ok(Step { t0, t1: self.t, x0, x1, interpolant: &self.dense });
             }
             self.statistics.rejected += 1;

@@ -2,14 +2,14 @@
 
 use nalgebra::SVector;
 
+use super::automatic::Automatic;
 use super::exit::{Chooser, Plan};
 use super::flow::{FreeFlow, InPhysicalTime, SlidingFlow, Straight, Truncated, project};
 use super::two_fold::{AlongCurve, SlidingAtTwoFold};
 use super::{EventKind, ExitRule, FilippovError, FilippovObserver, FilippovSummary, Mode, ModeEvent, Settings, Side};
-use crate::dopri5::Dopri5;
 use crate::driver::Watch;
 use crate::roots::{Enclosed, Start, Zero, brent, first_zero_along};
-use crate::step::{Failure, Flow, Interpolant, Statistics, Step, Stepper, StopReason, Tolerance, finite};
+use crate::step::{Failure, Flow, Interpolant, Statistics, Step, StopReason, Tolerance, finite};
 use twofold_num::{Arithmetic, Dual, Interval};
 use twofold_system::filippov::{TwoFold, gradient, lie_derivatives, two_fold};
 use twofold_system::{PiecewiseSmooth, VectorField, variables};
@@ -682,7 +682,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     /// Free flight until the surface or the end.
     fn fly(&mut self, side: Side, start: FlightStart) -> Result<State<N>, FilippovError> {
         let flow = FreeFlow { system: self.system, side };
-        let mut method = Dopri5::<N>::new(self.accumulation.tolerance(self.settings.tolerance));
+        let mut method = Automatic::<N>::new(self.accumulation.tolerance(self.settings.tolerance));
         let (t_start, mut start) = (self.t, start);
         method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step)?;
         let landed = loop {
@@ -730,7 +730,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 break None;
             }
         };
-        self.count(method.statistics());
+        self.count(&method.statistics());
         match landed {
             _ if self.stop.is_some() => Ok(State::Free { side, start: FlightStart::Away }),
             None => Ok(State::Free { side, start: FlightStart::Away }),
@@ -794,7 +794,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let system = self.system;
         let mode = sliding.mode();
         let flow = SlidingFlow { system, direction: sliding.direction() };
-        let mut method = Dopri5::<M>::new(self.settings.tolerance);
+        let mut method = Automatic::<M>::new(self.settings.tolerance);
         let lift = |x: &SVector<f64, N>| SVector::<f64, M>::from_fn(|i, _| if i < N { x[i] } else { 0.0 });
         // The clock of the flow starts at zero with each restart, so that short times keep their digits.
         let mut t_base = self.t;
@@ -827,7 +827,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 break Some(end);
             }
             if idle >= LIMITS.idle_steps {
-                self.count(method.statistics());
+                self.count(&method.statistics());
                 return self.degenerate(Some(mode), DEGENERATE_END);
             }
             if self.stop.is_some() || method.statistics().steps > self.settings.max_steps {
@@ -853,7 +853,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY)?;
             }
         };
-        self.count(method.statistics());
+        self.count(&method.statistics());
         let from = Some(mode);
         match next {
             None => match ahead.local {

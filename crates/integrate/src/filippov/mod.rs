@@ -44,6 +44,7 @@
 //! not reached along a sliding direction, end with [`FilippovError::NonTransversal`]; crossings that accumulate (invisible
 //! two-folds have such orbits) end with [`FilippovError::Zeno`], which names the moment of accumulation.
 
+mod automatic;
 mod engine;
 mod exit;
 mod flow;
@@ -198,7 +199,7 @@ impl<const N: usize, O: Observer<N>> FilippovObserver<N> for AllModes<'_, O> {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// Tolerances of the Dormand-Prince method in every mode.
+    /// Tolerances in every mode: of the Dormand-Prince method, and of Radau IIA where a piece is stiff.
     pub tolerance: Tolerance,
     /// The longest step in free flight. Sliding steps are measured in rescaled time and have no cap.
     pub max_step: f64,
