@@ -103,8 +103,8 @@ impl<const N: usize> Interpolant<N> for Truncated<'_, N> {
     fn bernstein(&self) -> Option<[SVector<f64, N>; 5]> {
         let mut work = self.inner.bernstein()?;
         let mut left = work;
-        for k in 0..5 {
-            left[k] = work[0];
+        for (k, point) in left.iter_mut().enumerate() {
+            *point = work[0];
             for i in 0..4 - k {
                 work[i] += (work[i + 1] - work[i]) * self.end;
             }
