@@ -3,6 +3,7 @@
 
 use nalgebra::SVector;
 
+use super::guard::Redoable;
 use super::starting_step::starting_step;
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
 use twofold_num::elementary::{rough_exp2, rough_log2, sqrt};
@@ -238,8 +239,11 @@ impl<const N: usize> Stepper<N> for Dopri5<N> {
         if !finite(&x) || !finite(&self.fsal) {
             return Err(Failure::NotFinite { t, state: Failure::state(&x) });
         }
-        // Not below what advances the time: the error test then decides.
-        self.h = self.first_step(field).max(2.0 * f64::EPSILON * t.abs()).min(max_step);
+        self.h = self.first_step(field).min(max_step);
+        if t + self.h == t {
+            // The shortest step that advances the time: the error test then decides.
+            self.h = (2.0 * f64::EPSILON * t.abs()).min(max_step);
+        }
         Ok(())
     }
 
@@ -309,5 +313,11 @@ impl<const N: usize> Stepper<N> for Dopri5<N> {
 
     fn statistics(&self) -> &Statistics {
         &self.statistics
+    }
+}
+
+impl<const N: usize> Redoable<N> for Dopri5<N> {
+    fn last(&self) -> &dyn Interpolant<N> {
+        &self.dense
     }
 }

@@ -3,7 +3,7 @@
 //!
 //! Each lane has its own time, step size, schedule and end, takes and refuses steps by itself, and is given the next run when its own has
 //! come to an end. So what comes of a run does not depend on its neighbours, on the number of lanes, or on the machine: it is bit for bit
-//! what [`drive`](super::drive) makes of it with [`Dopri5`], because every operation is the same one in the same order (tests/it/ensemble.rs).
+//! what [`drive`](super::drive) makes of it with [`Guarded`](super::Guarded) [`Dopri5`], because every operation is the same one in the same order (tests/it/ensemble.rs).
 //!
 //! The instruction set is chosen when the program runs ([`InstructionSet`]). It decides how many lanes an instruction takes and nothing else:
 //! no operation is fused, none reordered.
@@ -17,6 +17,7 @@ use pulp::{Scalar, Simd, WithSimd};
 
 use super::dopri5::{Dense, Dopri5, control, tableau::*};
 use super::driver::{Course, Observer, Summary, Watch};
+use super::guard::{Gates, SMALL_BEND, Stage, Stages};
 use super::schedule::{Kicker, Segment};
 use super::step::{Failure, Flow, Statistics, Step, Stepper, StopReason, Tolerance};
 use twofold_num::elementary::kernels::{rough_exp2, rough_log2};
@@ -303,6 +304,8 @@ struct Lane<O, const N: usize> {
     most_steps_in_segment: f64,
     /// Does the restarts.
     stepper: Dopri5<N>,
+    gates: Option<Gates>,
+    stages: Stages,
 }
 
 /// All lanes: the fields of [`Dopri5`] side by side, as bare registers.
@@ -323,6 +326,12 @@ struct State<S: Simd, O, const N: usize, const K: usize> {
     x: [[S::f64s; K]; N],
     fsal: [[S::f64s; K]; N],
     corner: [[S::f64s; K]; N],
+    /// What can hide in steps: [`Plain`](super::guard::Plain)'s fields; never anything if `flat` is -infinity, and always something if it is NaN.
+    slopes: [[S::f64s; K]; N],
+    offset: [S::f64s; K],
+    flat: [S::f64s; K],
+    /// Whether a slope is not zero in any lane.
+    sloping: [bool; N],
     /// Those in the runs' equations.
     numbers: Vec<Aligned<[S::f64s; K]>>,
     /// For what lies between in an evaluation; what is left there means nothing.
@@ -360,6 +369,10 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             x: [zero; N],
             fsal: [zero; N],
             corner: [zero; N],
+            slopes: [zero; N],
+            offset: zero,
+            flat: zero,
+            sloping: [false; N],
             numbers: vec![Aligned(zero); numbers],
             room: vec![Aligned(zero); room],
             lanes: (0..Registers::<S, K>::WIDTH).map(|_| None).collect(),
@@ -410,7 +423,10 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             steps_before: 0.0,
             most_steps_in_segment: 0.0,
             stepper: Dopri5::new(tolerance),
+            gates: Gates::new(equations.of(run).tape()),
+            stages: Stages::new(0.0, f64::INFINITY),
         });
+        self.watch_gates(l);
         if first.is_none() {
             return self.finish(l, Ok(StopReason::EndTime));
         }
@@ -420,13 +436,19 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
 
     /// Begins the segment of lane `l`.
     fn restart<E: Equations<N>>(&mut self, l: usize, equations: &E) -> Option<Failure> {
+        let lane = self.lanes[l].as_mut()?;
+        let end = lane.segment.end;
+        lane.stages = Stages::new(end, lane.course.step_cap.for_segment(end - get(&self.t, l)));
+        self.begin_stage(l, equations)
+    }
+
+    /// Begins the stage of lane `l` that is under way.
+    fn begin_stage<E: Equations<N>>(&mut self, l: usize, equations: &E) -> Option<Failure> {
         let (t, x) = (get(&self.t, l), self.state(l));
         let lane = self.lanes[l].as_mut()?;
         lane.restarts += 1;
-        let end = lane.segment.end;
-        if let Err(failure) =
-            lane.stepper.restart(equations.of(lane.run), t, x, end, lane.course.step_cap.for_segment(end - t))
-        {
+        let Stage { end, max_step } = lane.stages.now();
+        if let Err(failure) = lane.stepper.restart(equations.of(lane.run), t, x, end, max_step) {
             return Some(failure);
         }
         let Dopri5 { fsal, h, last_log, max_step, .. } = &lane.stepper;
@@ -439,6 +461,24 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             put(&mut self.fsal[i], l, fsal[i]);
         }
         None
+    }
+
+    /// For the lanes to see which steps hide nothing, as far as they can.
+    fn watch_gates(&mut self, l: usize) {
+        let gates = self.lanes[l].as_ref().and_then(|lane| lane.gates.as_ref());
+        let plain = gates.and_then(Gates::plain);
+        let flat = match (gates, plain) {
+            (None, _) => f64::NEG_INFINITY,
+            (Some(_), None) => f64::NAN,
+            (Some(_), Some(plain)) => plain.flat,
+        };
+        put(&mut self.flat, l, flat);
+        put(&mut self.offset, l, plain.map_or(0.0, |plain| plain.offset));
+        for i in 0..N {
+            let slope = plain.map_or(0.0, |plain| plain.slopes[i]);
+            put(&mut self.slopes[i], l, slope);
+            self.sloping[i] |= slope != 0.0;
+        }
     }
 
     fn state(&self, l: usize) -> SVector<f64, N> {
@@ -541,6 +581,24 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         let ended = accepted.and(last.or(of(self.max_steps).at_most(steps, set)));
         let unsound = sound.select(zero, one).size();
         let mut noted = tiny.or(ended).or(number(0.5).less(unsound, set));
+        let (mut w0, mut w1, mut bend) = (of(self.offset), of(self.offset), zero);
+        for i in 0..N {
+            if self.sloping[i] {
+                let slope = of(self.slopes[i]);
+                w0 += slope * x0[i];
+                w1 += slope * x1[i];
+                bend += slope.size() * reach(x0[i], x1[i], h, [k1[i], k3[i], k4[i], k5[i], k6[i], k7[i]], set);
+            }
+        }
+        let flat = of(self.flat);
+        let far = flat + bend;
+        let above = far.at_most(w0, set).and(far.at_most(w1, set));
+        let below = far.at_most(zero - w0, set).and(far.at_most(zero - w1, set));
+        let known = flat.at_most(flat, set);
+        let plain = bend.at_most(number(SMALL_BEND), set).or(above).or(below).and(known);
+        // Where not.
+        let hiding = number(0.5).less(plain.select(zero, one), set).and(accepted);
+        noted = noted.or(hiding);
         let mut met = None;
         if let Some(Plane { coordinate, value }) = common.plane {
             let may = may_meet(coordinate, number(value), h, &x0, &x1, [&k1, &k3, &k4, &k5, &k6, &k7], set);
@@ -583,6 +641,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             accepted: lanes(accepted),
             sound: lanes(sound),
             last: lanes(last),
+            hiding: lanes(hiding),
             met,
             beyond,
             outside,
@@ -640,6 +699,26 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             return None;
         }
         let (t1, mut x1, steps) = (get(&self.t, l), self.state(l), get(&self.steps, l));
+        let k = std::array::from_fn(|j| SVector::from_fn(|i, _| get(&seen.k[j][i], l)));
+        let dense = Dense { h, x0, x1, k };
+        if yes(&seen.hiding) {
+            let tolerance = Tolerance { rtol: get(&self.rtol, l), atol: get(&self.atol, l) };
+            let lane = self.lanes[l].as_mut()?;
+            let step = Step { t0, t1, x0, x1, interpolant: &dense };
+            if let Some(times) = lane.gates.as_mut().and_then(|gates| gates.missed(&step, tolerance)) {
+                if let Err(failure) = lane.stages.go_through((t0, &x0), times) {
+                    return Some(Err(failure));
+                }
+                put(&mut self.t, l, t0);
+                for i in 0..N {
+                    put(&mut self.x[i], l, x0[i]);
+                }
+                return self.begin_stage(l, equations).map(Err);
+            }
+        }
+        let staged = yes(&seen.last) && self.lanes[l].as_mut()?.stages.end_at(t1);
+        let last = yes(&seen.last) && t1 >= self.lanes[l].as_ref()?.segment.end;
+        let mut begun = !staged || last;
         if let (true, Some(carried)) = (seen.outside.as_ref().is_some_and(yes), &common.carried) {
             let (length, [least, most]) = (carried.length(&x1), carried.range);
             if !(least..=most).contains(&length) {
@@ -648,18 +727,17 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
                     put(&mut self.x[i], l, x1[i]);
                 }
                 self.lanes[l].as_mut()?.observer.rescaled(t1, length);
-                if !yes(&seen.last)
-                    && let Some(failure) = self.restart(l, equations)
-                {
-                    return Some(Err(failure));
+                if !last {
+                    begun = true;
+                    if let Some(failure) = self.restart(l, equations) {
+                        return Some(Err(failure));
+                    }
                 }
             }
         }
         let lane = self.lanes[l].as_mut()?;
         let mut flow = Flow::Continue;
         if seen.met.as_ref().is_some_and(yes) {
-            let k = std::array::from_fn(|j| SVector::from_fn(|i, _| get(&seen.k[j][i], l)));
-            let dense = Dense { h, x0, x1, k };
             flow = lane.observer.step(&Step { t0, t1, x0, x1, interpolant: &dense });
         }
         if seen.beyond.as_ref().is_some_and(yes) {
@@ -670,12 +748,15 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         } else {
             (steps >= lane.course.max_steps as f64 && t1 < lane.course.t_end).then_some(StopReason::StepBudget)
         };
-        if stop.is_some() || yes(&seen.last) {
+        if stop.is_some() || last {
             lane.most_steps_in_segment = lane.most_steps_in_segment.max(steps - lane.steps_before);
             lane.steps_before = steps;
         }
-        if stop.is_some() || !yes(&seen.last) {
+        if stop.is_some() {
             return stop.map(Ok);
+        }
+        if !last {
+            return if begun { None } else { self.begin_stage(l, equations).map(Err) };
         }
         if common.carried.is_some() {
             lane.observer.stopped(t1, &x1);
@@ -705,6 +786,8 @@ struct Seen<S: Simd, const N: usize, const K: usize> {
     accepted: [S::f64s; K],
     sound: [S::f64s; K],
     last: [S::f64s; K],
+    /// Where a step may hide something.
+    hiding: [S::f64s; K],
     met: Option<[S::f64s; K]>,
     beyond: Option<[S::f64s; K]>,
     /// Where what is carried may be too short or too long.
@@ -795,15 +878,8 @@ fn may_meet<S: Simd, const N: usize, const K: usize>(
     };
     let number = |value: f64| Registers::<S, K>::splat(set, value);
     let (a, b) = (component(x0), component(x1));
-    let [k1, k3, k4, k5, k6, k7] =
-        [component(k[0]), component(k[1]), component(k[2]), component(k[3]), component(k[4]), component(k[5])];
-    let r2 = b - a;
-    let r3 = k1 * h - r2;
-    let r3_and_r4 = r2 - k7 * h;
-    let r5 =
-        (k1 * number(D1) + k3 * number(D3) + k4 * number(D4) + k5 * number(D5) + k6 * number(D6) + k7 * number(D7)) * h;
-    let larger = r3.size().less(r3_and_r4.size(), set).select(r3_and_r4.size(), r3.size());
-    let reach = number(0.25) * (larger + number(0.25) * r5.size());
+    let k = [component(k[0]), component(k[1]), component(k[2]), component(k[3]), component(k[4]), component(k[5])];
+    let reach = reach(a, b, h, k, set);
     let (h0, h1) = (a - value, b - value);
     let margin = number(1e-12) * (h0.size() + h1.size() + value.size() + reach);
     let nearer = h0.size().less(h1.size(), set).select(h0.size(), h1.size());
@@ -811,6 +887,26 @@ fn may_meet<S: Simd, const N: usize, const K: usize>(
     let same = zero.less(h0, set).and(zero.less(h1, set)).or(h0.less(zero, set).and(h1.less(zero, set)));
     let far = clear.and(same).select(number(1.0), zero);
     far.less(number(0.5), set)
+}
+
+/// How far one coordinate may leave the range between its values `a` and `b` at a step's ends: as [`Dense`]'s
+/// [`reach`](super::step::Interpolant::reach) bounds it.
+#[inline(always)]
+fn reach<S: Simd, const K: usize>(
+    a: Registers<S, K>,
+    b: Registers<S, K>,
+    h: Registers<S, K>,
+    [k1, k3, k4, k5, k6, k7]: [Registers<S, K>; 6],
+    set: S,
+) -> Registers<S, K> {
+    let number = |value: f64| Registers::<S, K>::splat(set, value);
+    let r2 = b - a;
+    let r3 = k1 * h - r2;
+    let r3_and_r4 = r2 - k7 * h;
+    let r5 =
+        (k1 * number(D1) + k3 * number(D3) + k4 * number(D4) + k5 * number(D5) + k6 * number(D6) + k7 * number(D7)) * h;
+    let larger = r3.size().less(r3_and_r4.size(), set).select(r3_and_r4.size(), r3.size());
+    number(0.25) * (larger + number(0.25) * r5.size())
 }
 
 /// x0 + k_1 (h a_1) + k_2 (h a_2) + ..., from the left.

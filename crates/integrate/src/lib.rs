@@ -31,6 +31,7 @@ pub mod dopri5;
 pub mod driver;
 pub mod ensemble;
 pub mod filippov;
+pub mod guard;
 pub mod layered;
 mod linear;
 pub mod lsoda;
@@ -46,6 +47,7 @@ mod tests;
 
 pub use dopri5::Dopri5;
 pub use driver::{Course, Ignore, Observer, Part, Summary, Watch, drive, drive_part};
+pub use guard::Guarded;
 pub use layered::Layered;
 pub use lsoda::Lsoda;
 pub use method::{Method, PRECISIONS, WithStepper, with_extended};

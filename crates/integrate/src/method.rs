@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::step::{Stepper, Tolerance};
 use super::taylor::Precision;
-use super::{Dopri5, Layered, Lsoda, Radau5, Taylor};
+use super::{Dopri5, Guarded, Layered, Lsoda, Radau5, Taylor};
 use twofold_num::MultiFloat;
 
 /// How many bits a number of [`Method::TaylorExtended`] can have: double-double numbers, then those of [`MultiFloat`].
@@ -57,9 +57,9 @@ impl Method {
     /// Gives a fresh stepper of this method to `user`.
     pub fn with_stepper<U: WithStepper<N>, const N: usize>(self, tolerance: Tolerance, user: U) -> U::Answer {
         match self {
-            Method::Lsoda => user.with(Lsoda::new(tolerance)),
-            Method::Dopri5 => user.with(Dopri5::new(tolerance)),
-            Method::Radau5 => user.with(Radau5::new(tolerance)),
+            Method::Lsoda => user.with(Guarded::new(Lsoda::new(tolerance), tolerance)),
+            Method::Dopri5 => user.with(Guarded::new(Dopri5::new(tolerance), tolerance)),
+            Method::Radau5 => user.with(Guarded::new(Radau5::new(tolerance), tolerance)),
             Method::Taylor => user.with(Taylor::new(tolerance)),
             Method::TaylorExtended => user.with(Taylor::extended(tolerance).with_decimal_constants()),
             Method::Layered => user.with(Layered::new(tolerance)),

@@ -8,6 +8,7 @@
 
 use nalgebra::{Complex, Matrix3, SMatrix, SVector, Vector3};
 
+use super::guard::Redoable;
 use super::linear::Lu;
 use super::starting_step::starting_step;
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
@@ -145,6 +146,10 @@ impl<const N: usize> Interpolant<N> for Collocation<N> {
     /// The polynomial's distance from its start, term by term.
     fn reach(&self, coordinate: usize) -> f64 {
         self.p.iter().map(|p| p[coordinate].abs()).sum()
+    }
+    /// theta - theta^2 is at most 1/4, theta - theta^3 at most 2/sqrt(27).
+    fn bend(&self, coordinate: usize) -> f64 {
+        0.25 * self.p[1][coordinate].abs() + 0.385 * self.p[2][coordinate].abs()
     }
 }
 
@@ -362,8 +367,11 @@ impl<const N: usize> Stepper<N> for Radau5<N> {
         if !finite(&x) || !finite(&self.derivative) {
             return Err(Failure::NotFinite { t, state: Failure::state(&x) });
         }
-        // Not below what advances the time: the error test then decides.
-        self.h = self.first_step(field).max(2.0 * f64::EPSILON * t.abs()).min(max_step);
+        self.h = self.first_step(field).min(max_step);
+        if t + self.h == t {
+            // The shortest step that advances the time: the error test then decides.
+            self.h = (2.0 * f64::EPSILON * t.abs()).min(max_step);
+        }
         Ok(())
     }
 
@@ -473,6 +481,12 @@ impl<const N: usize> Stepper<N> for Radau5<N> {
 
     fn statistics(&self) -> &Statistics {
         &self.statistics
+    }
+}
+
+impl<const N: usize> Redoable<N> for Radau5<N> {
+    fn last(&self) -> &dyn Interpolant<N> {
+        self.dense.as_ref().expect("a step was made")
     }
 }
 

@@ -26,6 +26,10 @@ pub trait Interpolant<const N: usize> {
     fn bernstein(&self) -> Option<[SVector<f64, N>; 5]> {
         None
     }
+    /// A bound, up to rounding and the error of the step, on how far the coordinate leaves the chord between the step's two ends.
+    fn bend(&self, coordinate: usize) -> f64 {
+        self.reach(coordinate)
+    }
     /// Whether the coordinate is known to grow all along the step, or to fall all along it.
     fn is_monotone(&self, _coordinate: usize) -> bool {
         false

@@ -373,6 +373,7 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
                 MarkKind::Sign => exp(self.layers.log_tolerance) * size,
                 MarkKind::Singular => 0.01 * fractions[0].abs(),
                 MarkKind::Exp | MarkKind::Curved => 0.05,
+                MarkKind::Power(n) => 0.05 / f64::from(n) * size,
             };
             h *= resolved(fractions, allowed);
             let fractions = self.layers.in_fractions(w, h, &mut self.argument);
@@ -380,6 +381,7 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
                 MarkKind::Sign | MarkKind::Curved => continue,
                 MarkKind::Singular => stride_time(fractions, DOMAIN_SHARE * fractions[0].abs(), 1.0),
                 MarkKind::Exp => self.layers.visible(fractions),
+                MarkKind::Power(n) => self.layers.visible_power(fractions, f64::from(n)),
             };
             if part < 1.0 {
                 h *= part;
@@ -534,6 +536,13 @@ impl Layers {
     fn visible(&self, w: &[f64]) -> f64 {
         let shown = stride_time(w, 0.25 * self.terms, 1.0);
         let below = self.log_tolerance - EXP_MARGIN - w[0];
+        if shown < 1.0 && below > 0.0 { shown.max(stride_time(w, below, 1.0)) } else { shown }
+    }
+
+    /// The same of the power `n` of `w`.
+    fn visible_power(&self, w: &[f64], n: f64) -> f64 {
+        let shown = stride_time(w, 0.25 * self.terms / n * w[0].abs(), 1.0);
+        let below = exp((self.log_tolerance - EXP_MARGIN) / n) - w[0].abs();
         if shown < 1.0 && below > 0.0 { shown.max(stride_time(w, below, 1.0)) } else { shown }
     }
 

@@ -36,6 +36,8 @@ pub enum Stop {
     StepBudget,
     /// Asked to stop from outside: what is there is what was done until then.
     Interrupted,
+    /// The computation failed: what is there is what was done until then.
+    Failed,
 }
 
 impl Stop {
@@ -47,6 +49,7 @@ impl Stop {
             Stop::SetValued => "set-valued",
             Stop::StepBudget => "step-budget",
             Stop::Interrupted => "interrupted",
+            Stop::Failed => "failed",
         }
     }
 }

@@ -183,6 +183,10 @@ impl<const D: usize> Recording<D> {
                 Stop::SetValued => StopReason::SetValued,
                 Stop::StepBudget => StopReason::StepBudget,
                 Stop::Interrupted => StopReason::Watch,
+                Stop::Failed => {
+                    let why = "the computation failed".into();
+                    return Err(NoSuchFact { name: "stop".into(), why });
+                }
             },
         })
     }

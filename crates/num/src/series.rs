@@ -110,9 +110,14 @@ pub enum MarkKind {
     Singular,
     /// An exponential: nothing where its argument is very negative.
     Exp,
+    /// A power of at least [`HIGH_POWER`]: nothing where its base is small.
+    Power(u32),
     /// A transition function (of [`Solution::layer_arguments`]) whose argument is no linear function of the state.
     Curved,
 }
+
+/// A power whose series shows little of it from afar, as its first terms vanish.
+pub const HIGH_POWER: u32 = 16;
 
 /// An operation on the tape that a Taylor method must watch: its kind and place, and the series of its argument (divisor).
 #[derive(Clone, Copy, Debug)]
@@ -183,7 +188,7 @@ impl<S: Elementary + FromDecimal> Solution<S> {
         compiler.recurrences.clear();
         self.layer_arguments.clear();
         self.marks.clear();
-        let needed = tape.needed();
+        let (needed, powers) = (tape.needed(), tape.powers());
         let mut linear: Vec<bool> = Vec::with_capacity(tape.operations().len());
         for (node, operation) in tape.operations().iter().enumerate() {
             let fixed = |node: Node| compiler.fixed[node].is_some();
@@ -204,6 +209,9 @@ impl<S: Elementary + FromDecimal> Solution<S> {
                 let series = compiler.compile(*operation);
                 compiler.series[node] = Some(series);
                 let mark = match *operation {
+                    Operation::Mul(..) if powers[node].1 >= HIGH_POWER => {
+                        Some((MarkKind::Power(powers[node].1), powers[node].0))
+                    }
                     Operation::Sign(a) => Some((MarkKind::Sign, a)),
                     Operation::Sqrt(a) | Operation::Ln(a) => Some((MarkKind::Singular, a)),
                     Operation::Div(_, b) if compiler.fixed[b].is_none() => Some((MarkKind::Singular, b)),

@@ -208,6 +208,21 @@ impl Tape {
         needed
     }
 
+    /// Each operation as a power of another: its base and exponent. What is no power has itself and 1.
+    pub fn powers(&self) -> Vec<(Node, u32)> {
+        let mut powers: Vec<(Node, u32)> = Vec::with_capacity(self.operations.len());
+        for (node, operation) in self.operations.iter().enumerate() {
+            let power = match *operation {
+                Operation::Mul(a, b) if powers[a].0 == powers[b].0 => {
+                    (powers[a].0, powers[a].1.saturating_add(powers[b].1))
+                }
+                _ => (node, 1),
+            };
+            powers.push(power);
+        }
+        powers
+    }
+
     /// The values of all operations at `x`, in double precision.
     ///
     /// # Panics

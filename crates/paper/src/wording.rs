@@ -104,6 +104,7 @@ pub fn exit_rule(rule: &ExitRule) -> String {
                 number(*plus_probability)
             )
         }
+        ExitRule::Undecided => "none: the run ends where one is needed".into(),
         ExitRule::All => "all: the whole funnel".into(),
     }
 }

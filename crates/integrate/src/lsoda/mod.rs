@@ -35,8 +35,9 @@ mod selection;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
+use super::guard::Redoable;
 use super::linear::Lu;
-use super::step::{Failure, Statistics, Step, Stepper, Tolerance, finite};
+use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
 use coefficients::{ADAMS, ADAMS_ORDERS, ADAMS_STABILITY, BDF, BDF_ORDERS, ERROR_RATIO, Formula};
 use nordsieck::Nordsieck;
 use selection::*;
@@ -679,6 +680,12 @@ impl<const N: usize> Stepper<N> for Lsoda<N> {
 
     fn statistics(&self) -> &Statistics {
         &self.statistics
+    }
+}
+
+impl<const N: usize> Redoable<N> for Lsoda<N> {
+    fn last(&self) -> &dyn Interpolant<N> {
+        &self.history
     }
 }
 

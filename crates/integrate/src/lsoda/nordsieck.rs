@@ -117,6 +117,12 @@ impl<const N: usize> Interpolant<N> for Nordsieck<N> {
     fn reach(&self, coordinate: usize) -> f64 {
         self.y[1..=self.degree].iter().map(|y| y[coordinate].abs()).sum()
     }
+    /// Term by term, s from -1 to 0: s + s^2 is at most 1/4 in size, s^k and its chord differ by less than 1.
+    fn bend(&self, coordinate: usize) -> f64 {
+        let y = &self.y[..=self.degree];
+        let second = y.get(2).map_or(0.0, |y| 0.25 * y[coordinate].abs());
+        second + y.iter().skip(3).map(|y| y[coordinate].abs()).sum::<f64>()
+    }
 }
 
 #[cfg(test)]

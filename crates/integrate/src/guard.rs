@@ -1,0 +1,676 @@
+//! Steps that jump over what they cannot see.
+//!
+//! A method looks at an equation at few places in a step. A transition function, an exponential or a resonance that rises and falls between them, where all that
+//! the method sees is flat, leaves no trace in its error estimate. [`Guarded`] looks at each accepted step's continuous extension: it bounds how
+//! far the arguments of all operations that can be flat far away and steep near by ([`Gate`]) leave the chords between their values at the step's ends. Nearly
+//! always that shows that none of them comes near its steep part, that it hardly moves, or that it goes through once, and the step stands. Otherwise the step is searched by bisection, and where the
+//! right-hand side along the continuous extension is found outside what the method saw (its values at the step's ends and the extension's own derivative: the
+//! defect, Enright 1989) by more than the tolerance allows, the step is taken back. The method then ends a step where the structure begins and goes through it with
+//! short steps.
+//!
+//! A step that stands is exactly the method's own.
+
+use std::sync::Arc;
+
+use nalgebra::SVector;
+
+use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance};
+use twofold_num::elementary::ln;
+use twofold_num::series::HIGH_POWER;
+use twofold_num::tape::{Node, Operation};
+use twofold_num::{Elementary, Tape};
+use twofold_system::VectorField;
+
+/// The numbers between two bounds, up to a few roundings.
+#[derive(Clone, Copy, Debug)]
+struct Range {
+    low: f64,
+    high: f64,
+}
+
+impl Range {
+    const ALL: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
+
+    fn new(low: f64, high: f64) -> Self {
+        // Also if one is no number.
+        if low <= high { Self { low, high } } else { Self::ALL }
+    }
+
+    fn of(values: impl IntoIterator<Item = f64>) -> Self {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for v in values {
+            if v.is_nan() {
+                return Self::ALL;
+            }
+            low = low.min(v);
+            high = high.max(v);
+        }
+        Self::new(low, high)
+    }
+
+    fn width(self) -> f64 {
+        self.high - self.low
+    }
+
+    /// The largest absolute value, and the smallest.
+    fn sizes(self) -> (f64, f64) {
+        let least = if self.low <= 0.0 && self.high >= 0.0 { 0.0 } else { self.low.abs().min(self.high.abs()) };
+        (self.low.abs().max(self.high.abs()), least)
+    }
+}
+
+/// A number along a step: its values at the step's ends, and a bound on how far it leaves the chord between them (up to a few roundings).
+#[derive(Clone, Copy, Debug)]
+struct Along {
+    ends: [f64; 2],
+    bend: f64,
+}
+
+impl Along {
+    fn new(ends: [f64; 2], bend: f64) -> Self {
+        // What is no number is no bound.
+        Self { ends, bend: if bend >= 0.0 { bend } else { f64::INFINITY } }
+    }
+
+    fn constant(value: f64) -> Self {
+        Self { ends: [value; 2], bend: 0.0 }
+    }
+
+    fn range(self) -> Range {
+        let range = Range::of(self.ends);
+        Range::new(range.low - self.bend, range.high + self.bend)
+    }
+
+    fn change(self) -> f64 {
+        (self.ends[1] - self.ends[0]).abs()
+    }
+
+    /// The larger of its sizes at the ends.
+    fn size(self) -> f64 {
+        self.ends[0].abs().max(self.ends[1].abs())
+    }
+
+    fn plus(self, other: Self, sign: f64) -> Self {
+        let ends = [0, 1].map(|i| self.ends[i] + sign * other.ends[i]);
+        Self::new(ends, self.bend + other.bend)
+    }
+
+    /// A product of chords leaves its own by theta (1 - theta) times both changes.
+    fn times(self, other: Self) -> Self {
+        let ends = [0, 1].map(|i| self.ends[i] * other.ends[i]);
+        let bent = self.bend * other.size() + other.bend * self.size() + self.bend * other.bend;
+        Self::new(ends, 0.25 * self.change() * other.change() + bent)
+    }
+
+    /// A function of it, with bounds on its slope and curvature in the range, and on how far it leaves any value that it takes there.
+    fn through(self, f: impl Fn(f64) -> f64, slope: f64, curvature: f64, most: f64) -> Self {
+        let change = self.change();
+        let bend = 0.125 * curvature * change * change + slope * self.bend;
+        Self::new(self.ends.map(f), if bend < most { bend } else { most })
+    }
+
+    /// A function that goes from -1 to 1 and is flat far from zero.
+    fn through_step(self, f: impl Fn(f64) -> f64, slope: f64, curvature: f64) -> Self {
+        let (_, least) = self.range().sizes();
+        let most = if least > 0.0 { 1.0 - f(least) } else { 2.0 };
+        self.through(f, slope, curvature, most)
+    }
+
+    fn reciprocal(self) -> Self {
+        let (_, least) = self.range().sizes();
+        let square = least * least;
+        self.through(f64::recip, 1.0 / square, 2.0 / (square * least), f64::INFINITY)
+    }
+}
+
+/// An operation that can be flat where a method looks and steep elsewhere, by its argument.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Gate {
+    /// tanh, erf: flat beyond this argument.
+    Step(f64),
+    Sign,
+    Exp,
+    /// A quotient's divisor, the argument of a root, a logarithm or an arc tangent: smooth in its own scale.
+    Scale,
+    /// Sine and cosine.
+    Wave,
+    /// A high power, with its exponent.
+    Power(f64),
+}
+
+/// An argument may move so much without being looked at closer.
+const SMALL_MOVE: f64 = 1.0;
+/// An argument that leaves the chord by so little goes one way.
+pub(super) const SMALL_BEND: f64 = 0.1;
+/// Beyond this argument tanh is +-1 to 4e-9.
+const TANH_FLAT: f64 = 10.0;
+/// The same of erf.
+const ERF_FLAT: f64 = 4.2;
+/// Below this argument an exponential is nothing: 4e-18.
+const EXP_FLAT: f64 = -40.0;
+/// A factor by which a divisor may change.
+const SMALL_FACTOR: f64 = 8.0;
+
+impl Gate {
+    fn of(operation: Operation, (base, exponent): (Node, u32)) -> Option<(Self, Node)> {
+        match operation {
+            Operation::Mul(..) if exponent >= HIGH_POWER => Some((Self::Power(f64::from(exponent)), base)),
+            Operation::Tanh(a) => Some((Self::Step(TANH_FLAT), a)),
+            Operation::Erf(a) => Some((Self::Step(ERF_FLAT), a)),
+            Operation::Sign(a) => Some((Self::Sign, a)),
+            Operation::Exp(a) => Some((Self::Exp, a)),
+            Operation::Div(_, a) | Operation::Sqrt(a) | Operation::Ln(a) | Operation::Atan(a) => Some((Self::Scale, a)),
+            Operation::Sin(a) | Operation::Cos(a) => Some((Self::Wave, a)),
+            _ => None,
+        }
+    }
+
+    /// Whether it passes what it passes only once, from its value at one end of the step to that at the other.
+    fn is_passed_once(self, w: Along) -> bool {
+        let (_, least) = w.range().sizes();
+        match self {
+            Self::Step(_) | Self::Exp => w.bend <= SMALL_BEND,
+            Self::Sign => w.bend <= SMALL_BEND * w.change(),
+            Self::Scale => w.bend <= SMALL_BEND * least,
+            Self::Power(n) => n * w.bend <= SMALL_BEND * least,
+            Self::Wave => false,
+        }
+    }
+
+    /// Whether it does nothing that a method could miss while its argument is in this range.
+    fn is_quiet(self, w: Range) -> bool {
+        let (most, least) = w.sizes();
+        match self {
+            Self::Step(flat) => w.width() <= SMALL_MOVE || least >= flat,
+            Self::Sign => w.low >= 0.0 || w.high < 0.0,
+            Self::Exp => w.width() <= SMALL_MOVE || w.high <= EXP_FLAT,
+            Self::Scale => most <= SMALL_FACTOR * least || w.width() <= 0.0,
+            Self::Wave => w.width() <= 3.0 * SMALL_MOVE,
+            Self::Power(n) => n * (most - least) <= SMALL_MOVE * least || n * ln(most) <= EXP_FLAT,
+        }
+    }
+}
+
+/// The only gate of an equation, where its argument is a linear function of the state: offset + slopes . x.
+#[derive(Clone, Debug)]
+pub(super) struct Plain {
+    pub(super) slopes: Vec<f64>,
+    pub(super) offset: f64,
+    pub(super) flat: f64,
+}
+
+impl Plain {
+    fn new(tape: &Tape, gate: Gate, argument: Node) -> Option<Self> {
+        let Gate::Step(flat) = gate else { return None };
+        let fixed = tape.values(&vec![0.0; tape.variables()]);
+        // None: not linear.
+        let mut slopes: Vec<Option<Vec<f64>>> = Vec::with_capacity(argument + 1);
+        let none = vec![0.0; tape.variables()];
+        for operation in &tape.operations()[..=argument] {
+            let of = |a: Node| slopes[a].as_ref();
+            let is_fixed = |a: Node| of(a).is_some_and(|s| s.iter().all(|v| *v == 0.0));
+            let scaled = |a: Node, by: f64| of(a).map(|s| s.iter().map(|v| v * by).collect::<Vec<f64>>());
+            let sum = |a: Node, b: Node, sign: f64| -> Option<Vec<f64>> {
+                Some(of(a)?.iter().zip(of(b)?).map(|(a, b)| a + sign * b).collect())
+            };
+            let linear = match *operation {
+                Operation::Variable(i) => {
+                    let mut slopes = none.clone();
+                    slopes[i] = 1.0;
+                    Some(slopes)
+                }
+                Operation::Add(a, b) => sum(a, b, 1.0),
+                Operation::Sub(a, b) => sum(a, b, -1.0),
+                Operation::Neg(a) => scaled(a, -1.0),
+                Operation::Mul(a, b) if is_fixed(b) => scaled(a, fixed[b]),
+                Operation::Mul(a, b) if is_fixed(a) => scaled(b, fixed[a]),
+                Operation::Div(a, b) if is_fixed(b) => scaled(a, 1.0 / fixed[b]),
+                other => other.arguments().all(is_fixed).then(|| none.clone()),
+            };
+            slopes.push(linear);
+        }
+        let slopes = slopes.pop().flatten()?;
+        Some(Self { slopes, offset: fixed[argument], flat })
+    }
+
+    /// Whether nothing can be hidden in the step, as far as little work shows: a sufficient condition, with the operations and the order of
+    /// those in [`ensemble`](super::ensemble).
+    fn hides_nothing<const N: usize>(&self, step: &Step<'_, N>) -> bool {
+        let (mut w0, mut w1, mut bend) = (self.offset, self.offset, 0.0);
+        for (i, slope) in self.slopes.iter().enumerate().filter(|(_, slope)| **slope != 0.0) {
+            w0 += slope * step.x0[i];
+            w1 += slope * step.x1[i];
+            bend += slope.abs() * step.interpolant.bend(i);
+        }
+        let far = self.flat + bend;
+        bend <= SMALL_BEND || (w0 >= far && w1 >= far) || (w0 <= -far && w1 <= -far)
+    }
+}
+
+/// An equation's gates, ready to be looked at.
+#[derive(Clone, Debug)]
+pub(super) struct Gates {
+    tape: Arc<Tape>,
+    gates: Vec<(Gate, Node)>,
+    plain: Option<Plain>,
+    /// The operations that gates' arguments need, and those that the whole equation does.
+    needed: [Vec<Node>; 2],
+    /// Operations without variables.
+    fixed: Vec<f64>,
+    along: Vec<Along>,
+    values: Vec<f64>,
+}
+
+impl Gates {
+    /// None, if the equation has no gates.
+    pub(super) fn new(tape: Arc<Tape>) -> Option<Self> {
+        let operations = tape.operations();
+        let mut moves = vec![false; operations.len()];
+        for (node, operation) in operations.iter().enumerate() {
+            moves[node] = matches!(operation, Operation::Variable(_)) || operation.arguments().any(|a| moves[a]);
+        }
+        let (live, powers) = (tape.needed(), tape.powers());
+        let mut gates: Vec<(Gate, Node)> = Vec::new();
+        for node in (0..operations.len()).filter(|node| live[*node]) {
+            if let Some(gate) = Gate::of(operations[node], powers[node]).filter(|(_, a)| moves[*a])
+                && !gates.contains(&gate)
+            {
+                gates.push(gate);
+            }
+        }
+        if gates.is_empty() {
+            return None;
+        }
+        let mut for_gates = vec![false; operations.len()];
+        gates.iter().for_each(|(_, node)| for_gates[*node] = true);
+        for node in (0..operations.len()).rev().filter(|node| moves[*node]) {
+            if for_gates[node] {
+                operations[node].arguments().for_each(|a| for_gates[a] = true);
+            }
+        }
+        let list = |wanted: &[bool]| (0..operations.len()).filter(|node| wanted[*node] && moves[*node]).collect();
+        let needed = [list(&for_gates), list(&live)];
+        let fixed = tape.values(&vec![0.0; tape.variables()]);
+        let along = fixed.iter().map(|v| Along::constant(*v)).collect();
+        let plain = match gates[..] {
+            [(gate, argument)] => Plain::new(&tape, gate, argument),
+            _ => None,
+        };
+        Some(Self { needed, values: fixed.clone(), fixed, along, gates, plain, tape })
+    }
+
+    pub(super) fn plain(&self) -> Option<&Plain> {
+        self.plain.as_ref()
+    }
+
+    /// Whether nothing can be hidden in a step with these states: all gates are quiet, or all but one that is passed once.
+    fn hide_nothing(&mut self, x: impl Fn(usize) -> Along) -> bool {
+        let operations = self.tape.operations();
+        for node in &self.needed[0] {
+            let v = &self.along;
+            let along = match operations[*node] {
+                Operation::Variable(i) => x(i),
+                Operation::Constant(_) | Operation::Parameter(_) | Operation::Pi => continue,
+                Operation::Add(a, b) => v[a].plus(v[b], 1.0),
+                Operation::Sub(a, b) => v[a].plus(v[b], -1.0),
+                Operation::Mul(a, b) => v[a].times(v[b]),
+                Operation::Div(a, b) => v[a].times(v[b].reciprocal()),
+                Operation::Neg(a) => Along { ends: v[a].ends.map(|v| -v), ..v[a] },
+                // Bounds of the functions' first and second derivatives.
+                Operation::Tanh(a) => v[a].through_step(Elementary::tanh, 1.0, 0.77),
+                Operation::Erf(a) => v[a].through_step(Elementary::erf, 1.13, 0.97),
+                Operation::Sign(a) => {
+                    let (_, least) = v[a].range().sizes();
+                    let jump = if least > 0.0 { 0.0 } else { 2.0 };
+                    Along::new(v[a].ends.map(Elementary::sign), jump)
+                }
+                Operation::Exp(a) => {
+                    let most = Elementary::exp(v[a].range().high);
+                    v[a].through(Elementary::exp, most, most, most)
+                }
+                Operation::Ln(a) => {
+                    let least = v[a].range().low.max(0.0);
+                    v[a].through(Elementary::ln, 1.0 / least, 1.0 / (least * least), f64::INFINITY)
+                }
+                Operation::Sqrt(a) => {
+                    let root = Elementary::sqrt(v[a].range().low.max(0.0));
+                    v[a].through(Elementary::sqrt, 0.5 / root, 0.25 / (root * root * root), f64::INFINITY)
+                }
+                Operation::Sin(a) => v[a].through(Elementary::sin, 1.0, 1.0, 2.0),
+                Operation::Cos(a) => v[a].through(Elementary::cos, 1.0, 1.0, 2.0),
+                Operation::Atan(a) => v[a].through(Elementary::atan, 1.0, 0.65, std::f64::consts::PI),
+            };
+            self.along[*node] = along;
+        }
+        let mut passed = 0;
+        self.gates.iter().all(|(gate, node)| {
+            let w = self.along[*node];
+            gate.is_quiet(w.range()) || {
+                passed += 1;
+                passed == 1 && gate.is_passed_once(w)
+            }
+        })
+    }
+
+    /// Computes the operations of gates' arguments, or all, at `x`.
+    fn evaluate(&mut self, x: &[f64], all: bool) {
+        let operations = self.tape.operations();
+        for node in &self.needed[usize::from(all)] {
+            let v = &self.values;
+            self.values[*node] = match operations[*node] {
+                Operation::Variable(i) => x[i],
+                Operation::Constant(_) | Operation::Parameter(_) | Operation::Pi => self.fixed[*node],
+                Operation::Add(a, b) => v[a] + v[b],
+                Operation::Sub(a, b) => v[a] - v[b],
+                Operation::Mul(a, b) => v[a] * v[b],
+                Operation::Div(a, b) => v[a] / v[b],
+                Operation::Neg(a) => -v[a],
+                Operation::Tanh(a) => Elementary::tanh(v[a]),
+                Operation::Exp(a) => Elementary::exp(v[a]),
+                Operation::Ln(a) => Elementary::ln(v[a]),
+                Operation::Sin(a) => Elementary::sin(v[a]),
+                Operation::Cos(a) => Elementary::cos(v[a]),
+                Operation::Sqrt(a) => Elementary::sqrt(v[a]),
+                Operation::Atan(a) => Elementary::atan(v[a]),
+                Operation::Erf(a) => Elementary::erf(v[a]),
+                Operation::Sign(a) => Elementary::sign(v[a]),
+            };
+        }
+    }
+
+    /// The gates' arguments at `x`.
+    fn arguments(&mut self, x: &[f64]) -> Vec<f64> {
+        self.evaluate(x, false);
+        self.gates.iter().map(|(_, node)| self.values[*node]).collect()
+    }
+
+    /// The right-hand side at `x`.
+    fn field<const N: usize>(&mut self, x: &SVector<f64, N>) -> SVector<f64, N> {
+        self.evaluate(x.as_slice(), true);
+        SVector::from_fn(|i, _| self.values[self.tape.outputs()[i]])
+    }
+
+    /// Whether all gates are quiet between five equidistant samples of their arguments, which are smooth but where another gate is not quiet.
+    fn are_quiet_between(&self, samples: [&[f64]; 5]) -> bool {
+        self.gates.iter().enumerate().all(|(i, (gate, _))| {
+            let w = samples.map(|s| s[i]);
+            let second = |k: usize| (w[k - 1] - 2.0 * w[k] + w[k + 1]).abs();
+            // Twice what a parabola leaves the range of its samples by.
+            let reach = 0.25 * second(1).max(second(2)).max(second(3));
+            let range = Range::of(w);
+            gate.is_quiet(Range::new(range.low - reach, range.high + reach))
+        })
+    }
+}
+
+/// What was missed in a step: from and to which fraction of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Missed {
+    from: f64,
+    to: f64,
+}
+
+/// The smallest part of a step that is halved again.
+const FINEST: f64 = 1e-12;
+/// Most parts of a step that are looked at.
+const MOST_PARTS: usize = 4000;
+/// What a step has missed is allowed to be so many times the tolerance: what its error estimate does not show.
+const ALLOWED: f64 = 20.0;
+/// The right-hand side is outside what the method saw if by so much of its variation there.
+const OUTSIDE: f64 = 0.1;
+
+/// A part of a step, with the gates' arguments at five places in it.
+struct Piece {
+    from: f64,
+    to: f64,
+    samples: [Vec<f64>; 5],
+}
+
+impl Gates {
+    /// From when to when the step has missed something, if it has.
+    pub(super) fn missed<const N: usize>(&mut self, step: &Step<'_, N>, tolerance: Tolerance) -> Option<[f64; 2]> {
+        if self.plain.as_ref().is_some_and(|plain| plain.hides_nothing(step)) {
+            return None;
+        }
+        let state = |i: usize| Along::new([step.x0[i], step.x1[i]], step.interpolant.bend(i));
+        if self.hide_nothing(state) {
+            return None;
+        }
+        self.searched(step, tolerance).map(|missed| [missed.from, missed.to].map(|theta| step.time(theta)))
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn searched<const N: usize>(&mut self, step: &Step<'_, N>, tolerance: Tolerance) -> Option<Missed> {
+        let at = |gates: &mut Self, theta: f64| gates.arguments(step.at(theta).as_slice());
+        let five = |from: f64, to: f64| std::array::from_fn::<f64, 5, _>(|k| from + 0.25 * k as f64 * (to - from));
+        let mut open = vec![Piece { from: 0.0, to: 1.0, samples: five(0.0, 1.0).map(|theta| at(self, theta)) }];
+        let mut leaves: Vec<(f64, f64)> = Vec::new();
+        while let Some(Piece { from, to, samples }) = open.pop() {
+            let whole = to - from == 1.0;
+            let quiet = self.are_quiet_between(std::array::from_fn(|k| &samples[k][..]));
+            if quiet && whole {
+                return None;
+            }
+            if quiet || to - from < FINEST || leaves.len() + open.len() > MOST_PARTS {
+                leaves.push((from, to));
+                continue;
+            }
+            let middle = 0.5 * (from + to);
+            let [a, b, c, d, e] = samples;
+            let between = |gates: &mut Self, from: f64, to: f64| at(gates, 0.5 * (from + to));
+            let quarter = 0.25 * (to - from);
+            let right = [c.clone(), between(self, middle, middle + quarter), d, between(self, middle + quarter, to), e];
+            let left = [a, between(self, from, from + quarter), b, between(self, from + quarter, middle), c];
+            open.push(Piece { from: middle, to, samples: right });
+            open.push(Piece { from, to: middle, samples: left });
+        }
+        self.defect(step, tolerance, &leaves)
+    }
+
+    /// Where the right-hand side is outside what the method saw, as far as that matters.
+    fn defect<const N: usize>(
+        &mut self,
+        step: &Step<'_, N>,
+        tolerance: Tolerance,
+        leaves: &[(f64, f64)],
+    ) -> Option<Missed> {
+        let h = step.length();
+        let (f0, f1) = (self.field(&step.x0), self.field(&step.x1));
+        // Neighbouring parts in which something was missed are one structure.
+        let mut structures: Vec<(Missed, SVector<f64, N>)> = Vec::new();
+        for &(from, to) in leaves {
+            let mut outside = SVector::<f64, N>::zeros();
+            // Boole's rule.
+            for (k, weight) in [7.0, 32.0, 12.0, 32.0, 7.0].into_iter().enumerate() {
+                let theta = from + 0.25 * k as f64 * (to - from);
+                let f = self.field(&step.at(theta));
+                let (before, after) = ((theta - DIFFERENCE).max(0.0), (theta + DIFFERENCE).min(1.0));
+                let at = |theta: f64| step.interpolant.at(theta);
+                let own = (at(after) - at(before)) / ((after - before) * h);
+                for i in 0..N {
+                    let (low, high) = (f0[i].min(f1[i]).min(own[i]), f0[i].max(f1[i]).max(own[i]));
+                    let beyond = (f[i] - high).max(low - f[i]);
+                    if f[i].is_nan() {
+                        outside[i] = f64::INFINITY;
+                    } else if beyond > OUTSIDE * (high - low) {
+                        outside[i] += weight / 90.0 * beyond * (to - from) * h;
+                    }
+                }
+            }
+            if outside.iter().any(|v| *v > 0.0) {
+                match structures.last_mut().filter(|(missed, _)| missed.to == from) {
+                    Some((missed, sum)) => {
+                        missed.to = to;
+                        *sum += outside;
+                    }
+                    None => structures.push((Missed { from, to }, outside)),
+                }
+            }
+        }
+        let exceeds = |missed: &SVector<f64, N>, part: f64| {
+            (0..N).any(|i| {
+                let size = step.x0[i].abs().max(step.x1[i].abs());
+                missed[i] > part * ALLOWED * (tolerance.atol + tolerance.rtol * size)
+            })
+        };
+        let all = structures.iter().fold(SVector::zeros(), |sum, (_, outside)| sum + outside);
+        if !exceeds(&all, 1.0) {
+            return None;
+        }
+        let large = structures.iter().find(|(_, outside)| exceeds(outside, 0.25));
+        large.or(structures.first()).map(|(missed, _)| *missed)
+    }
+}
+
+/// Fraction of a step for the difference quotient of its continuous extension.
+const DIFFERENCE: f64 = 1e-3;
+/// Steps through a structure that was found, at least.
+const STEPS_THROUGH: f64 = 16.0;
+/// A structure of this part of the time is too short for steps.
+const SHORTEST: f64 = 1e-12;
+
+/// How far a method goes, and with how long steps.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stage {
+    pub(super) end: f64,
+    pub(super) max_step: f64,
+}
+
+/// How a method comes to the end of what it was asked for.
+#[derive(Clone, Debug)]
+pub(super) struct Stages {
+    asked: Stage,
+    /// Before that; the last one comes first.
+    before: Vec<Stage>,
+}
+
+impl Stages {
+    pub(super) fn new(end: f64, max_step: f64) -> Self {
+        Self { asked: Stage { end, max_step }, before: Vec::new() }
+    }
+
+    /// That under way.
+    pub(super) fn now(&self) -> Stage {
+        self.before.last().copied().unwrap_or(self.asked)
+    }
+
+    /// Whether stages end at or before the time `t`, after which they are over.
+    pub(super) fn end_at(&mut self, t: f64) -> bool {
+        let stages = self.before.len();
+        while self.before.last().is_some_and(|stage| t >= stage.end) {
+            self.before.pop();
+        }
+        self.before.len() < stages
+    }
+
+    /// What lies between the times `from` and `to` was missed by a step from (t, x): to there, and through it with short steps.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn go_through<const N: usize>(
+        &mut self,
+        (t, x): (f64, &SVector<f64, N>),
+        [from, to]: [f64; 2],
+    ) -> Result<(), Failure> {
+        let width = to - from;
+        if width <= SHORTEST * t.abs().max(from.abs()) {
+            return Err(Failure::StepUnderflow { t: from, h: width, state: Failure::state(x) });
+        }
+        let Stage { end, max_step } = self.now();
+        self.before.push(Stage { end: to.min(end), max_step: max_step.min(width / STEPS_THROUGH) });
+        if from - t > 1e-3 * width && from - t > SHORTEST * t.abs() {
+            self.before.push(Stage { end: from, max_step });
+        }
+        Ok(())
+    }
+}
+
+/// A method whose last step can be looked at again.
+pub trait Redoable<const N: usize>: Stepper<N> {
+    /// The continuous extension of the last step, which there must have been since the last restart.
+    fn last(&self) -> &dyn Interpolant<N>;
+}
+
+/// A method whose steps are looked at. See the [module](self).
+#[derive(Clone, Debug)]
+pub struct Guarded<M, const N: usize> {
+    method: M,
+    tolerance: Tolerance,
+    gates: Option<Gates>,
+    stages: Stages,
+    /// The last step's end.
+    reached: (f64, SVector<f64, N>),
+}
+
+impl<M, const N: usize> Guarded<M, N> {
+    /// The method, with its tolerance.
+    pub fn new(method: M, tolerance: Tolerance) -> Self {
+        let stages = Stages::new(0.0, f64::INFINITY);
+        Self { method, tolerance, gates: None, stages, reached: (0.0, SVector::zeros()) }
+    }
+}
+
+impl<M: Redoable<N>, const N: usize> Guarded<M, N> {
+    /// Begins the stage under way where the last step has ended.
+    fn begin<F: VectorField<N>>(&mut self, field: &F) -> Result<(), Failure> {
+        let (Stage { end, max_step }, (t, x)) = (self.stages.now(), self.reached);
+        self.method.restart_again(field, t, x, end, max_step)
+    }
+}
+
+impl<M: Redoable<N>, const N: usize> Stepper<N> for Guarded<M, N> {
+    fn restart<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
+        self.gates = Gates::new(field.tape());
+        self.reached = (t, x);
+        self.stages = Stages::new(t_end, max_step);
+        self.method.restart(field, t, x, t_end, max_step)
+    }
+
+    fn restart_again<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
+        self.reached = (t, x);
+        self.stages = Stages::new(t_end, max_step);
+        self.method.restart_again(field, t, x, t_end, max_step)
+    }
+
+    fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
+        if self.gates.is_none() {
+            return self.method.step(field);
+        }
+        loop {
+            if self.stages.end_at(self.reached.0) {
+                self.begin(field)?;
+            }
+            let step = self.method.step(field)?;
+            let Step { t0, t1, x0, x1, .. } = step;
+            match self.gates.as_mut().and_then(|gates| gates.missed(&step, self.tolerance)) {
+                Some(times) => {
+                    self.reached = (t0, x0);
+                    self.stages.go_through((t0, &x0), times)?;
+                    self.begin(field)?;
+                }
+                None => {
+                    self.reached = (t1, x1);
+                    return Ok(Step { t0, t1, x0, x1, interpolant: self.method.last() });
+                }
+            }
+        }
+    }
+
+    fn statistics(&self) -> &Statistics {
+        self.method.statistics()
+    }
+}
