@@ -168,11 +168,9 @@ def _spec(
             _refuse({"plus_probability": plus_probability, "seed": seed, "stream": stream}, "nothing in a funnel is random")
             model = {"filippov": {"exit": "all", "funnel": funnel}}
         elif exit is None:
-            raise SpecError(
-                "give exit: how repelling sliding ends is a choice that the equations do not make "
-                '(such as exit="at-once:plus"; twofold.funnel follows all)',
-                "exit",
-            )
+            # The run ends with an error where a choice is needed.
+            _refuse({"plus_probability": plus_probability, "seed": seed, "stream": stream}, "it belongs to a random exit")
+            model = {"filippov": {"exit": "undecided"}}
         elif exit == "all":
             raise SpecError('exit="all" follows every future: that is twofold.funnel', "exit")
         else:

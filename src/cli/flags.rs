@@ -105,7 +105,8 @@ pub struct RunFlags {
     #[arg(long, value_enum, help_heading = "Schedule")]
     pub kick_law: Option<KickLaw>,
     /// How repelling sliding ends (with --switch filippov): at-once:SIDE, after-time:T:SIDE, after-arc:L:SIDE, with SIDE plus or
-    /// minus; random:exponential:MEAN or random:uniform:LONGEST (see --seed, --stream, --plus-probability); all.
+    /// minus; random:exponential:MEAN or random:uniform:LONGEST (see --seed, --stream, --plus-probability); all. Without it a run ends
+    /// with an error where a choice is needed.
     #[arg(long, value_name = "RULE", allow_hyphen_values = true, help_heading = "Filippov motion")]
     pub exit: Option<String>,
     /// Probability of leaving to h > 0 under a random exit rule [default: 0.5].
@@ -376,10 +377,6 @@ const EFFECTS: [Effect; 37] = {
 #[derive(Debug, thiserror::Error)]
 enum Misuse {
     #[error(
-        "at the two-fold the future is a set, and nothing is chosen silently: give --exit at-once:plus, after-time:0.3:minus, after-arc:0.2:plus, random:exponential:0.5, or all"
-    )]
-    NoExitRule,
-    #[error(
         "--exit \"{0}\" is not a rule; give one such as at-once:plus, after-time:0.3:minus, after-arc:0.2:plus, random:exponential:0.5, random:uniform:1, or all"
     )]
     Exit(String),
@@ -548,9 +545,7 @@ impl RunFlags {
             },
             Switch::Filippov if command == Use::Exponent => return Err(Misuse::NoTangentFlow),
             Switch::Filippov => {
-                // A closed orbit never comes to where a rule would be asked.
-                let at_once = ExitRule::AtOnce { side: Side::Plus };
-                let exit = if command == Use::Orbit { at_once } else { self.exit_rule()? };
+                let exit = self.exit_rule()?;
                 let funnel = (exit == ExitRule::All).then_some(FunnelSpec {
                     shortest: self.funnel_shortest.unwrap_or(0.05),
                     longest: self.funnel_longest.unwrap_or(2.0),
@@ -670,7 +665,7 @@ impl RunFlags {
 
     /// Reads "after-time:0.3:minus".
     fn exit_rule(&self) -> Result<ExitRule, Misuse> {
-        let text = self.exit.as_deref().ok_or(Misuse::NoExitRule)?;
+        let Some(text) = self.exit.as_deref() else { return Ok(ExitRule::Undecided) };
         let wrong = || Misuse::Exit(text.to_owned());
         let side = |word: &str| match word {
             "plus" => Ok(Side::Plus),

@@ -22,6 +22,7 @@ mod ensemble;
 mod examples;
 mod faults;
 mod filippov;
+mod filippov_choices;
 mod filippov_events;
 mod filippov_limit;
 mod flags;

@@ -288,6 +288,16 @@ impl<const D: usize> Recorder<D> for TimedMotion<D> {
 }
 
 impl<R: Recorder<D>, const D: usize> Draining<'_, '_, R, D> {
+    /// Gives away what was recorded before a failure: it is right up to there.
+    fn kept_if_failed<T, E>(&mut self, end: Result<T, E>) -> Result<T, E> {
+        if end.is_err()
+            && let Some(sink) = self.aside.sink.as_mut()
+        {
+            sink(self.recorder.take());
+        }
+        end
+    }
+
     /// Gives points away if there are enough of them. Who keeps everything has no limit below that of memory.
     fn drained(&mut self, flow: Flow) -> Flow {
         if let Some(sink) = self.aside.sink.as_mut()
@@ -453,18 +463,21 @@ fn watched<const D: usize>(
     match spec.observe {
         Observation::Path { chord } => {
             let mut draining = Draining { recorder: MotionRecorder::new(chord), aside };
-            let end = run(&mut draining)?;
+            let end = run(&mut draining);
+            let end = draining.kept_if_failed(end)?;
             Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
         }
         Observation::Times { every } => {
             let mut draining =
                 Draining { recorder: TimedMotion::new(&start(spec), every).at_most(aside.most()), aside };
-            let end = run(&mut draining)?;
+            let end = run(&mut draining);
+            let end = draining.kept_if_failed(end)?;
             Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
         }
         Observation::Section { coordinate, value } => {
             let mut draining = Draining { recorder: SectionRecorder::new(coordinate, value), aside };
-            let end = run(&mut AllModes(&mut draining))?;
+            let end = run(&mut AllModes(&mut draining));
+            let end = draining.kept_if_failed(end)?;
             Ok(recording(Data::Section(draining.recorder.into_crossings()), end))
         }
     }
@@ -544,19 +557,19 @@ fn observe<F: VectorField<N>, const D: usize, const N: usize>(
     let (summary, data) = match spec.observe {
         Observation::Path { chord } => {
             let mut draining = Draining { recorder: PathRecorder::<D>::new(&x0, chord), aside: &mut *aside };
-            (integrate(spec, field, x0, D, part, &mut draining, watch)?, Data::Path(draining.recorder.into_samples()))
+            let end = integrate(spec, field, x0, D, part, &mut draining, watch);
+            (draining.kept_if_failed(end)?, Data::Path(draining.recorder.into_samples()))
         }
         Observation::Times { every } => {
             let recorder = TimesRecorder::<D>::new(&x0, every).at_most(aside.most());
             let mut draining = Draining { recorder, aside: &mut *aside };
-            (integrate(spec, field, x0, D, part, &mut draining, watch)?, Data::Path(draining.recorder.into_samples()))
+            let end = integrate(spec, field, x0, D, part, &mut draining, watch);
+            (draining.kept_if_failed(end)?, Data::Path(draining.recorder.into_samples()))
         }
         Observation::Section { coordinate, value } => {
             let mut draining = Draining { recorder: SectionRecorder::<D>::new(coordinate, value), aside: &mut *aside };
-            (
-                integrate(spec, field, x0, D, part, &mut draining, watch)?,
-                Data::Section(draining.recorder.into_crossings()),
-            )
+            let end = integrate(spec, field, x0, D, part, &mut draining, watch);
+            (draining.kept_if_failed(end)?, Data::Section(draining.recorder.into_crossings()))
         }
     };
     aside.end = summary.x.as_slice().to_vec();

@@ -148,7 +148,7 @@ fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, Cl
         None => Rows::Output,
     };
     let about = encode::about_run(run);
-    let (mut tail, mut failed) = (Vec::new(), None);
+    let (mut tail, mut failed, mut count) = (Vec::new(), None, 0);
     let watch = job::Progress::begin(progress, &run.label(), run.extent());
     let found = simulate::stream(
         &run.0,
@@ -159,6 +159,7 @@ fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, Cl
                 tail = encode::csv_tail(table, &about);
             }
             bytes.extend(encode::csv_rows(table));
+            count += table.len();
             failed = rows.append(&bytes).err();
             failed.is_none()
         },
@@ -172,7 +173,24 @@ fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, Cl
         Some(error) => return Err(error),
         None => {}
     }
-    let found = found?;
+    let found = match found {
+        Ok(found) => found,
+        Err(error) if count == 0 => return Err(error.into()),
+        Err(error) => {
+            rows.append(&tail)?;
+            rows.append(&encode::cut_short(Stop::Failed))?;
+            let part = file.map(part_of);
+            if let Rows::File(file) = rows {
+                file.finish(part.as_deref())?;
+            }
+            let place = part.map_or("standard output".to_owned(), |p| p.display().to_string());
+            let error = CliError::from(error);
+            return Err(CliError::Stopped {
+                said: format!("{error} (the {count} rows up to there are in {place})"),
+                exit: error.exit(),
+            });
+        }
+    };
     rows.append(&tail)?;
     let stopped = if found.stop == Stop::Interrupted { progress.asked_to_stop() } else { None };
     let Some(exit) = stopped else {

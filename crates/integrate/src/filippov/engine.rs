@@ -4,11 +4,14 @@ use nalgebra::SVector;
 
 use super::automatic::Automatic;
 use super::exit::{Chooser, Plan};
-use super::flow::{FreeFlow, InPhysicalTime, SlidingFlow, Straight, Truncated, project};
-use super::two_fold::{AlongCurve, SlidingAtTwoFold};
-use super::{EventKind, ExitRule, FilippovError, FilippovObserver, FilippovSummary, Mode, ModeEvent, Settings, Side};
+use super::flow::{FreeFlow, InPhysicalTime, Sided, SlidingFlow, Straight, Truncated, project};
+use super::two_fold::{AlongCurve, FusedFolds, SlidingAtTwoFold};
+use super::{
+    CHOOSE, Choice, EventKind, ExitRule, FilippovError, FilippovObserver, FilippovSummary, Mode, ModeEvent, Settings,
+    Side,
+};
 use crate::driver::Watch;
-use crate::roots::{Enclosed, Start, Zero, brent, first_zero_along};
+use crate::roots::{Enclosed, Start, Zero, brent, first_zero, first_zero_along};
 use crate::step::{Failure, Flow, Interpolant, Statistics, Step, StopReason, Tolerance, finite};
 use twofold_num::{Arithmetic, Dual, Interval};
 use twofold_system::filippov::{TwoFold, gradient, lie_derivatives, two_fold};
@@ -73,6 +76,8 @@ pub(super) enum Departure<const N: usize> {
     TwoFold(Option<Box<SlidingAtTwoFold<N>>>),
     /// On the surface, in the repelling region.
     Repelling,
+    /// On the surface, in a mode that is known.
+    Decided(Mode),
 }
 
 /// [`run_watched`] from anywhere, with an exit rule that may have been at work before.
@@ -118,6 +123,7 @@ where
         speed: SVector::zeros(),
         stop: None,
         steps_until_watch: STEPS_BETWEEN_WATCHES,
+        depth: None,
     };
     let mut state = match departure {
         Departure::Anywhere if !near_surface(system, &x0) => {
@@ -128,6 +134,7 @@ where
         Departure::TwoFold(Some(local)) => State::TwoFold(local),
         Departure::TwoFold(None) => return Err(engine.non_transversal("the two-fold is degenerate")),
         Departure::Repelling => engine.enter_repelling(None)?,
+        Departure::Decided(mode) => engine.begin(mode),
     };
     loop {
         if let Some(reason) = engine.stop {
@@ -147,11 +154,8 @@ where
             State::Free { side, start } => engine.fly(side, start)?,
             State::Sliding(sliding) => engine.slide::<M>(sliding)?,
             State::TwoFold(local) => engine.depart(&local)?,
-            State::Rest => {
-                let (x, t_end) = (engine.x, engine.t_end);
-                engine.take(Mode::SlidingAttracting, t_end, x, &Truncated { inner: &Standing(x), end: 1.0 });
-                State::Rest
-            }
+            State::Fused(folds) => engine.pass(&folds)?,
+            State::Rest => engine.rest(),
             State::SetValued(mode) => return Ok(engine.summary(mode, StopReason::SetValued)),
         };
     }
@@ -174,13 +178,24 @@ pub(super) fn up_to(t_end: f64, t: f64) -> f64 {
 
 /// How a flight begins: what is known of the growth of |h|.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum FlightStart {
+pub(super) enum FlightStart {
     /// Off the surface.
     Away,
     /// On it, with this rate of growth of |h|.
     Transversal(f64),
     /// On it at a visible fold, with this second derivative of |h|.
     Tangent(f64),
+}
+
+impl FlightStart {
+    /// The same over a step of this length, as a function of the fraction of the step.
+    pub(super) fn over(self, length: f64) -> Start {
+        match self {
+            FlightStart::Away => Start::Away,
+            FlightStart::Transversal(rate) => Start::Simple(rate * length),
+            FlightStart::Tangent(second) => Start::Double(0.5 * second * length * length),
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -266,6 +281,7 @@ enum State<const N: usize> {
     },
     Sliding(Sliding),
     TwoFold(Box<SlidingAtTwoFold<N>>),
+    Fused(Box<FusedFolds<N>>),
     /// At a point of the surface where zero lies between the two fields: the motion stays there.
     Rest,
     SetValued(Option<Mode>),
@@ -276,7 +292,7 @@ impl<const N: usize> State<N> {
         match self {
             State::Free { side, .. } => Some((*side).into()),
             State::Sliding(s) => Some(s.mode()),
-            State::TwoFold(_) => None,
+            State::TwoFold(_) | State::Fused(_) => None,
             State::Rest => Some(Mode::SlidingAttracting),
             State::SetValued(mode) => *mode,
         }
@@ -388,8 +404,16 @@ struct Limits {
     idle: f64,
     /// ... and so many of them are arrival at a degenerate point.
     idle_steps: u32,
+    /// A field without values beyond the surface is asked no nearer to it, where the surface goes through zero.
+    depth: f64,
+    /// The first step of sliding out of two folds in one place changes the Lie derivatives by this share of the same.
+    departure: f64,
+    /// The rate at which sliding passes two folds in one place changes there by less than this share of it.
+    kink: f64,
     /// Closer to a two-fold than so many tolerances there is nothing to integrate.
     blur: f64,
+    /// Where a zero of h is farther from the surface than this share of the state, h jumps.
+    jump: f64,
     /// Sliding restarts on the surface when it has drifted off by this share of the state ...
     drift: f64,
     /// ... or by so many absolute tolerances, whichever is more.
@@ -414,15 +438,24 @@ const LIMITS: Limits = Limits {
     end: 4.0 * f64::EPSILON,
     idle: 4.0 * f64::EPSILON,
     idle_steps: 32,
+    depth: 1e-24,
+    departure: 1e-7,
+    kink: 1e-3,
     blur: 300.0,
+    jump: 1e-7,
     drift: 1e-10,
     drift_in_tolerances: 10.0,
     departure_chords: 256,
     shortest_departure: 1e-6,
 };
 
-const DEGENERATE_END: &str =
-    "sliding runs into a point where both Lie derivatives vanish and which is not a regular two-fold";
+const DEGENERATE_END: &str = "sliding comes to a point where both fields are tangent to the surface, and which is neither a regular two-fold nor two folds in one place with a sliding motion through them";
+
+/// The ways on, in words.
+const REPELLING: &str = "repelling sliding, which may end at any later moment to either side";
+fn flight(side: Side) -> String {
+    format!("flight to h {} 0", if side == Side::Plus { ">" } else { "<" })
+}
 
 /// What ended a stretch of sliding within a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -467,6 +500,8 @@ struct Engine<'a, P, const N: usize> {
     speed: SVector<f64, N>,
     stop: Option<StopReason>,
     steps_until_watch: u32,
+    /// Set where a field has no value beyond the surface: how near to it fields are asked (see [`Sided`]).
+    depth: Option<f64>,
 }
 
 impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
@@ -494,13 +529,41 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         FilippovError::NonTransversal { t: self.t, state: Failure::state(&self.x), what }
     }
 
+    fn undecided(&self, what: &'static str, continuations: impl IntoIterator<Item = String>) -> FilippovError {
+        let (t, state) = (self.t, Failure::state(&self.x));
+        let continuations = continuations.into_iter().collect();
+        let choice = Choice { what, continuations, remedy: CHOOSE };
+        FilippovError::Undecided { t, state, choice: Box::new(choice) }
+    }
+
     fn no_exit(&self, why: &'static str) -> FilippovError {
         FilippovError::NoSuchExit { t: self.t, state: Failure::state(&self.x), why }
     }
 
+    fn sided(&self) -> Sided<'_, P> {
+        Sided { system: self.system, depth: self.depth }
+    }
+
+    /// A field has no finite value at or beyond the surface: from here on each is asked on its own side only. Whether that is new.
+    fn stay_inside(&mut self) -> bool {
+        let new = self.depth.is_none();
+        // Resolved by the state's digits, or where the surface goes through zero so small that no tolerance sees it.
+        let least = (4.0 * f64::EPSILON * self.x.amax()).max(LIMITS.depth);
+        self.depth = Some(least * gradient(self.system, &self.x).norm());
+        new
+    }
+
+    /// Lie derivatives at a state on the surface.
+    fn lie_on_surface(&mut self) -> Lie {
+        let l = self.lie(&self.x);
+        let known = l.p.is_finite() && l.q.is_finite();
+        if !known && self.stay_inside() { self.lie(&self.x) } else { l }
+    }
+
     fn lie(&self, x: &SVector<f64, N>) -> Lie {
-        let (plus, minus) = (self.system.plus(x), self.system.minus(x));
-        let (p, q) = lie_derivatives::<P, Dual<f64, N>, N>(self.system, &variables(x));
+        let system = self.sided();
+        let (plus, minus) = (system.plus(x), system.minus(x));
+        let (p, q) = lie_derivatives::<Sided<'_, P>, Dual<f64, N>, N>(&system, &variables(x));
         let along = |d: &Dual<f64, N>, f: &SVector<f64, N>| (0..N).map(|i| d.partials[i] * f[i]).sum::<f64>();
         let slope = gradient(self.system, x);
         // Rounding of the sum that is the Lie derivative, and of the state that it is taken at.
@@ -549,11 +612,14 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     /// The mode at the start of a run on the surface.
     fn start(&mut self) -> Result<State<N>, FilippovError> {
         self.x = project(self.system, &self.x);
-        let l = self.lie(&self.x);
+        let l = self.lie_on_surface();
         if let Some(local) = self.two_fold_here(&l) {
             self.x = local.point;
             self.event(EventKind::TwoFoldReached { leg: 0.0, error: 0.0 }, None, None);
             return Ok(State::TwoFold(Box::new(local)));
+        }
+        if let Some(folds) = self.fused_here(&l) {
+            return Ok(self.meet(folds, None));
         }
         // Growth of |h| along each field on its own side; a fold counts by its second derivative.
         let growth = |first: f64, zero: f64, second: f64| {
@@ -573,8 +639,17 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         Ok(state)
     }
 
-    /// The present state, where the Lie derivatives decide nothing: a rest, if zero lies between the fields there.
+    /// The present state, where the first Lie derivatives decide nothing: two folds in one place, or a rest.
     fn degenerate(&mut self, from: Option<Mode>, what: &'static str) -> Result<State<N>, FilippovError> {
+        let l = self.lie_on_surface();
+        match self.fused_here(&l) {
+            Some(folds) => Ok(self.meet(folds, from)),
+            None => self.rest_or(from, what),
+        }
+    }
+
+    /// A rest, if zero lies between the fields here, or an error that says `what` else.
+    fn rest_or(&mut self, from: Option<Mode>, what: &'static str) -> Result<State<N>, FilippovError> {
         let below = self.speed * LIMITS.rest;
         if !self.rests_at(&self.x, &below) {
             return Err(self.non_transversal(what));
@@ -594,7 +669,10 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     /// Whether a convex combination of the two fields at `x` is zero, each component up to `below`: then Filippov's set of velocities holds
     /// zero, and the motion may stay (Filippov 1988, sec. 19).
     fn rests_at(&self, x: &SVector<f64, N>, below: &SVector<f64, N>) -> bool {
-        let (plus, minus) = (self.system.plus(x), self.system.minus(x));
+        let (system, sided) = (self.system, self.sided());
+        // Their values there, or beside it on their own sides where they have none there.
+        let [plus, minus] = [[system.plus(x), sided.plus(x)], [system.minus(x), sided.minus(x)]]
+            .map(|[there, beside]| if finite(&there) { there } else { beside });
         // The combination nearest to zero, each component in units of its own size.
         let scaled = |v: SVector<f64, N>| {
             SVector::<f64, N>::from_fn(|i, _| {
@@ -639,6 +717,16 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         Ok(State::Rest)
     }
 
+    /// Begins on the surface in a mode that is known.
+    fn begin(&mut self, mode: Mode) -> State<N> {
+        self.event(EventKind::StartedOnSurface, None, Some(mode));
+        match mode {
+            Mode::Plus => self.launch(Side::Plus),
+            Mode::Minus => self.launch(Side::Minus),
+            Mode::SlidingAttracting | Mode::SlidingRepelling => State::Sliding(Sliding::ATTRACTING),
+        }
+    }
+
     /// A two-fold at the present state, if both Lie derivatives are almost zero there.
     fn two_fold_here(&self, l: &Lie) -> Option<SlidingAtTwoFold<N>> {
         let near = LIMITS.near_two_fold * l.zero_p.max(l.zero_q);
@@ -652,6 +740,10 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     /// The state is in the repelling region: ask the rule.
     fn enter_repelling(&mut self, from: Option<Mode>) -> Result<State<N>, FilippovError> {
         self.event(EventKind::EnteredRepelling, from, Some(Mode::SlidingRepelling));
+        if self.chooser.rule == ExitRule::Undecided {
+            let ways = [REPELLING.to_owned(), flight(Side::Plus), flight(Side::Minus)];
+            return Err(self.undecided("both fields point away from the switching surface", ways));
+        }
         let Some(plan) = self.chooser.plan() else {
             return Ok(State::SetValued(Some(Mode::SlidingRepelling)));
         };
@@ -669,8 +761,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     }
 
     /// A flight from a point of the surface where the field of `side` points to it.
-    fn launch(&self, side: Side) -> State<N> {
-        let l = self.lie(&self.x);
+    fn launch(&mut self, side: Side) -> State<N> {
+        let l = self.lie_on_surface();
         let (first, zero, second) = match side {
             Side::Plus => (l.p, l.zero_p, l.pp),
             Side::Minus => (-l.q, l.zero_q, -l.mm),
@@ -681,19 +773,27 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
 
     /// Free flight until the surface or the end.
     fn fly(&mut self, side: Side, start: FlightStart) -> Result<State<N>, FilippovError> {
-        let flow = FreeFlow { system: self.system, side };
+        let system = self.system;
+        let mut flow = FreeFlow { system: Sided { system, depth: self.depth }, side };
         let mut method = Automatic::<N>::new(self.accumulation.tolerance(self.settings.tolerance));
         let (t_start, mut start) = (self.t, start);
-        method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step)?;
+        if let Err(failure) = method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step) {
+            return if self.stay_inside() { Ok(State::Free { side, start }) } else { Err(failure.into()) };
+        }
         let landed = loop {
-            let step = method.step(&flow)?;
+            let step = match method.step(&flow) {
+                Ok(step) => step,
+                // Trial points beyond the surface, where the motion does not go, may be where the field has no value.
+                Err(Failure::NotFinite { .. } | Failure::StepUnderflow { .. }) if self.stay_inside() => {
+                    flow.system.depth = self.depth;
+                    method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step)?;
+                    continue;
+                }
+                Err(failure) => return Err(failure.into()),
+            };
             let height = |theta: f64| side.sign() * self.system.switching(&step.at(theta));
             let length = step.length();
-            let at_start = match start {
-                FlightStart::Away => Start::Away,
-                FlightStart::Transversal(rate) => Start::Simple(rate * length),
-                FlightStart::Tangent(second) => Start::Double(0.5 * second * length * length),
-            };
+            let at_start = start.over(length);
             start = FlightStart::Away;
             let enclosed = |x: &SVector<Enclosed, N>| self.system.switching(x).scale(side.sign());
             match first_zero_along(&step, &height, &enclosed, at_start) {
@@ -721,7 +821,15 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                             theta = moved;
                         }
                     }
-                    let (t1, x1) = (up_to(self.t_end, step.time(theta)), project(self.system, &step.at(theta)));
+                    let (t1, place) = (up_to(self.t_end, step.time(theta)), step.at(theta));
+                    let x1 = project(self.system, &place);
+                    // A zero of a continuous h is on the surface but for rounding.
+                    let travel = (step.x1 - step.x0).norm() + place.norm();
+                    let moved = (x1 - place).norm();
+                    if moved.is_nan() || moved > LIMITS.jump * travel {
+                        self.take(side.into(), t1, place, &Truncated { inner: step.interpolant, end: theta });
+                        return Err(FilippovError::Jump { t: t1, state: Failure::state(&place) });
+                    }
                     self.take(side.into(), t1, x1, &Truncated { inner: step.interpolant, end: theta });
                     break Some(zero);
                 }
@@ -746,13 +854,16 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
 
     /// The mode after an arrival on the surface from `side`.
     fn land(&mut self, side: Side, touch: bool) -> Result<State<N>, FilippovError> {
-        let l = self.lie(&self.x);
+        let l = self.lie_on_surface();
         let from = Some(side.into());
         if let Some(local) = self.two_fold_here(&l) {
             let error = (local.point - self.x).norm() / self.system.plus(&self.x).norm();
             self.x = local.point;
             self.event(EventKind::TwoFoldReached { leg: 0.0, error }, from, None);
             return Ok(State::TwoFold(Box::new(local)));
+        }
+        if let Some(folds) = self.fused_here(&l) {
+            return Ok(self.meet(folds, from));
         }
         // Growth of |h| on this side along its own field, and on the other side along the other field.
         let (own, own_zero, own_second, across, across_zero, across_second) = match side {
@@ -772,8 +883,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             Some(FlightStart::Transversal(across))
         } else if across < -across_zero {
             None
-        } else if across_second == 0.0 {
-            return Err(self.non_transversal("landing on a fold with zero second Lie derivative (a cusp)"));
+        } else if across_second == 0.0 || across_second.is_nan() {
+            return self.degenerate(from, "landing on a fold with zero second Lie derivative (a cusp)");
         } else {
             (across_second > 0.0).then_some(FlightStart::Tangent(across_second))
         };
@@ -793,7 +904,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     {
         let system = self.system;
         let mode = sliding.mode();
-        let flow = SlidingFlow { system, direction: sliding.direction() };
+        let sided = Sided { system, depth: self.depth };
+        let flow = SlidingFlow { system: Sided { ..sided }, direction: sliding.direction() };
         let mut method = Automatic::<M>::new(self.settings.tolerance);
         let lift = |x: &SVector<f64, N>| SVector::<f64, M>::from_fn(|i, _| if i < N { x[i] } else { 0.0 });
         // The clock of the flow starts at zero with each restart, so that short times keep their digits.
@@ -801,9 +913,19 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let mut fresh = true;
         let mut idle = 0;
         let mut ahead = TwoFoldAhead::new();
-        method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY)?;
+        if let Err(failure) = method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY) {
+            return if self.stay_inside() { Ok(State::Sliding(sliding)) } else { Err(failure.into()) };
+        }
         let next = loop {
-            let step = method.step(&flow)?;
+            let before = method.statistics().clone();
+            let step = match method.step(&flow) {
+                Ok(step) => step,
+                Err(Failure::NotFinite { .. } | Failure::StepUnderflow { .. }) if self.stay_inside() => {
+                    self.count(&before);
+                    return Ok(State::Sliding(sliding));
+                }
+                Err(failure) => return Err(failure.into()),
+            };
             let end = self.sliding_end(&step, &sliding, t_base, fresh);
             fresh = false;
             let theta = end.map_or(1.0, |(theta, _)| theta);
@@ -833,7 +955,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             if self.stop.is_some() || method.statistics().steps > self.settings.max_steps {
                 break Some(SlidingEnd::Time);
             }
-            ahead.look(system, &self.x, sliding.margins(system, &self.x));
+            ahead.look(system, &self.x, sliding.margins(&sided, &self.x));
             if let Some(fold) = &ahead.local {
                 let distance = (fold.point - self.x).norm();
                 // Nearer than the tolerances resolve there is nothing to integrate.
@@ -878,7 +1000,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         t_base: f64,
         fresh: bool,
     ) -> Option<(f64, SlidingEnd)> {
-        let (system, direction) = (self.system, sliding.direction());
+        let direction = sliding.direction();
         let mut first: Option<(f64, SlidingEnd)> = None;
         let mut propose = |theta: f64, end: SlidingEnd| {
             if first.is_none_or(|(best, _)| theta < best) {
@@ -902,12 +1024,18 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                     start = Start::Simple(rate * step.length());
                 }
             }
-            let margin = |s| sliding.margins(system, &without_clock(&step.at(s)))[i];
+            let sided = self.sided();
+            let margin = |s| sliding.margins(&sided, &without_clock(&step.at(s)))[i];
             let enclosed = |z: &SVector<Enclosed, M>| {
-                let (p, q) = lie_derivatives(system, &SVector::<Enclosed, N>::from_fn(|j, _| z[j]));
+                let (p, q) = lie_derivatives(&sided, &SVector::<Enclosed, N>::from_fn(|j, _| z[j]));
                 if i == 0 { p.scale(-direction) } else { q.scale(direction) }
             };
-            if let Some(zero) = first_zero_along(step, &margin, &enclosed, start) {
+            // A set of states about the surface reaches to where such a field has no value: nothing encloses it.
+            let zero = match self.depth {
+                Some(_) => first_zero(margin, start),
+                None => first_zero_along(step, &margin, &enclosed, start),
+            };
+            if let Some(zero) = zero {
                 propose(zero.theta(), SlidingEnd::Fold(side));
             }
         }
@@ -987,6 +1115,98 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         Ok(State::Free { side, start: FlightStart::Tangent(second) })
     }
 
+    /// Two folds in one place at the present state, if both Lie derivatives are almost zero there.
+    fn fused_here(&self, l: &Lie) -> Option<FusedFolds<N>> {
+        let near = LIMITS.near_two_fold * l.zero_p.max(l.zero_q);
+        if !(l.p.abs() <= near && l.q.abs() <= near) {
+            return None;
+        }
+        let system = self.sided();
+        let folds = FusedFolds::at(&system, &self.x).filter(FusedFolds::leave)?;
+        let Some(velocity) = folds.velocity else { return Some(folds) };
+        // At a kink the motion before and the motion behind are not those of one fold.
+        let moved = velocity * self.departure(l, &folds);
+        let [before, behind] = [self.x - moved, self.x + moved].map(|x| FusedFolds::at(&system, &x));
+        let smooth = (before?.rate - behind?.rate).abs() <= LIMITS.kink * folds.rate.abs();
+        smooth.then_some(folds)
+    }
+
+    /// The time of the first step of sliding out of two folds in one place.
+    fn departure(&self, l: &Lie, folds: &FusedFolds<N>) -> f64 {
+        LIMITS.departure * l.zero_p.max(l.zero_q) / LIMITS.lie / folds.rate.abs()
+    }
+
+    fn meet(&mut self, folds: FusedFolds<N>, from: Option<Mode>) -> State<N> {
+        self.event(EventKind::TwoFoldReached { leg: 0.0, error: 0.0 }, from, None);
+        State::Fused(Box::new(folds))
+    }
+
+    /// Rest on the surface until the end.
+    fn rest(&mut self) -> State<N> {
+        self.take(Mode::SlidingAttracting, self.t_end, self.x, &Standing(self.x));
+        State::Rest
+    }
+
+    /// The future at two folds in one place.
+    fn pass(&mut self, folds: &FusedFolds<N>) -> Result<State<N>, FilippovError> {
+        self.accumulation = Accumulation::default();
+        let growth = |side: Side| match side {
+            Side::Plus => folds.second[0],
+            Side::Minus => -folds.second[1],
+        };
+        let visible = |side: &Side| growth(*side) > 0.0;
+        let flights: Vec<Side> = [Side::Plus, Side::Minus].into_iter().filter(visible).collect();
+        let repelling = folds.rate > 0.0;
+        let leave = |engine: &mut Self, to: Side, kind: EventKind| {
+            engine.event(kind, None, Some(to.into()));
+            Ok(State::Free { side: to, start: FlightStart::Tangent(growth(to)) })
+        };
+        let plan = match (folds.velocity, flights.as_slice()) {
+            (Some(_), []) if !repelling => None,
+            (None, [only]) => return leave(self, *only, EventKind::LeftByTangency { to: *only }),
+            _ if self.chooser.rule == ExitRule::Undecided => {
+                let slides = folds.velocity.map(|_| if repelling { REPELLING } else { "attracting sliding" });
+                let ways = slides.map(str::to_owned).into_iter().chain(flights.into_iter().map(flight));
+                let what = if [Side::Plus, Side::Minus].iter().all(visible) {
+                    "the folds of both fields, both visible, lie in one place (fused folds, a two-fold with two visible sides), and the motion is there"
+                } else {
+                    "the folds of both fields lie in one place (fused folds), and the motion is there"
+                };
+                return Err(self.undecided(what, ways));
+            }
+            _ => match self.chooser.plan() {
+                None => return Ok(State::SetValued(None)),
+                plan => plan,
+            },
+        };
+        if let Some(Plan { side, at_once, .. }) = plan
+            && visible(&side)
+            && (at_once || folds.velocity.is_none())
+        {
+            return leave(self, side, EventKind::Exit { to: side, time: 0.0, arc: 0.0, rule: self.chooser.rule });
+        }
+        let Some(velocity) = folds.velocity else {
+            return Err(self.no_exit(
+                "both folds lie in one place, no sliding leaves it, and the fold of the side asked for is invisible; ask --exit for the other side",
+            ));
+        };
+        let mode = if repelling { Mode::SlidingRepelling } else { Mode::SlidingAttracting };
+        self.event(if repelling { EventKind::EnteredRepelling } else { EventKind::StartedOnSurface }, None, Some(mode));
+        let l = self.lie(&self.x);
+        let t1 = (self.t + self.departure(&l, folds)).min(self.t_end);
+        let (time, from) = (t1 - self.t, self.x);
+        let to = project(self.system, &(from + velocity * time));
+        self.take(mode, t1, to, &Straight { system: self.system, from, to });
+        let arc = (to - from).norm();
+        Ok(match plan {
+            Some(plan) if repelling && (time >= plan.time || arc >= plan.arc) => {
+                self.exit(plan.side, time, arc, Some(mode))
+            }
+            Some(_) if repelling => State::Sliding(Sliding { repelling, plan, time, arc }),
+            _ => State::Sliding(Sliding::ATTRACTING),
+        })
+    }
+
     /// The future at a two-fold.
     fn depart(&mut self, local: &SlidingAtTwoFold<N>) -> Result<State<N>, FilippovError> {
         self.accumulation = Accumulation::default();
@@ -995,6 +1215,18 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             Side::Plus => pp,
             Side::Minus => -mm,
         };
+        if self.chooser.rule == ExitRule::Undecided {
+            let sides = [Side::Plus, Side::Minus].into_iter().filter(|side| growth(*side) > 0.0).map(flight);
+            let slides = match (&local.through, &local.back) {
+                (Some(_), _) => Some(REPELLING.to_owned()),
+                (None, Some(_)) => Some("attracting sliding".to_owned()),
+                (None, None) => None,
+            };
+            return Err(self.undecided(
+                "the motion is at a two-fold, where both fields are tangent to the surface",
+                slides.into_iter().chain(sides),
+            ));
+        }
         let Some(plan) = self.chooser.plan() else {
             return Ok(State::SetValued(None));
         };

@@ -62,7 +62,7 @@ impl SlidingLaw {
 ///
 /// In the repelling region sliding may end at any moment, to either side: Filippov's equation has all these solutions
 /// (Filippov 1988, sec. 10), and a passage through a two-fold puts every orbit there. The rule says which one is
-/// followed. It has no default: a caller must choose, and each departure is an event that names the rule with the
+/// followed. Nothing is chosen silently: without a rule a run ends where one is needed, and each departure is an event that names the rule with the
 /// time and the side it gave. Out of a two-fold the orbit slides along the analytic invariant curve, the smooth
 /// continuation of the way in (see [`two_fold`](super::two_fold)); every point of the repelling region lies on some other
 /// sliding orbit out of the same two-fold, which [`history`](super::history) finds. Whatever the rule says, an orbit that comes to the edge of the repelling region (an
@@ -106,6 +106,9 @@ pub enum ExitRule {
         /// Stream of the generator: one per run.
         stream: u64,
     },
+    /// No rule: a run goes on as long as none is needed, and ends with
+    /// [`FilippovError::Undecided`](super::FilippovError::Undecided) where one is.
+    Undecided,
     /// No choice: a run stops at the first set-valued point. [`funnel`](super::funnel) then follows the whole family.
     All,
 }
@@ -124,6 +127,7 @@ impl std::fmt::Display for ExitRule {
             ExitRule::Random { law: SlidingLaw::Uniform { longest }, plus_probability, .. } => {
                 write!(f, "random:uniform:{longest:?}, to h > 0 with probability {plus_probability:?}")
             }
+            ExitRule::Undecided => write!(f, "undecided"),
             ExitRule::All => write!(f, "all"),
         }
     }
@@ -144,7 +148,7 @@ impl ExitRule {
             }
         };
         match *self {
-            ExitRule::AtOnce { .. } | ExitRule::All => Ok(()),
+            ExitRule::AtOnce { .. } | ExitRule::Undecided | ExitRule::All => Ok(()),
             ExitRule::AfterTime { time, .. } => positive("time", time),
             ExitRule::AfterArc { arc, .. } => positive("arc", arc),
             ExitRule::Random { law, plus_probability, .. } => {
@@ -189,7 +193,7 @@ impl Chooser {
         Self { rule, stream }
     }
 
-    /// The plan for the stretch that starts now; `None` for `All`.
+    /// The plan for the stretch that starts now; `None` for `Undecided` and `All`.
     pub fn plan(&mut self) -> Option<Plan> {
         let never = f64::INFINITY;
         match self.rule {
@@ -202,7 +206,7 @@ impl Chooser {
                 let side = if stream.uniform() < plus_probability { Side::Plus } else { Side::Minus };
                 Some(Plan { side, time, arc: never, at_once: false })
             }
-            ExitRule::All => None,
+            ExitRule::Undecided | ExitRule::All => None,
         }
     }
 }

@@ -9,10 +9,49 @@ use twofold_num::Elementary;
 use twofold_system::filippov::{gradient, lie_derivatives};
 use twofold_system::{PiecewiseSmooth, VectorField};
 
-/// f+ or f-, continued smoothly across the surface.
+/// A system whose fields may be defined on their own sides only. With a `depth`, a field is asked no nearer to the surface than |h| = `depth` on
+/// its own side: beyond, it is continued by its values there, along grad h. Motion on the field's own side does not depend on that.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sided<'a, P> {
+    pub system: &'a P,
+    pub depth: Option<f64>,
+}
+
+impl<P> Sided<'_, P> {
+    fn inside<S: Elementary, const N: usize>(&self, x: &SVector<S, N>, side: Side) -> SVector<S, N>
+    where
+        P: PiecewiseSmooth<N>,
+    {
+        let Some(depth) = self.depth else { return *x };
+        let mut y = *x;
+        // Newton's method, with steps a little too long: from outside of a convex side it would stay outside.
+        for _ in 0..4 {
+            let height = self.system.switching(&y).scale(side.sign()) - S::from_f64(depth);
+            let short = (height - height.abs()).scale(0.5 * (1.0 + 1.0 / 1024.0) * side.sign());
+            let slope = gradient(self.system, &y);
+            let square = (0..N).fold(S::zero(), |sum, i| sum + slope[i] * slope[i]);
+            y = SVector::from_fn(|i, _| y[i] - slope[i] * (short / square));
+        }
+        y
+    }
+}
+
+impl<P: PiecewiseSmooth<N>, const N: usize> PiecewiseSmooth<N> for Sided<'_, P> {
+    fn switching<S: Elementary>(&self, x: &SVector<S, N>) -> S {
+        self.system.switching(x)
+    }
+    fn plus<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
+        self.system.plus(&self.inside(x, Side::Plus))
+    }
+    fn minus<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
+        self.system.minus(&self.inside(x, Side::Minus))
+    }
+}
+
+/// f+ or f-, continued across the surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FreeFlow<'a, P> {
-    pub system: &'a P,
+    pub system: Sided<'a, P>,
     pub side: Side,
 }
 
@@ -41,7 +80,7 @@ pub(super) fn desingularised<P: PiecewiseSmooth<N>, S: Elementary, const N: usiz
 /// sign is + in the attracting region and - in the repelling one, so that time always runs forward.
 #[derive(Clone, Copy, Debug)]
 pub struct SlidingFlow<'a, P, const N: usize> {
-    pub(super) system: &'a P,
+    pub(super) system: Sided<'a, P>,
     pub(super) direction: f64,
 }
 
@@ -51,7 +90,7 @@ macro_rules! sliding_in_dimension {
         impl<P: PiecewiseSmooth<$n>> VectorField<$m> for SlidingFlow<'_, P, $n> {
             fn eval<S: Elementary>(&self, state: &SVector<S, $m>) -> SVector<S, $m> {
                 let x = SVector::<S, $n>::from_fn(|i, _| state[i]);
-                let (field, rate) = desingularised(self.system, &x);
+                let (field, rate) = desingularised(&self.system, &x);
                 SVector::from_fn(|i, _| if i < $n { field[i] } else { rate }.scale(self.direction))
             }
         }

@@ -38,7 +38,8 @@
 //! long as the rule says; [`ExitRule::AtOnce`] to a visible side takes that side's tangent orbit. Where the rule asks for a
 //! future that does not exist the run ends with [`FilippovError::NoSuchExit`].
 //!
-//! **Two switching surfaces** are followed one at a time ([`run_two_surfaces`]); their intersection is refused.
+//! **Two switching surfaces** are followed one at a time ([`run_two_surfaces`]); where they meet, the motion is followed if the four fields
+//! decide it, and refused if not.
 //!
 //! **Non-transversal cases.** A fold whose second Lie derivative vanishes too (a cusp), and contact with a two-fold that is
 //! not reached along a sliding direction, end with [`FilippovError::NonTransversal`]; crossings that accumulate (invisible
@@ -49,6 +50,7 @@ mod engine;
 mod exit;
 mod flow;
 mod funnel;
+mod intersection;
 mod surfaces;
 mod trajectory;
 pub mod two_fold;
@@ -298,11 +300,21 @@ pub enum FilippovError {
         /// What vanishes.
         what: &'static str,
     },
-    /// Two switching surfaces are reached at once.
+    /// Several motions are possible, and nothing says which is followed.
+    #[error("the motion is not decided at t = {t}, state {state:?}: {choice}")]
+    Undecided {
+        /// Time reached.
+        t: f64,
+        /// State reached.
+        state: Vec<f64>,
+        /// What could be chosen.
+        choice: Box<Choice>,
+    },
+    /// The switching function is not continuous along the motion.
     #[error(
-        "the run comes to the intersection of the two switching surfaces at t = {t}, state {state:?}. What follows there is not decided by Filippov's convention, and nothing is chosen here: end the run before that time, start elsewhere, change a parameter, or smooth the switches"
+        "the switching function h jumps at t = {t}, state {state:?}: it changes sign there without coming to 0, or faster than numbers resolve. Give the place of the jump as a second switching surface ([second] in the system's file), or smooth the switches (--switch smoothed)"
     )]
-    Intersection {
+    Jump {
         /// Time reached.
         t: f64,
         /// State reached.
@@ -341,6 +353,27 @@ pub enum FilippovError {
         limit: u64,
     },
 }
+
+/// The motions that are possible where none is decided.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "{what}. Possible: {}. {remedy}",
+    if continuations.is_empty() { "not known".to_owned() } else { continuations.join("; ") }
+)]
+pub struct Choice {
+    /// Where the motion is.
+    pub what: &'static str,
+    /// What may follow.
+    pub continuations: Vec<String>,
+    /// What the one who asked can do.
+    pub remedy: &'static str,
+}
+
+/// What helps where an exit rule can choose.
+const CHOOSE: &str = "Nothing is chosen silently: say which is followed by --exit, such as at-once:plus, after-time:0.3:minus, after-arc:0.2:plus, random:exponential:0.5, or all; or end the run before (--t-end)";
+
+/// What helps where no rule can choose.
+const WITHOUT_CHOICE: &str = "Nothing is chosen here: end the run before that time (--t-end), start elsewhere (--start), change a parameter (--set), or smooth the switches (--switch smoothed)";
 
 #[cfg(test)]
 mod tests;

@@ -1,41 +1,69 @@
-//! Filippov motion with two switching surfaces, as far as they are met one at a time.
+//! Filippov motion with two switching surfaces.
 //!
 //! Near a point of one surface that is off the other, a system with two is a system with one: the other's sign does not change there. So a run
 //! is a sequence of runs of the one-surface engine, each with the sign of the other surface fixed (a *face* of the system), and ends its turn
 //! where the other surface is reached, which becomes the one that is followed. Crossing, sliding, folds, two-folds and the exit
 //! rule are those of [`engine`](super::engine) on each surface.
 //!
-//! Where both surfaces meet, one case is decided: a motion that slides attracted on one surface when it comes to the other, where all four
-//! fields cross that other surface in the same direction. Every mixture of them does too, so the motion crosses it, and goes on as the far
-//! side says. In any other case Filippov's convention leaves a whole family of sliding vectors (Filippov 1988, ch. 2; Dieci & Lopez 2011),
-//! and nothing here chooses one: the run ends with [`FilippovError::Intersection`].
+//! Where both surfaces meet, [`intersection`](super::intersection) lists what may follow. If that is one motion it is followed, also along the
+//! intersection itself; else the run ends with [`FilippovError::Undecided`].
 
 use nalgebra::SVector;
 
-use super::engine::{Departure, Origin, near_surface, run_from, up_to};
+use super::engine::{Departure, FlightStart, Origin, near_surface, run_from, up_to};
 use super::exit::Chooser;
 use super::flow::{SlidingFlow, Truncated, project};
+use super::intersection::{
+    AlongIntersection, Continuation, Mixture, OnIntersection, UNDECIDING, continuations, deciding, resolution, side,
+    turns,
+};
+use super::{Choice, WITHOUT_CHOICE, intersection};
 use super::{EventKind, ExitRule, FilippovError, FilippovObserver, FilippovSummary, Mode, ModeEvent, Settings, Side};
+use crate::dopri5::Dopri5;
 use crate::driver::Watch;
-use crate::roots::{Enclosed, Start, first_zero_along};
-use crate::step::{Failure, Flow, Statistics, Step, StopReason, Tolerance, finite};
-use twofold_num::Arithmetic;
-use twofold_system::filippov::{Region, gradient, lie_derivatives, region, sliding_field};
-use twofold_system::{PiecewiseSmooth, VectorField};
+use crate::roots::{Enclosed, Start, first_zero, first_zero_along};
+use crate::step::{Failure, Flow, Statistics, Step, Stepper, StopReason, finite};
+use twofold_num::{Arithmetic, Dual};
+use twofold_system::filippov::{gradient, sliding_field};
+use twofold_system::{PiecewiseSmooth, VectorField, variables};
 
 /// The faces of a system with two surfaces: `faces[i][0]` switches at surface i where the other function is positive, `faces[i][1]` where it is
 /// negative.
 pub type Faces<P> = [[P; 2]; 2];
 
-/// Nearer to a point of both surfaces than so many tolerances of the motion is at their intersection.
-pub const INTERSECTION: f64 = 100.0;
+/// Tables call a state that is nearer to a surface than this, relative to its size, on the surface.
+pub const INTERSECTION: f64 = 1e-9;
+
+/// Share of [`resolution`] within which a spiral has come to the intersection: nearer, a turn takes no time that matters.
+const END_OF_SPIRAL: f64 = 1e-4;
+/// Share of [`resolution`] within which sliding that reaches the other surface is at the intersection.
+const SLID: f64 = 100.0;
+
+/// What the next part of a run is.
+enum Part<const N: usize> {
+    /// A run of the one-surface engine on surface `active`, on the side `beyond` of the other.
+    Face { active: usize, beyond: Side, departure: Departure<N>, left: Option<FlightStart>, first: First },
+    /// Motion along the intersection.
+    Intersection(Box<Mixture<N>>),
+}
+
+/// What the first event of a part is called.
+#[derive(Clone, Copy, Debug)]
+enum First {
+    /// As the engine says.
+    AsIs,
+    /// An arrival from this side of the surface that is now followed.
+    Arrived(Side),
+    /// This, after this mode.
+    Called(EventKind, Mode),
+}
 
 /// Runs the Filippov motion of a system with two switching surfaces from (0, x0) to `t_end`. `M` is `N + 1` and is inferred. The modes that the
 /// observer is told are those of the surface that was met last (at the start: the first one, unless the run starts on the second).
 ///
 /// # Errors
-/// [`FilippovError::Intersection`] where the run comes to both surfaces at once; else see [`FilippovError`]. Each names the time and the
-/// state.
+/// [`FilippovError::Undecided`] where both surfaces meet and several motions are possible; else see [`FilippovError`]. Each names the time and
+/// the state.
 pub fn run_two_surfaces<P, const N: usize, const M: usize>(
     faces: &Faces<P>,
     x0: SVector<f64, N>,
@@ -57,138 +85,292 @@ where
     if !finite(&x0) {
         return Err(Failure::NotFinite { t: 0.0, state: Failure::state(&x0) }.into());
     }
-    let near = |x: &SVector<f64, N>| {
-        let Tolerance { rtol, atol } = settings.tolerance;
-        let reach = x.map(|v| INTERSECTION * (atol + rtol * v.abs()));
-        intersection_within(faces, x, &reach)
-    };
     let mut chooser = Chooser::new(rule);
-    let (mut t, mut x) = (0.0, x0);
-    let mut active = usize::from(near_surface(&faces[1][0], &x));
-    let mut arrived = None;
-    // Set where the other surface was crossed in sliding on this one: the state is on both.
-    let mut passed: Option<Passage> = None;
-    let (mut events, mut statistics) = (0, Statistics { highest_order: 5, ..Statistics::default() });
-    loop {
-        let other = 1 - active;
-        if passed.is_none() && near(&x) {
-            return Err(FilippovError::Intersection { t, state: Failure::state(&x) });
+    let mut run =
+        Run { faces, settings, t_end, observer, watch, t: 0.0, x: x0, events: 0, statistics: Statistics::default() };
+    run.statistics.highest_order = 5;
+    let near = [0, 1].map(|surface: usize| near_surface(&faces[surface][0], &x0));
+    let start = if near == [true; 2] { run.corner(&x0, 1.0) } else { None };
+    let mut part = match start {
+        Some(corner) => {
+            run.x = corner;
+            run.decide(None)?
         }
-        let below = passed.map_or(faces[other][0].switching(&x) < 0.0, |passage| passage.to == Side::Minus);
-        let face = &faces[active][usize::from(below)];
-        let sign = if below { -1.0 } else { 1.0 };
+        None => {
+            let active = usize::from(near[1]);
+            let beyond = run.side_of(1 - active);
+            Part::Face { active, beyond, departure: Departure::Anywhere, left: None, first: First::AsIs }
+        }
+    };
+    loop {
+        let (active, beyond, departure, left, first) = match part {
+            Part::Face { active, beyond, departure, left, first } => (active, beyond, departure, left, first),
+            Part::Intersection(mixture) => match run.along(*mixture)? {
+                Ok(next) => {
+                    part = next;
+                    continue;
+                }
+                Err(stop) => return Ok(run.summary(Some(Mode::SlidingAttracting), stop)),
+            },
+        };
+        let other = 1 - active;
+        let face = &faces[active][usize::from(beyond == Side::Minus)];
+        let (t, events) = (run.t, run.events);
         let mut guard = Guard {
-            observer: &mut *observer,
+            observer: &mut *run.observer,
             guarded: &faces[other][0],
-            sign,
-            arrived,
-            passed: passed.map(|passage| passage.to),
-            left: passed.map(|passage| passage.rate),
+            sign: beyond.sign(),
+            first,
+            left,
             hit: None,
             t_end,
         };
-        let left = Settings {
+        let remaining = Settings {
             max_events: settings.max_events.saturating_sub(events),
-            max_steps: settings.max_steps.saturating_sub(statistics.steps),
+            max_steps: settings.max_steps.saturating_sub(run.statistics.steps),
             ..*settings
         };
-        // What was found to be on the surface is on it.
-        let found = arrived.is_some() || passed.is_some();
-        let origin = Origin { t, x, departure: if found { Departure::OnSurface } else { Departure::Anywhere } };
-        let summary = run_from(face, origin, t_end, &left, &mut chooser, &mut guard, watch)?;
+        let from_corner = left.is_some();
+        let origin = Origin { t, x: run.x, departure };
+        let summary = run_from(face, origin, t_end, &remaining, &mut chooser, &mut guard, watch)?;
         let hit = guard.hit;
-        events += summary.events;
-        statistics += &summary.statistics;
-        let whole = |summary: FilippovSummary<N>, statistics| FilippovSummary { events, statistics, ..summary };
+        run.events += summary.events;
+        run.statistics += &summary.statistics;
         let Some(Hit { t: when, x: place, mode, from, wanted }) = hit else {
-            return Ok(whole(summary, statistics));
+            return Ok(FilippovSummary { events: run.events, statistics: run.statistics, ..summary });
         };
-        let both = mode.slides() || near(&place);
-        let passage = if mode == Mode::SlidingAttracting { Passage::at(faces, active, from, &place) } else { None };
-        if both && passage.is_none() {
-            return Err(FilippovError::Intersection { t: when, state: Failure::state(&place) });
-        }
-        let ended = FilippovSummary { t: when, x: place, mode: Some(mode), ..summary };
+        (run.t, run.x) = (when, place);
         if !wanted {
-            return Ok(whole(FilippovSummary { stop: StopReason::Observer, ..ended }, statistics));
+            return Ok(run.summary(Some(mode), StopReason::Observer));
         }
-        if matches!(ended.stop, StopReason::Watch | StopReason::StepBudget) {
-            return Ok(whole(ended, statistics));
+        if matches!(summary.stop, StopReason::Watch | StopReason::StepBudget) {
+            return Ok(run.summary(Some(mode), summary.stop));
         }
         if when >= t_end {
-            return Ok(whole(FilippovSummary { stop: StopReason::EndTime, ..ended }, statistics));
+            return Ok(run.summary(Some(mode), StopReason::EndTime));
         }
-        if events > settings.max_events {
+        if run.events > settings.max_events {
             return Err(FilippovError::TooManyEvents {
                 t: when,
                 state: Failure::state(&place),
                 limit: settings.max_events,
             });
         }
-        (t, x, passed) = (when, place, passage);
-        match passage {
-            Some(_) => arrived = None,
-            None => (active, arrived) = (other, Some(from)),
+        if from_corner && when <= t {
+            return Err(run.undecided(&[], "the motion does not get away from where both switching surfaces meet"));
+        }
+        // Who slides is on both surfaces; a flight that only comes near one may pass by.
+        let mut corner = run.corner(&place, if mode.slides() { SLID } else { 1.0 });
+        if let Some(at) = corner
+            && !mode.slides()
+            && !run.within(END_OF_SPIRAL, &place, &at)
+            && turns(faces, &at)
+        {
+            // A spiral comes nearer by itself.
+            corner = None;
+        }
+        part = match corner {
+            Some(at) => {
+                run.x = at;
+                run.decide(Some(Arrival { mode, surface: other, from }))?
+            }
+            None => Part::Face {
+                active: other,
+                beyond: run.side_of(active),
+                departure: Departure::OnSurface,
+                left: None,
+                first: First::Arrived(from),
+            },
+        };
+    }
+}
+
+/// How a run came to the intersection.
+#[derive(Clone, Copy, Debug)]
+struct Arrival {
+    mode: Mode,
+    /// The surface that was reached, and the side that it came from.
+    surface: usize,
+    from: Side,
+}
+
+/// A run on its way.
+struct Run<'a, P, const N: usize> {
+    faces: &'a Faces<P>,
+    settings: &'a Settings,
+    t_end: f64,
+    observer: &'a mut dyn FilippovObserver<N>,
+    watch: &'a dyn Watch,
+    t: f64,
+    x: SVector<f64, N>,
+    events: u64,
+    statistics: Statistics,
+}
+
+impl<P: PiecewiseSmooth<N>, const N: usize> Run<'_, P, N> {
+    fn summary(self, mode: Option<Mode>, stop: StopReason) -> FilippovSummary<N> {
+        FilippovSummary { t: self.t, x: self.x, mode, stop, events: self.events, statistics: self.statistics }
+    }
+
+    fn side_of(&self, surface: usize) -> Side {
+        if self.faces[surface][0].switching(&self.x) < 0.0 { Side::Minus } else { Side::Plus }
+    }
+
+    /// Whether `x` and `y` differ by no more than this share of [`resolution`], each coordinate in its own units.
+    fn within(&self, share: f64, x: &SVector<f64, N>, y: &SVector<f64, N>) -> bool {
+        let reach = resolution(self.settings, x);
+        (0..N).all(|i| (y[i] - x[i]).abs() <= share * reach[i])
+    }
+
+    /// The point of the intersection at `x`, if one is within `share` of [`resolution`].
+    fn corner(&self, x: &SVector<f64, N>, share: f64) -> Option<SVector<f64, N>> {
+        intersection::project(self.faces, x).filter(|corner| self.within(share, x, corner))
+    }
+
+    fn undecided(&self, found: &[Continuation<N>], what: &'static str) -> FilippovError {
+        let continuations = found.iter().map(ToString::to_string).collect();
+        let choice = Box::new(Choice { what, continuations, remedy: WITHOUT_CHOICE });
+        FilippovError::Undecided { t: self.t, state: Failure::state(&self.x), choice }
+    }
+
+    fn event(&mut self, kind: EventKind, from: Option<Mode>, to: Mode) -> Flow {
+        self.events += 1;
+        self.observer.event(&ModeEvent { t: self.t, state: self.x, kind, from, to: Some(to) })
+    }
+
+    /// What follows at the intersection; `None`, if the run starts there.
+    fn decide(&mut self, arrival: Option<Arrival>) -> Result<Part<N>, FilippovError> {
+        let mut found = continuations(self.faces, &self.x);
+        match found.as_slice() {
+            [Continuation::Stay(_)] => {
+                let Some(Continuation::Stay(mixture)) = found.pop() else { unreachable!() };
+                let (kind, from) = match arrival {
+                    None => (EventKind::StartedOnSurface, None),
+                    Some(Arrival { mode, from, .. }) => (EventKind::Landing { from }, Some(mode)),
+                };
+                // The next step is refused by an observer that wants no more.
+                let _ = self.event(kind, from, Mode::SlidingAttracting);
+                Ok(Part::Intersection(mixture))
+            }
+            [only @ (Continuation::Flight(_) | Continuation::Sliding { repelling: false, .. })] => {
+                Ok(self.leave(only, arrival, false))
+            }
+            [] => {
+                Err(self
+                    .undecided(&[], "both switching surfaces meet, and their Lie derivatives do not say what follows"))
+            }
+            _ => Err(self.undecided(&found, "both switching surfaces meet, and the motion there is not unique")),
         }
     }
-}
 
-/// Whether both functions are zero at a point near `x`, to first order: the nearest one in units of `reach` is within that.
-fn intersection_within<P: PiecewiseSmooth<N>, const N: usize>(
-    faces: &Faces<P>,
-    x: &SVector<f64, N>,
-    reach: &SVector<f64, N>,
-) -> bool {
-    let [h, k] = [0, 1].map(|i| faces[i][0].switching(x));
-    // Gradients in those units, of length 1 each.
-    let [(g, h), (l, k)] = [(0, h), (1, k)].map(|(i, value)| {
-        let slope = gradient(&faces[i][0], x).component_mul(reach);
-        let length = slope.norm();
-        (slope / length, value / length)
-    });
-    if h == 0.0 && k == 0.0 {
-        return true;
-    }
-    // |u|^2 of the shortest u with g.u = -h and l.u = -k.
-    let cosine = g.dot(&l);
-    let across = h - cosine * k;
-    k * k + across * across / (1.0 - cosine * cosine) <= 1.0
-}
-
-/// The other surface crossed in sliding.
-#[derive(Clone, Copy, Debug)]
-struct Passage {
-    /// The side of the other surface that it goes to.
-    to: Side,
-    /// How fast |h| of the other surface grows there.
-    rate: f64,
-}
-
-impl Passage {
-    /// What follows at a point of both surfaces, reached in attracting sliding on `active` from the side `from` of the other: that it is
-    /// crossed, if this is decided.
-    fn at<P: PiecewiseSmooth<N>, const N: usize>(
-        faces: &Faces<P>,
-        active: usize,
-        from: Side,
-        x: &SVector<f64, N>,
-    ) -> Option<Self> {
-        let to = from.other();
-        let (far, other) = (&faces[active][usize::from(to == Side::Minus)], &faces[1 - active]);
-        let across = other.iter().flat_map(|face| {
-            let (p, q) = lie_derivatives(face, x);
-            [p, q]
-        });
-        let all_cross = across.into_iter().all(|rate| to.sign() * rate > 0.0);
-        let slope = gradient(&other[0], x);
-        let along = |field: SVector<f64, N>| to.sign() * slope.dot(&field);
-        let rate = match region(far, x) {
-            Region::Attracting => along(sliding_field(far, x)),
-            Region::CrossingUp => along(far.plus(x)),
-            Region::CrossingDown => along(far.minus(x)),
-            Region::Repelling | Region::Boundary => return None,
+    /// The part that begins at the intersection by `next`.
+    fn leave(&self, next: &Continuation<N>, arrival: Option<Arrival>, stayed: bool) -> Part<N> {
+        let (active, beyond, mode) = match *next {
+            Continuation::Flight(m) => (0, side(m, 1), side(m, 0).into()),
+            Continuation::Sliding { surface, beyond, .. } => (surface, beyond, Mode::SlidingAttracting),
+            _ => unreachable!("the others do not leave"),
         };
-        (all_cross && rate > 0.0).then_some(Self { to, rate })
+        let face = &self.faces[active][usize::from(beyond == Side::Minus)];
+        let at = variables(&self.x);
+        let velocity = match mode {
+            Mode::Plus => face.plus(&at),
+            Mode::Minus => face.minus(&at),
+            _ => sliding_field(face, &at),
+        };
+        let slope = gradient(&self.faces[1 - active][0], &at);
+        let rate = (0..N).fold(Dual::constant(0.0), |sum, i| sum + slope[i] * velocity[i]);
+        let along: f64 = (0..N).map(|i| rate.partials[i] * velocity[i].value).sum();
+        let size: f64 = (0..N).map(|i| slope[i].value.abs() * velocity[i].value.abs()).sum();
+        let left = if rate.value.abs() > UNDECIDING * size {
+            FlightStart::Transversal(beyond.sign() * rate.value)
+        } else {
+            FlightStart::Tangent(beyond.sign() * along)
+        };
+        let first = match arrival {
+            None if stayed => First::Called(EventKind::LeftByTangency { to: beyond }, Mode::SlidingAttracting),
+            None => First::AsIs,
+            Some(Arrival { mode: before, from, .. }) if mode.slides() && !before.slides() => {
+                First::Called(EventKind::Landing { from }, before)
+            }
+            Some(Arrival { mode: before, surface, from }) => {
+                // The side of the surface reached on which it goes on.
+                let to = match (surface == active, mode) {
+                    (false, _) => beyond,
+                    (true, Mode::Plus) => Side::Plus,
+                    (true, Mode::Minus) => Side::Minus,
+                    (true, _) => from.other(),
+                };
+                First::Called(EventKind::Crossing { to }, before)
+            }
+        };
+        Part::Face { active, beyond, departure: Departure::Decided(mode), left: Some(left), first }
+    }
+
+    /// Motion along the intersection until something else follows, or the reason to stop.
+    fn along(&mut self, mut mixture: Mixture<N>) -> Result<Result<Part<N>, StopReason>, FilippovError> {
+        let faces = self.faces;
+        let mode = Mode::SlidingAttracting;
+        'stretch: loop {
+            let flow = AlongIntersection { faces, mixture: &mixture };
+            let mut method = Dopri5::<N>::new(self.settings.tolerance);
+            method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step)?;
+            loop {
+                let before = method.statistics().clone();
+                let step = method.step(&flow)?;
+                let (t0, signs) = (step.t0, deciding(faces, &self.x));
+                let mut end: Option<f64> = None;
+                for (k, sign) in signs.into_iter().enumerate().filter(|(_, v)| v.abs() > UNDECIDING) {
+                    let margin = |theta: f64| sign.signum() * deciding(faces, &step.at(theta))[k];
+                    if let Some(zero) = first_zero(margin, Start::Away) {
+                        end = Some(end.unwrap_or(1.0).min(zero.theta()));
+                    }
+                }
+                let theta = end.unwrap_or(1.0);
+                let place = step.at(theta);
+                let Some(x1) = intersection::project(faces, &place) else {
+                    return Err(
+                        self.undecided(&[], "the motion along the intersection of the switching surfaces loses it")
+                    );
+                };
+                let t1 = up_to(self.t_end, if theta == 1.0 { step.t1 } else { step.time(theta) });
+                let interpolant = OnIntersection { faces, inner: step.interpolant, end: theta };
+                let seen = Step { t0, t1, x0: self.x, x1, interpolant: &interpolant };
+                let flow_on = if t1 > t0 { self.observer.step(mode, &seen) } else { Flow::Continue };
+                (self.t, self.x) = (t1, x1);
+                let work = method.statistics();
+                self.statistics.steps += work.steps - before.steps;
+                self.statistics.evaluations += work.evaluations - before.evaluations;
+                self.statistics.rejected += work.rejected - before.rejected;
+                if flow_on == Flow::Stop {
+                    return Ok(Err(StopReason::Observer));
+                }
+                if self.t >= self.t_end {
+                    return Ok(Err(StopReason::EndTime));
+                }
+                if !self.watch.reached(self.t) {
+                    return Ok(Err(StopReason::Watch));
+                }
+                if self.statistics.steps > self.settings.max_steps {
+                    return Ok(Err(StopReason::StepBudget));
+                }
+                let found = continuations(faces, &self.x);
+                match found.as_slice() {
+                    [Continuation::Stay(next)] => {
+                        if end.is_some() || !self.within(1.0, &x1, &place) {
+                            mixture = (**next).clone();
+                            continue 'stretch;
+                        }
+                    }
+                    [only @ (Continuation::Flight(_) | Continuation::Sliding { repelling: false, .. })] => {
+                        return Ok(Ok(self.leave(only, None, true)));
+                    }
+                    _ => {
+                        let what = "the motion along the intersection of the switching surfaces comes to where it is not unique";
+                        return Err(self.undecided(&found, what));
+                    }
+                }
+            }
+        }
     }
 }
 
@@ -210,12 +392,9 @@ struct Guard<'a, P, const N: usize> {
     guarded: &'a P,
     /// The sign of its function.
     sign: f64,
-    /// Set until the first event of a run that begins on a surface: the side it came from.
-    arrived: Option<Side>,
-    /// Set until the first event of a run that goes on from a crossing in sliding: the side that it goes to.
-    passed: Option<Side>,
-    /// Set until the first step of such a run: how fast it leaves the other surface.
-    left: Option<f64>,
+    first: First,
+    /// Set until the first step of a run that begins at the intersection: how it leaves the other surface.
+    left: Option<FlightStart>,
     hit: Option<Hit<N>>,
     t_end: f64,
 }
@@ -229,7 +408,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> FilippovObserver<N> for Guard<'_, P,
         let enclosed = |x: &SVector<Enclosed, N>| self.guarded.switching(x).scale(self.sign);
         let first = |start| first_zero_along(step, &height, &enclosed, start).map(|zero| zero.theta());
         let zero = match self.left.take() {
-            Some(rate) => first(Start::Simple(rate * step.length())),
+            Some(start) => first(start.over(step.length())),
             // Rounding may have carried the step before over the surface.
             None if height(0.0) <= 0.0 => Some(0.0),
             None => first(Start::Away),
@@ -248,11 +427,13 @@ impl<P: PiecewiseSmooth<N>, const N: usize> FilippovObserver<N> for Guard<'_, P,
         if self.hit.is_some() {
             return Flow::Stop;
         }
-        if let Some(to) = self.passed.take() {
-            let kind = EventKind::Crossing { to };
-            return self.observer.event(&ModeEvent { kind, from: Some(Mode::SlidingAttracting), ..*event });
-        }
-        let Some(from) = self.arrived.take() else { return self.observer.event(event) };
+        let from = match std::mem::replace(&mut self.first, First::AsIs) {
+            First::AsIs => return self.observer.event(event),
+            First::Called(kind, from) => {
+                return self.observer.event(&ModeEvent { kind, from: Some(from), ..*event });
+            }
+            First::Arrived(from) => from,
+        };
         let kind = match (event.kind, event.to) {
             (EventKind::StartedOnSurface, Some(mode)) if mode.slides() => EventKind::Landing { from },
             (EventKind::StartedOnSurface, Some(mode)) if mode == from.into() => EventKind::Grazing { side: from },
@@ -337,7 +518,7 @@ mod tests {
     #[test]
     fn sliding_into_the_other_surface_is_refused_where_they_meet() {
         let (end, seen) = run(DOWN, [1.0, 3.0], 10.0);
-        let Err(FilippovError::Intersection { t, state }) = end else { panic!("{end:?}") };
+        let Err(FilippovError::Undecided { t, state, .. }) = end else { panic!("{end:?}") };
         assert!((t - 3.0).abs() < 1e-11 && state.iter().all(|v| v.abs() < 1e-11), "{t} {state:?}");
         assert!(
             seen.events.iter().any(|e| e.kind == EventKind::Landing { from: Side::Plus } && (e.t - 1.0).abs() < 1e-11)
@@ -369,20 +550,26 @@ mod tests {
         assert_eq!(seen.events[1].to, Some(Mode::Plus));
         // Below, x = 0 repels: a set of futures.
         let (end, _) = run([[-1.0, -1.0], [1.0, -1.0], [1.0, -2.0], [-1.0, -2.0]], [1.0, 3.0], 10.0);
-        assert!(matches!(end, Err(FilippovError::Intersection { .. })), "{end:?}");
+        let Err(FilippovError::Undecided { choice, .. }) = end else { panic!("{end:?}") };
+        assert!(choice.continuations.iter().any(|way| way.contains("repelling sliding on h = 0")), "{choice:?}");
     }
 
     #[test]
-    fn flying_and_starting_and_spiralling_into_the_intersection_are_refused() {
-        for (fields, x0, when) in [
-            (SQUARE.map(|_| [-1.0, -1.0]), [2.0, 2.0], 2.0),
-            (SQUARE, [0.0, 0.0], 0.0),
-            // A square that shrinks by half with each side: it comes to its middle in a finite time.
-            ([[-2.0, 1.0], [-1.0, -2.0], [1.0, 2.0], [2.0, -1.0]], [1.0, 0.0], 1.0),
-        ] {
-            let (end, _) = run(fields, x0, 100.0);
-            let Err(FilippovError::Intersection { t, .. }) = end else { panic!("{fields:?}: {end:?}") };
-            assert!((t - when).abs() < 1e-6, "{t} instead of {when}");
-        }
+    fn flying_into_the_intersection_goes_on_where_all_fields_cross() {
+        let (end, _) = run(SQUARE.map(|_| [-1.0, -1.0]), [2.0, 2.0], 5.0);
+        assert!((end.unwrap().x - vector![-3.0, -3.0]).amax() < 1e-10);
+    }
+
+    #[test]
+    fn turns_around_the_intersection_end_there_only_if_they_contract() {
+        let (end, _) = run(SQUARE, [0.0, 0.0], 100.0);
+        let Err(FilippovError::Undecided { t, choice, .. }) = end else { panic!("{end:?}") };
+        assert!(t == 0.0 && choice.continuations.len() > 1, "{choice:?}");
+        // Each side halves the distance: 1 + 1/2 + 1/4 + ... = 2 to the middle.
+        let (end, seen) = run([[-2.0, 1.0], [-1.0, -2.0], [1.0, 2.0], [2.0, -1.0]], [1.0, 0.0], 100.0);
+        let end = end.unwrap();
+        assert!(end.x.amax() < 1e-11 && end.mode == Some(Mode::SlidingAttracting), "{}", end.x);
+        let last = seen.events.last().unwrap();
+        assert!((last.t - 1.0).abs() < 1e-6, "{}", last.t);
     }
 }

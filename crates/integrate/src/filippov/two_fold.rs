@@ -217,6 +217,46 @@ impl<const N: usize> SlidingAtTwoFold<N> {
     }
 }
 
+/// Two folds in one place: both Lie derivatives vanish on the same part of the surface, not only at a point. Always so with two states.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct FusedFolds<const N: usize> {
+    /// L+²h and L-²h.
+    pub second: [f64; 2],
+    /// Sliding through the fold, if there is any: the limit of its velocity.
+    pub velocity: Option<SVector<f64, N>>,
+    /// Rate of change of L+h along it: positive from attracting to repelling sliding.
+    pub rate: f64,
+}
+
+impl<const N: usize> FusedFolds<N> {
+    /// The folds at `x`, where both Lie derivatives vanish; `None` if they vanish apart from each other elsewhere.
+    pub fn at<P: PiecewiseSmooth<N>>(system: &P, x: &SVector<f64, N>) -> Option<Self> {
+        let rows = fold_conditions(system, x);
+        let [normal, of_plus, of_minus] = [0, 1, 2].map(|i| SVector::<f64, N>::from(rows[i].partials));
+        let along = |g: SVector<f64, N>| g - normal * (g.dot(&normal) / normal.norm_squared());
+        let (a, b) = (along(of_plus), along(of_minus));
+        let (aa, ab, bb) = (a.norm_squared(), a.dot(&b), b.norm_squared());
+        // Where a gradient is normal to the surface the fold is not on it.
+        let across = aa > 1e-12 * of_plus.norm_squared() && bb > 1e-12 * of_minus.norm_squared();
+        if !(across && aa * bb - ab * ab <= 1e-12 * aa * bb) {
+            return None;
+        }
+        let (plus, minus) = (system.plus(x), system.minus(x));
+        let second = [of_plus.dot(&plus), of_minus.dot(&minus)];
+        // On the surface L-h = ratio L+h: of opposite signs, or there is no sliding.
+        let ratio = ab / aa;
+        let velocity = (ratio < 0.0).then(|| minus + (plus - minus) * (ratio / (ratio - 1.0)));
+        let rate = velocity.map_or(0.0, |v| of_plus.dot(&v));
+        let moves = rate.abs() > 1e-12 * of_plus.norm() * velocity.map_or(0.0, |v| v.norm());
+        Some(Self { second, velocity: velocity.filter(|_| moves), rate })
+    }
+
+    /// Whether a motion leaves them: sliding, or a flight on a visible side.
+    pub fn leave(&self) -> bool {
+        self.velocity.is_some() || self.second[0] > 0.0 || self.second[1] < 0.0
+    }
+}
+
 /// The series of the invariant curve along `direction`, order by order: (DF - k mu) W_k = -[F(W_0 + ... + W_(k-1))]_k.
 fn invariant_curve<P: PiecewiseSmooth<N>, const N: usize>(
     system: &P,
