@@ -142,12 +142,12 @@ fn the_page_says_what_the_census_says() {
 fn the_page_says_what_the_audit_says() {
     let [equal, whole] = figures::audit::candidates_in(&on_disk("figures/audit")).unwrap();
     let text = audit::text(&equal, &whole);
-    let page = fs::read_to_string(path("docs/census.md")).unwrap();
+    let page = fs::read_to_string(path("docs/parameters.md")).unwrap();
     let (_, rest) = page.split_once(audit::BEGIN).expect("the page has a place for the audit");
     let (said, _) = rest.split_once(audit::END).expect("its text about the audit ends");
     assert!(
         said.trim() == text.trim(),
-        "docs/census.md does not say what figures/audit says:\n{}\n\n{text}\n",
+        "docs/parameters.md does not say what figures/audit says:\n{}\n\n{text}\n",
         audit::BEGIN
     );
 }

@@ -37,6 +37,7 @@ mod odepack;
 mod properties;
 mod readme;
 mod records;
+mod reference;
 mod report;
 mod rigor_interval;
 mod rigor_law;

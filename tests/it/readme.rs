@@ -66,9 +66,10 @@ fn unwrapped(text: &str) -> Vec<String> {
 /// The prose of the pages of findings. Their generated tables are compared elsewhere.
 fn findings() -> String {
     let findings = without(&text("docs/findings.md"), verdict_table::BEGIN, verdict_table::END);
-    let odds = without(&text("docs/census.md"), census::BEGIN, census::END);
-    let odds = without(&odds, audit::BEGIN, audit::END);
-    unwrapped(&format!("{findings}\n\n{odds}")).join("\n")
+    let census = without(&text("docs/census.md"), census::BEGIN, census::END);
+    let parameters = without(&text("docs/parameters.md"), audit::BEGIN, audit::END);
+    unwrapped(&[findings, text("docs/theorems.md"), text("docs/differences.md"), census, parameters].join("\n\n"))
+        .join("\n")
 }
 
 #[test]

@@ -58,7 +58,14 @@ impl Bench {
         assemble(
             &visit_tree(&self.made(), &|_| true, &|path, place| MadeFile::read(path, place, &known)).unwrap().0,
             &read_tree(&self.expected(), &|_| true).unwrap().files,
-            &Program { figures: &known, findings: include_str!("../../docs/findings.md") },
+            &Program {
+                figures: &known,
+                findings: concat!(
+                    include_str!("../../docs/findings.md"),
+                    "\n\n",
+                    include_str!("../../docs/theorems.md")
+                ),
+            },
         )
     }
 

@@ -221,12 +221,12 @@ pub fn candidate_table(candidates: &[Candidate]) -> Table {
     table
 }
 
-/// Stands before the text about the parameter map in docs/census.md.
+/// Stands before the text about the parameter map in docs/parameters.md.
 pub const BEGIN: &str = "<!-- audit: what figures/audit says; tests/it/census.rs compares it; do not edit -->";
 /// Stands after it.
 pub const END: &str = "<!-- end of audit -->";
 
-/// The text about the candidates in docs/census.md: `equal` with as many runs of each panel for all of them, `whole` with all runs of the printed and the
+/// The text about the candidates in docs/parameters.md: `equal` with as many runs of each panel for all of them, `whole` with all runs of the printed and the
 /// reconstructed numbers.
 pub fn text(equal: &[Candidate], whole: &[Candidate]) -> String {
     use std::fmt::Write as _;

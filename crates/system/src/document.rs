@@ -104,9 +104,12 @@ pub struct ParameterEntry {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StateTable {
+    /// The state's name, as expressions use it.
     name: String,
+    /// What it is, in words; appears on the axes of pictures.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     meaning: String,
+    /// Its unit; appears on the axes of pictures.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     unit: String,
 }
@@ -114,13 +117,18 @@ struct StateTable {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ParameterTable {
+    /// The value: a number, or its decimal digits as a string.
     value: Decimal,
+    /// Values that are not above this bound are refused, also by `--set`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     above: Option<Decimal>,
+    /// Values that are not below this bound are refused.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     below: Option<Decimal>,
+    /// What it is, in words.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     meaning: String,
+    /// Its unit.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     unit: String,
 }
@@ -204,8 +212,11 @@ impl<'de> Deserialize<'de> for ParameterEntry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SecondEntry {
+    /// The second switching function.
     pub h: String,
+    /// The field where the first function is positive and the second negative.
     pub plus: Vec<String>,
+    /// The field where both are negative.
     pub minus: Vec<String>,
 }
 
@@ -213,26 +224,39 @@ pub struct SecondEntry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Document {
+    /// The name of the system: letters, digits, `-` and `_`.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub name: String,
+    /// One line for headings of pictures.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub title: String,
+    /// What the system describes, in sentences.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub about: String,
+    /// Where the system comes from, a string each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub references: Vec<String>,
+    /// One to sixteen states, in order: a name, or a table (below).
     pub states: Vec<StateEntry>,
+    /// Where runs begin unless `--start` says otherwise: a number for each state.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<Vec<Decimal>>,
+    /// The two or three states that pictures show: horizontal, (depth,) vertical.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub axes: Vec<String>,
+    /// The switching function: `plus` holds where h > 0, `minus` where h < 0.
     pub h: String,
+    /// The field where h > 0: an expression for the derivative of each state.
     pub plus: Vec<String>,
+    /// The field where h < 0, likewise.
     pub minus: Vec<String>,
+    /// A second switching surface, as a table (below).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub second: Option<SecondEntry>,
+    /// Parameters by name: a number, its digits as a string, or a table (below).
     #[serde(default)]
     pub parameters: Ordered<ParameterEntry>,
+    /// Expressions by name, in any order, for what is used more than once.
     #[serde(default, rename = "let")]
     pub terms: Ordered<String>,
 }

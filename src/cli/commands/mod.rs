@@ -55,6 +55,11 @@ enum Command {
     Man(manual::Man),
 }
 
+/// The definition of every command and flag, from which help, manual pages and docs/commands.md are made.
+pub fn definition() -> clap::Command {
+    Arguments::command()
+}
+
 /// The program `twofold`.
 pub fn main() -> ExitCode {
     interrupt::listen();

@@ -10,7 +10,8 @@ use crate::paper::{Figure, figures};
 use crate::record::{self, FileBytes, read_tree, visit_tree};
 use crate::report::{Links, MadeFile, Program, Report, archive, assemble, names, page};
 
-const FINDINGS: &str = include_str!("../../../docs/findings.md");
+const FINDINGS: &str =
+    concat!(include_str!("../../../docs/findings.md"), "\n\n", include_str!("../../../docs/theorems.md"));
 
 /// Write a self-contained page about the figures in a folder, and beside it report.json, verdicts.json and RO-Crate metadata.
 ///

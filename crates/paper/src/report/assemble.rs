@@ -83,7 +83,7 @@ impl MadeFile {
 pub struct Program<'a> {
     /// The figures that it knows.
     pub figures: &'a [Figure],
-    /// Its docs/findings.md, whose findings the page repeats.
+    /// Its pages of findings and theorems, which the report repeats.
     pub findings: &'a str,
 }
 

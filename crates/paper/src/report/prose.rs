@@ -1,5 +1,5 @@
 //! Findings in sentences: those of the folder as it is, from its verdicts, and those of the published
-//! figures, from the docs/findings.md that this program was built with, whose numbers are tested.
+//! figures, from the pages of findings and theorems that this program was built with, whose numbers are tested.
 
 use std::fmt::Write as _;
 
@@ -64,7 +64,7 @@ fn panel_name(picture: &str, reading: Option<Reading>, panel: &str) -> String {
     }
 }
 
-/// What docs/findings.md says: its paragraphs that begin with a finding in bold, and its theorems, as HTML blocks.
+/// What docs/findings.md and docs/theorems.md say: paragraphs that begin with a finding in bold, and the theorems, as HTML blocks.
 pub fn of_the_project(findings: &str) -> Vec<String> {
     let mut blocks = Vec::new();
     let mut heading = "";
@@ -140,7 +140,11 @@ mod tests {
 
     #[test]
     fn the_page_has_findings() {
-        let blocks = of_the_project(include_str!("../../../../docs/findings.md"));
+        let blocks = of_the_project(concat!(
+            include_str!("../../../../docs/findings.md"),
+            "\n\n",
+            include_str!("../../../../docs/theorems.md")
+        ));
         assert!(blocks.len() >= 6, "{blocks:#?}");
         assert!(blocks.iter().any(|b| b.contains("<strong>Each visit to the singularity costs digits.</strong>")));
         assert!(blocks.last().unwrap().contains("<li>"));
