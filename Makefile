@@ -167,7 +167,15 @@ fonts: ## crates/render/fonts/glyphs.bin from the fonts' files
 sbom: ## what the program links, with versions, licences and checksums (CycloneDX), into target/sbom (needs cargo-cyclonedx; scripts/sbom.sh)
 	@sh scripts/sbom.sh
 
-lint: ## formatting, clippy and documentation, warnings denied
+.PHONY: prose reference
+reference: ## write the generated pages of docs/ anew: flags, columns, keys, exit codes, messages
+	@TWOFOLD_UPDATE=1 $(CARGO) test --locked --quiet --test it reference::
+
+prose: ## spelling (typos; skipped without Python) and subjects of commits; the rules of pages are tests (tests/it/prose.rs)
+	@sh scripts/spelling.sh
+	@sh scripts/subjects.sh
+
+lint: prose ## formatting, clippy and documentation with warnings denied, spelling, subjects of commits
 	@git ls-files '*.rs' | xargs rustfmt --edition 2024 --check
 	@$(CARGO) clippy --workspace --exclude twofold-python --locked --all-targets -- -D warnings
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --exclude twofold-python --locked --no-deps --quiet

@@ -35,6 +35,7 @@ mod long_term;
 mod misprint;
 mod odepack;
 mod properties;
+mod prose;
 mod readme;
 mod records;
 mod reference;
