@@ -229,11 +229,11 @@ bench-cost: ## cost against end time, layer and tolerance: benches/cost.csv, cos
 
 bench: ## benchmarks, compared with the last kept ones (make bench-keep)
 	@if ls target/criterion/*/*/kept >/dev/null 2>&1; then flags="--baseline kept"; fi; \
-	$(CARGO) bench --locked --bench steppers -- $$flags && $(CARGO) bench --locked --bench render -- $$flags
+	$(CARGO) bench --locked -p twofold-benches --bench steppers -- $$flags && $(CARGO) bench --locked -p twofold-benches --bench render -- $$flags
 
 bench-keep: ## benchmarks, kept as what `make bench` compares with
-	@$(CARGO) bench --locked --bench steppers -- --save-baseline kept
-	@$(CARGO) bench --locked --bench render -- --save-baseline kept
+	@$(CARGO) bench --locked -p twofold-benches --bench steppers -- --save-baseline kept
+	@$(CARGO) bench --locked -p twofold-benches --bench render -- --save-baseline kept
 
 .PHONY: rehearse
 rehearse: ## a job of a workflow, its own lines, in a fresh clone: make rehearse JOB=ci.yml/package (needs Python with PyYAML; scripts/rehearse.py)

@@ -1,7 +1,7 @@
 //! What a unit of time costs: the caricature, smoothed and hysteretic, both readings, by each method, as the figures run
 //! it (tolerances 10^-7.97727, restart after each 100, step cap 10). Prints the counts of work first, then times.
 //!
-//! `cargo bench --bench steppers`; with `-- --counts` the counts only.
+//! `cargo bench -p twofold-benches --bench steppers`; with `-- --counts` the counts only.
 
 use std::hint::black_box;
 

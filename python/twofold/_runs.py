@@ -627,7 +627,7 @@ def solve(
         Longest step, in units of time [default a tenth of the time between restarts or kicks].
     max_steps : int
         Most steps before the run is given up [default 4e8].
-    precision : {106, 192, 256, 384, 512}
+    precision : {106, 192}
         Bits of taylor-extended's numbers [default 106, double-double].
     order : int
         Degree of taylor-extended's series, 4 to 1000 [default: what the tolerance asks for].

@@ -86,7 +86,7 @@ pub struct RunFlags {
     /// Most steps before the run is given up [default: 400000000].
     #[arg(long, allow_negative_numbers = true, help_heading = "Method")]
     pub max_steps: Option<u64>,
-    /// Bits of taylor-extended's numbers: 106, 192, 256, 384 or 512 [default: 106].
+    /// Bits of taylor-extended's numbers: 106 or 192 [default: 106].
     #[arg(long, value_name = "BITS", allow_negative_numbers = true, help_heading = "Method")]
     pub precision: Option<u16>,
     /// Degree of taylor-extended's series [default: what the tolerance asks for].
@@ -759,7 +759,7 @@ mod tests {
         ("--atol", &["2e-9"]),
         ("--max-step", &["0.1"]),
         ("--max-steps", &["1000"]),
-        ("--precision", &["256"]),
+        ("--precision", &["192"]),
         ("--order", &["40"]),
         ("--restart", &["2"]),
         ("--kick-every", &["0.7"]),

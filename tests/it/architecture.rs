@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Every crate below the command, with the crates that it may be built on and the libraries that only it may name.
-const CRATES: [(&str, &[&str], &[&str]); 10] = [
+const CRATES: [(&str, &[&str], &[&str]); 11] = [
     ("digest", &[], &["proc-macro2"]),
     // The only crate that names a math library or a random generator.
     ("num", &[], &["libm", "rand", "rand_chacha"]),
@@ -16,7 +16,8 @@ const CRATES: [(&str, &[&str], &[&str]); 10] = [
     ("integrate", &["num", "system"], &[]),
     ("rigor", &["num", "system", "integrate"], &[]),
     ("analyse", &["num", "system", "integrate", "rigor"], &[]),
-    ("job", &["num", "system", "integrate", "rigor", "analyse"], &["csv", "zmij"]),
+    ("instances", &["system", "integrate", "analyse"], &[]),
+    ("job", &["num", "system", "integrate", "rigor", "analyse", "instances"], &["csv", "zmij"]),
     ("render", &["num"], &["plotters", "plotters-backend", "tiny-skia", "pdf-writer", "png", "miniz_oxide"]),
     ("paper", &["num", "system", "integrate", "rigor", "analyse", "job", "render"], &["base64", "percent-encoding"]),
 ];

@@ -95,61 +95,21 @@ impl<const N: usize> Summary<N> {
     }
 }
 
-/// A part of a run, in segments of its schedule: it begins where segment `from` does, counted from 0, and ends where segment `to` would begin.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Part {
-    /// Segments before it.
-    pub from: u64,
-    /// Segments up to its end.
-    pub to: u64,
-}
-
-impl Part {
-    /// All of a run.
-    pub const WHOLE: Part = Part { from: 0, to: u64::MAX };
-}
-
 /// Runs `stepper` from (0, x0) over `course`.
 ///
 /// # Errors
 /// What the method could not do. Running out of steps is no error but a [`StopReason`]: what was observed until then stands.
-pub fn drive<const N: usize, F, M, O>(
+pub fn drive<const N: usize, F, M>(
     field: &F,
     x0: SVector<f64, N>,
     course: &Course,
     stepper: &mut M,
-    observer: &mut O,
+    observer: &mut dyn Observer<N>,
     watch: &dyn Watch,
 ) -> Result<Summary<N>, Failure>
 where
     F: VectorField<N>,
     M: Stepper<N>,
-    O: Observer<N>,
-{
-    drive_part(field, x0, course, Part::WHOLE, stepper, observer, watch)
-}
-
-/// Runs `stepper` over a part of `course`, from the state `x0` at that part's beginning (behind the kick, if one stands there).
-///
-/// At a restart or kick the state is the whole state of a run: the method forgets everything, and of a kicked run's generator it is known how
-/// often it was asked. So the parts of a run, each computed from the state in which the one before ended, are the run, bit for bit. Only
-/// `max_steps` is counted for each part anew.
-///
-/// # Errors
-/// As [`drive`].
-pub fn drive_part<const N: usize, F, M, O>(
-    field: &F,
-    x0: SVector<f64, N>,
-    course: &Course,
-    part: Part,
-    stepper: &mut M,
-    observer: &mut O,
-    watch: &dyn Watch,
-) -> Result<Summary<N>, Failure>
-where
-    F: VectorField<N>,
-    M: Stepper<N>,
-    O: Observer<N>,
 {
     let Course { t_end, ref schedule, step_cap, max_steps, kicked_states } = *course;
     let mut kicker = schedule.kick.map(|kick| Kicker::new(kick, kicked_states));
@@ -157,15 +117,7 @@ where
     let mut begun = false;
     let mut most_steps_in_segment = 0;
     let mut stop = StopReason::EndTime;
-    let count = |segments: u64| usize::try_from(segments).unwrap_or(usize::MAX);
-    let mut segments = schedule.segments(0.0, t_end);
-    for before in segments.by_ref().take(count(part.from)) {
-        t = before.end;
-        if let (true, Some(kicker)) = (before.kick, kicker.as_mut()) {
-            kicker.draw();
-        }
-    }
-    'run: for segment in segments.take(count(part.to.saturating_sub(part.from))) {
+    'run: for segment in schedule.segments(0.0, t_end) {
         let steps_before = stepper.statistics().steps;
         let longest = step_cap.for_segment(segment.end - t);
         if !std::mem::replace(&mut begun, true) {
@@ -241,34 +193,9 @@ mod tests {
         }
     }
 
-    fn run(course: Course, observer: &mut impl Observer<2>, watch: &dyn Watch) -> Summary<2> {
+    fn run(course: Course, observer: &mut dyn Observer<2>, watch: &dyn Watch) -> Summary<2> {
         let mut stepper = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
         drive(&Turning, vector![1.0, 0.0], &course, &mut stepper, observer, watch).unwrap()
-    }
-
-    #[test]
-    fn parts_are_the_whole() {
-        let schedule = Schedule {
-            restart_every: Some(0.7),
-            kick: Some(Kick { every: 0.3, size: 1e-2, law: KickLaw::Normal, seed: 3, stream: 1 }),
-        };
-        let course = Course { schedule, kicked_states: 2, ..Course::to(10.0) };
-        let whole = run(course, &mut Ignore, &());
-        let count = schedule.count(10.0);
-        assert_eq!(count, 33 + 14 - 4 + 1, "kicks, restarts without the shared moments, and the end");
-        for cuts in [vec![0, count], vec![0, 1, 2, 7, 8, count], (0..=count).collect()] {
-            let (mut x, mut t, mut steps) = (vector![1.0, 0.0], 0.0, 0);
-            for cut in cuts.windows(2) {
-                let mut stepper = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
-                let part = Part { from: cut[0], to: cut[1] };
-                let end = drive_part(&Turning, x, &course, part, &mut stepper, &mut Ignore, &()).unwrap();
-                assert!(end.t > t);
-                (x, t) = (end.x, end.t);
-                steps += end.statistics.steps;
-            }
-            assert_eq!((x.map(f64::to_bits), t), (whole.x.map(f64::to_bits), whole.t));
-            assert_eq!(steps, whole.statistics.steps);
-        }
     }
 
     #[test]

@@ -196,19 +196,28 @@ pub fn ensemble_watched<E, O, const N: usize>(
     O: Observer<N>,
 {
     let all = All::<_, _, _, N, 1> { equations, runs, common, observer, finished };
-    match if set.is_here() { set } else { InstructionSet::best() } {
-        #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx2 => match pulp::x86::V3::try_new() {
-            Some(set) => all.side_by_side(set),
-            None => all.with_simd(Scalar),
-        },
-        #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx512 => match pulp::x86::V4::try_new() {
-            Some(set) => all.side_by_side(set),
-            None => all.with_simd(Scalar),
-        },
-        _ => all.with_simd(Scalar),
+    if let Some(all) = all.in_vectors(set) {
+        all.with_simd(Scalar);
     }
+}
+
+/// [`ensemble_watched`] by vector instructions only: says `false`, and has computed nothing, on a machine that has none.
+///
+/// # Panics
+/// As there.
+pub fn ensemble_in_vectors<E, O, const N: usize>(
+    set: InstructionSet,
+    equations: &E,
+    runs: &[Run<N>],
+    common: Common<'_, N>,
+    observer: impl Fn(usize) -> O,
+    finished: &mut dyn FnMut(usize, End<O, N>),
+) -> bool
+where
+    E: Equations<N>,
+    O: Observer<N>,
+{
+    All::<_, _, _, N, 1> { equations, runs, common, observer, finished }.in_vectors(set).is_none()
 }
 
 /// The whole task, for `K` registers.
@@ -220,14 +229,28 @@ struct All<'a, E, O, M: Fn(usize) -> O, const N: usize, const K: usize> {
     finished: &'a mut dyn FnMut(usize, End<O, N>),
 }
 
-// No other processor has wider registers here.
+impl<'a, E: Equations<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> All<'a, E, O, M, N, 1> {
+    /// Computes all by these vector instructions, or by this machine's best; gives itself back if there are none.
+    fn in_vectors(self, set: InstructionSet) -> Option<Self> {
+        match if set.is_here() { set } else { InstructionSet::best() } {
+            // No other processor has wider registers here.
+            #[cfg(target_arch = "x86_64")]
+            InstructionSet::Avx2 if let Some(set) = pulp::x86::V3::try_new() => self.side_by_side(set),
+            #[cfg(target_arch = "x86_64")]
+            InstructionSet::Avx512 if let Some(set) = pulp::x86::V4::try_new() => self.side_by_side(set),
+            _ => return Some(self),
+        }
+        None
+    }
+}
+
 #[cfg(target_arch = "x86_64")]
 impl<'a, E: Equations<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> All<'a, E, O, M, N, 1> {
     /// By as many registers at a time as suit the number of runs: while one waits for a quotient the others go on, and of four none waits long,
     /// but they take 1.6 times as long as two for a step. That pays where runs fill their lanes at least twice, and states
     /// are few: six are no faster with four.
     fn side_by_side<S: Simd>(self, set: S) {
-        if N <= 4 && self.runs.len() >= 2 * 4 * S::F64_LANES {
+        if const { N <= 4 } && self.runs.len() >= 2 * 4 * S::F64_LANES {
             set.vectorize(self.in_registers::<4>());
         } else {
             set.vectorize(self.in_registers::<2>());

@@ -46,7 +46,7 @@ pub mod taylor;
 mod tests;
 
 pub use dopri5::Dopri5;
-pub use driver::{Course, Ignore, Observer, Part, Summary, Watch, drive, drive_part};
+pub use driver::{Course, Ignore, Observer, Summary, Watch, drive};
 pub use guard::Guarded;
 pub use layered::Layered;
 pub use lsoda::Lsoda;

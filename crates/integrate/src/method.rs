@@ -8,7 +8,7 @@ use super::{Dopri5, Guarded, Layered, Lsoda, Radau5, Taylor};
 use twofold_num::MultiFloat;
 
 /// How many bits a number of [`Method::TaylorExtended`] can have: double-double numbers, then those of [`MultiFloat`].
-pub const PRECISIONS: [u16; 5] = [106, 192, 256, 384, 512];
+pub const PRECISIONS: [u16; 2] = [106, 192];
 
 /// An integration method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -84,10 +84,7 @@ pub fn with_extended<U: WithStepper<N>, const N: usize>(
     }
     match bits {
         0..=106 => user.with(of_order(Taylor::extended(tolerance), order)),
-        107..=192 => user.with(of_order(Taylor::<N, MultiFloat<3>>::multi(tolerance), order)),
-        193..=256 => user.with(of_order(Taylor::<N, MultiFloat<4>>::multi(tolerance), order)),
-        257..=384 => user.with(of_order(Taylor::<N, MultiFloat<6>>::multi(tolerance), order)),
-        _ => user.with(of_order(Taylor::<N, MultiFloat<8>>::multi(tolerance), order)),
+        _ => user.with(of_order(Taylor::<N, MultiFloat<3>>::multi(tolerance), order)),
     }
 }
 
@@ -156,7 +153,7 @@ mod tests {
         };
         assert_eq!(PRECISIONS.map(number), PRECISIONS);
         // The next that there is, at most the last.
-        assert_eq!([1, 105, 107, 193, 257, 385, 5000].map(number), [106, 106, 192, 256, 384, 512, 512]);
+        assert_eq!([1, 105, 107, 193, 5000].map(number), [106, 106, 192, 192, 192]);
         for bits in PRECISIONS {
             assert_eq!(with_extended(bits, Some(17), tolerance, ToItsName).1, 17);
             assert_eq!(with_extended(bits, None, tolerance, ToItsName).1, 36);

@@ -7,9 +7,10 @@ use super::answer::{Answer, Stop};
 use super::desk::Desk;
 use super::question::{JobError, Question};
 use super::table::{Column, Entry, Table};
-use twofold_analyse::digits::{DigitsQuestion, digits};
+use twofold_analyse::digits::DigitsQuestion;
+use twofold_instances as instances;
 use twofold_integrate::Watch;
-use twofold_system::{Compiled, Field, Smoothed, System, Transition};
+use twofold_system::{System, Transition};
 
 /// How many digits of each passage through a plane methods get right, beside an orbit in double-double arithmetic, with tanh smoothing. Tables:
 /// `agreement`, a row per method and passage, and `visits`, the reference orbit's passages near the origin.
@@ -41,11 +42,7 @@ impl Question for MethodDigits {
     }
 
     fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
-        let (transition, eps) = (Transition::Tanh, self.eps);
-        let found = match self.system.compiled() {
-            Some(Compiled::Caricature(system)) => digits(&Smoothed { system, transition, eps }, &self.compared),
-            _ => digits(&Field::smoothed(&self.system, transition, eps).bind::<3>()?, &self.compared),
-        }?;
+        let found = instances::smoothed(&self.system, Transition::Tanh, self.eps)?.digits(&self.compared)?;
         let columns = [Column::words("method"), Column::numbers("tolerance"), Column::integers("crossing")];
         let mut rows =
             Table::new("agreement", columns.into_iter().chain(["t", "error", "digits"].map(Column::numbers)));

@@ -10,6 +10,7 @@ use super::question::{JobError, Question};
 use super::spec::SwitchSpec;
 use twofold_analyse::lyapunov::{self, Estimate, Exponent};
 use twofold_analyse::tangent::Tangent;
+use twofold_instances::{Exponents, Growth};
 use twofold_integrate::Watch;
 use twofold_integrate::ensemble::InstructionSet;
 use twofold_num::tape::Program;
@@ -64,12 +65,15 @@ impl LargestExponent {
         questions: &[&Self],
         set: InstructionSet,
         watch: &dyn Watch,
-    ) -> Result<Option<Vec<Option<Exponent>>>, JobError> {
+    ) -> Result<Option<Vec<Option<Exponent>>>, JobError>
+    where
+        Alike<M>: Exponents<N>,
+    {
         let fields: Option<Vec<BoundField<M>>> = questions.iter().map(|q| q.tangent()?.bind().ok()).collect();
         let Some(tangents) = fields.and_then(Alike::new) else { return Ok(None) };
         let starts: Vec<_> = questions.iter().map(|q| SVector::<f64, N>::from_column_slice(&q.start)).collect();
         let settings = &questions[0].settings;
-        match lyapunov::largest_side_by_side::<N, M, _>(set, &tangents, &starts, settings, watch) {
+        match tangents.exponents(set, &starts, settings, watch) {
             Some(found) => Ok(Some(found.into_iter().map(Result::ok).collect())),
             None => Err(JobError::Interrupted),
         }
@@ -99,15 +103,13 @@ impl LargestExponent {
                 let field = Smoothed { system, transition, eps };
                 let x = SVector::from_fn(|i, _| start(i));
                 let tangent = Tangent::<_, 1>(&field);
-                return lyapunov::estimate_along::<3, 6, _>(&tangent, x, 3, &self.settings, watch)
-                    .map_err(|e| e.to_string());
+                return tangent.growth(x, 3, &self.settings, watch).map_err(|e| e.to_string());
             }
             (SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. }, Some(Compiled::Caricature(system))) => {
                 let field = Hysteretic { system, eps, eps_prime, relaxation };
                 let x = SVector::from_fn(|i, _| if i < 3 { start(i) } else { self.phi() });
                 let tangent = Tangent::<_, 1>(&field);
-                return lyapunov::estimate_along::<4, 8, _>(&tangent, x, 3, &self.settings, watch)
-                    .map_err(|e| e.to_string());
+                return tangent.growth(x, 3, &self.settings, watch).map_err(|e| e.to_string());
             }
             (SwitchSpec::Smoothed { eps, transition }, _) => Field::smoothed(&self.system, transition, eps),
             (SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. }, _) => {
@@ -131,11 +133,13 @@ impl LargestExponent {
     }
 
     /// By the recorded equation and its variational equation.
-    fn along<const N: usize, const M: usize>(&self, tangent: &Field, watch: &dyn Watch) -> Result<Estimate, String> {
+    fn along<const N: usize, const M: usize>(&self, tangent: &Field, watch: &dyn Watch) -> Result<Estimate, String>
+    where
+        BoundField<M>: Growth<N>,
+    {
         let tangent = tangent.bind::<M>().map_err(|e| e.to_string())?;
         let x = SVector::<f64, N>::from_fn(|i, _| self.start.get(i).copied().unwrap_or_else(|| self.phi()));
-        lyapunov::estimate_along::<N, M, _>(&tangent, x, self.start.len(), &self.settings, watch)
-            .map_err(|e| e.to_string())
+        tangent.growth(x, self.start.len(), &self.settings, watch).map_err(|e| e.to_string())
     }
 
     /// phi at the start: within its relaxation time of the side that h says.

@@ -167,12 +167,9 @@ mod tests {
     /// The next precision; of the highest the one below.
     #[test]
     fn every_precision_has_another_to_compare_with() {
-        for (precision, rtol, bits, other) in [
-            (None, 1e-20, 106, 192),
-            (Some(106), 1e-20, 106, 192),
-            (Some(384), 1e-20, 384, 512),
-            (Some(512), 1e-20, 512, 384),
-        ] {
+        for (precision, rtol, bits, other) in
+            [(None, 1e-20, 106, 192), (Some(106), 1e-20, 106, 192), (Some(192), 1e-20, 192, 106)]
+        {
             let answer = decay(precision, Some(30), rtol).compute(&Desk::quiet(), &()).unwrap();
             let fact = |name: &str| answer.fact::<u16>(name).unwrap();
             assert_eq!([fact("precision"), fact("other_precision"), fact("order")], [bits, other, 30]);

@@ -61,7 +61,6 @@ mod shortest;
 pub mod simulate;
 pub mod spec;
 pub mod store;
-pub mod stretch;
 pub mod sweep;
 pub mod table;
 

@@ -11,11 +11,12 @@ use super::passage::TwoFoldPassage;
 use super::question::{AnyQuestion, JobError, Question};
 use super::recording::side_word;
 use super::table::{Column, Entry, Table};
-use twofold_analyse::limit::{AfterVisitQuestion, ConvergenceQuestion, after_visit, convergence};
+use twofold_analyse::limit::{AfterVisitQuestion, ConvergenceQuestion};
 use twofold_analyse::passage::PassageQuestion;
+use twofold_instances as instances;
 use twofold_integrate::Watch;
 use twofold_integrate::filippov::Mode;
-use twofold_system::{Compiled, System, Transition};
+use twofold_system::{System, Transition};
 
 /// Distance of smoothed orbits from the Filippov orbit before its first visit to a two-fold. Table `before`: a row per eps and time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -44,10 +45,7 @@ impl Question for SmoothingLimit {
     }
 
     fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
-        let found = match self.system.compiled() {
-            Some(Compiled::Caricature(system)) => convergence(&system, &self.compared),
-            _ => convergence(&self.system.bind::<3>()?, &self.compared),
-        }?;
+        let found = instances::sliding(&self.system)?.convergence(&self.compared)?;
         let columns =
             [Column::numbers("eps"), Column::numbers("t"), Column::words("mode"), Column::numbers("distance")];
         let mut table = Table::new("before", columns);
@@ -125,11 +123,8 @@ impl Question for AfterVisit {
 
     fn compute(&self, desk: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
         let crossings = self.smoothed(desk)?;
-        let crossing = |eps: f64| Ok(crossings.iter().find(|c| c.0 == eps).and_then(|c| c.1.clone()));
-        let found = match self.system.compiled() {
-            Some(Compiled::Caricature(system)) => after_visit(&system, &self.compared, crossing),
-            _ => after_visit(&self.system.bind::<3>()?, &self.compared, crossing),
-        }?;
+        let mut crossing = |eps: f64| Ok(crossings.iter().find(|c| c.0 == eps).and_then(|c| c.1.clone()));
+        let found = instances::sliding(&self.system)?.after_visit(&self.compared, &mut crossing)?;
         let kinds = |name: &str| if name.ends_with("side") { Column::words(name) } else { Column::numbers(name) };
         let names = self.system.coordinates();
         let (b, c) = (names[1], names[2]);

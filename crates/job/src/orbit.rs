@@ -16,11 +16,11 @@ use super::table::{Column, Entry, Table};
 use twofold_analyse::branch::{self, Course, End, Newton, Obstacle, Orbit, ReturnMap, Trouble};
 use twofold_analyse::filippov_return;
 use twofold_analyse::floquet::{self, Plane, Returned};
-use twofold_integrate::filippov::SlidingFlow;
+use twofold_instances::{Motions, Returns};
 use twofold_integrate::{Failure, Schedule, Tolerance, Watch};
 use twofold_num::elementary::sqrt;
 use twofold_num::tape::Program;
-use twofold_system::{Bound, Field, System, VectorField};
+use twofold_system::{Bound, BoundField, Field, System};
 
 /// The closed orbit through a plane near a start, by Newton's method, and its branch along a parameter if one is named.
 ///
@@ -394,10 +394,13 @@ impl Map<'_> {
         field: &Field,
         u: &[f64],
         settings: &floquet::Settings,
-    ) -> Result<Returned, Failed> {
+    ) -> Result<Returned, Failed>
+    where
+        BoundField<M>: Returns<N>,
+    {
         let tangent = field.variational(N).bind::<M>().map_err(JobError::from)?;
         let start = SVector::<f64, N>::from_column_slice(u);
-        let found = floquet::return_map::<N, M, _>(&tangent, self.question.plane, self.returns, &start, settings);
+        let found = tangent.return_map(self.question.plane, self.returns, &start, settings);
         found.map_err(|error| {
             let (obstacle, said) = match error {
                 floquet::Error::Integration(failure) => (Obstacle::Other, without_tangents(failure, N).to_string()),
@@ -410,7 +413,7 @@ impl Map<'_> {
     }
 
     /// Of the discontinuous system.
-    fn discontinuous<const N: usize, const M: usize>(
+    fn discontinuous<const N: usize>(
         &self,
         system: &System,
         u: &[f64],
@@ -418,12 +421,11 @@ impl Map<'_> {
         derivative: bool,
     ) -> Result<Returned, Failed>
     where
-        for<'b> SlidingFlow<'b, Bound<N>, N>: VectorField<M>,
+        Bound<N>: Motions<N>,
     {
         let start = SVector::<f64, N>::from_column_slice(u);
         let system = system.bind::<N>().map_err(JobError::from)?;
-        let found =
-            filippov_return::return_map(&system, self.question.plane, self.returns, &start, settings, derivative);
+        let found = system.return_map(self.question.plane, self.returns, &start, settings, derivative);
         found.map_err(|error| {
             let obstacle = match error {
                 filippov_return::Error::Grazing { .. } => Obstacle::Grazing,
@@ -445,13 +447,13 @@ impl Map<'_> {
         let field = match switch {
             SwitchSpec::Filippov { .. } => {
                 return match u.len() {
-                    2 => self.discontinuous::<2, 3>(&system, u, settings, derivative),
-                    3 => self.discontinuous::<3, 4>(&system, u, settings, derivative),
-                    4 => self.discontinuous::<4, 5>(&system, u, settings, derivative),
-                    5 => self.discontinuous::<5, 6>(&system, u, settings, derivative),
-                    6 => self.discontinuous::<6, 7>(&system, u, settings, derivative),
-                    7 => self.discontinuous::<7, 8>(&system, u, settings, derivative),
-                    8 => self.discontinuous::<8, 9>(&system, u, settings, derivative),
+                    2 => self.discontinuous::<2>(&system, u, settings, derivative),
+                    3 => self.discontinuous::<3>(&system, u, settings, derivative),
+                    4 => self.discontinuous::<4>(&system, u, settings, derivative),
+                    5 => self.discontinuous::<5>(&system, u, settings, derivative),
+                    6 => self.discontinuous::<6>(&system, u, settings, derivative),
+                    7 => self.discontinuous::<7>(&system, u, settings, derivative),
+                    8 => self.discontinuous::<8>(&system, u, settings, derivative),
                     n => Err(JobError::Other(format!("no closed orbits with {n} states")).into()),
                 };
             }

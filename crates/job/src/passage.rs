@@ -9,9 +9,10 @@ use super::desk::Desk;
 use super::question::{JobError, Question};
 use super::spec::{SpecError, SwitchSpec};
 use super::table::{Column, Entry, Table};
-use twofold_analyse::passage::{self, Passage, PassageQuestion, passage};
-use twofold_integrate::{Course, Dopri5, Schedule, Statistics, StepCap, Tolerance, Watch, drive};
-use twofold_system::{Compiled, Field, Hysteretic, Smoothed, System, Transition, VectorField};
+use twofold_analyse::passage::{self, Passage, PassageQuestion};
+use twofold_instances::{self as instances, How, Orbits};
+use twofold_integrate::{Course, Method, Schedule, Statistics, StepCap, Tolerance, Watch};
+use twofold_system::{System, Transition};
 
 /// How the smoothed orbit passes the two-fold at the origin. Table `passage`: one row with the visit's time and the places of leaving (`left_`), of the first
 /// passage through x = 0 (`surface_`), of the exit on y = 0 (`exit_`) and of the far exit (`far_`); blank what did not happen. Table `growth`: a row
@@ -49,11 +50,8 @@ impl Question for TwoFoldPassage {
     }
 
     fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
-        let (transition, eps) = (self.transition, self.eps);
-        let found = match self.system.compiled() {
-            Some(Compiled::Caricature(system)) => passage(&Smoothed { system, transition, eps }, eps, &self.followed),
-            _ => passage(&Field::smoothed(&self.system, transition, eps).bind::<3>()?, eps, &self.followed),
-        }?;
+        let field = instances::smoothed(&self.system, self.transition, self.eps)?;
+        let found = field.passage(self.eps, &self.followed)?;
         Ok(Answer {
             statistics: Some(found.statistics.clone()),
             stop: Stop::Finished,
@@ -125,9 +123,9 @@ impl Leaving {
         }
     }
 
-    fn each<const N: usize, F: VectorField<N>>(
+    fn each<const N: usize>(
         &self,
-        field: &F,
+        field: &(impl Orbits<N> + ?Sized),
         eps: f64,
         start: impl Fn([f64; 3]) -> SVector<f64, N>,
     ) -> Result<Answer, JobError> {
@@ -136,14 +134,15 @@ impl Leaving {
         let mut work = Statistics::default();
         for (at, schedule) in &self.runs {
             let mut leaving = passage::Leaving::new(eps);
-            let mut method = Dopri5::<N>::new(Tolerance { rtol: self.tolerance, atol: self.tolerance });
             let course = Course {
                 schedule: *schedule,
                 step_cap: StepCap::Absolute(self.longest_step * eps),
                 max_steps: 100_000_000,
                 ..Course::to(self.by)
             };
-            let end = drive(field, start(*at), &course, &mut method, &mut leaving, &())?.within_budget()?;
+            let tolerance = Tolerance { rtol: self.tolerance, atol: self.tolerance };
+            let how = How { method: Method::Dopri5, tolerance, precision: None, order: None, course };
+            let end = field.orbit(start(*at), &how, &mut leaving, &())?.within_budget()?;
             work += &end.statistics;
             let mut row: Vec<Entry> = vec![eps.into()];
             row.extend(cells(leaving.place()));
@@ -172,26 +171,15 @@ impl Question for Leaving {
 
     fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
         let eps = self.eps()?;
-        let compiled = match self.system.compiled() {
-            Some(Compiled::Caricature(system)) => Some(system),
-            _ => None,
-        };
-        match (self.switch, compiled) {
-            (SwitchSpec::Smoothed { transition, .. }, Some(system)) => {
-                self.each(&Smoothed { system, transition, eps }, eps, SVector::from)
+        match self.switch {
+            SwitchSpec::Smoothed { transition, .. } => {
+                self.each(&*instances::smoothed(&self.system, transition, eps)?, eps, SVector::from)
             }
-            (SwitchSpec::Hysteretic { eps_prime, relaxation, phi0, .. }, Some(system)) => {
-                let field = Hysteretic { system, eps, eps_prime, relaxation };
-                self.each(&field, eps, |[x, y, z]| vector![x, y, z, phi0])
+            SwitchSpec::Hysteretic { eps_prime, relaxation, phi0, .. } => {
+                let field = instances::hysteretic(&self.system, eps, eps_prime, relaxation)?;
+                self.each(&*field, eps, |[x, y, z]| vector![x, y, z, phi0])
             }
-            (SwitchSpec::Smoothed { transition, .. }, None) => {
-                self.each(&Field::smoothed(&self.system, transition, eps).bind::<3>()?, eps, SVector::from)
-            }
-            (SwitchSpec::Hysteretic { eps_prime, relaxation, phi0, .. }, None) => {
-                let field = Field::hysteretic(&self.system, eps, eps_prime, relaxation).bind::<4>()?;
-                self.each(&field, eps, |[x, y, z]| vector![x, y, z, phi0])
-            }
-            (SwitchSpec::Filippov { .. }, _) => unreachable!("refused above"),
+            SwitchSpec::Filippov { .. } => unreachable!("refused above"),
         }
     }
 }

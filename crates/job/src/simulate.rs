@@ -11,14 +11,12 @@ use super::spec::{FunnelSpec, MethodSpec, Observation, RunSpec, SpecError, Switc
 use super::table::Table;
 use twofold_analyse::path::MOST_POINTS;
 use twofold_analyse::{Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder, TimedMotion, TimesRecorder};
+use twofold_instances::{self as instances, How, Motions, Orbits, TwoSurfaces};
 use twofold_integrate::filippov::{
-    self, AllModes, ExitRule, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent, SlidingFlow,
+    self, AllModes, ExitRule, Faces, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent,
 };
-use twofold_integrate::{
-    Course, Flow, Observer, PRECISIONS, Part, Statistics, Step, Stepper, StopReason, Summary, Watch, WithStepper,
-    drive_part, with_extended,
-};
-use twofold_system::{Bound, Compiled, Field, Hysteretic, PiecewiseSmooth, Smoothed, VectorField};
+use twofold_integrate::{Course, Flow, Observer, Statistics, Step, StopReason, Summary, Watch};
+use twofold_system::{Bound, BoundField, Field};
 
 /// Computes a run of a system with three states.
 ///
@@ -81,44 +79,6 @@ pub fn answer(spec: &RunSpec, watch: &dyn Watch) -> Result<Answer, JobError> {
 
 const UP_TO_EIGHT: &str = "runs are computed with up to eight states";
 
-/// Computes a part of a smoothed or hysteretic run whose section is recorded, from the equation's state at that part's beginning (which `spec`'s
-/// start and phi are): the rows, the time at its end, and the equation's state there.
-///
-/// # Errors
-///
-/// As [`answer`].
-pub(super) fn part(spec: &RunSpec, part: Part, watch: &dyn Watch) -> Result<(Table, f64, Vec<f64>), JobError> {
-    spec.validate()?;
-    match spec.system.dimension() {
-        1 => one_part(spec, part, |aside| record::<1, 2>(spec, aside, watch)),
-        2 => one_part(spec, part, |aside| record::<2, 3>(spec, aside, watch)),
-        3 => one_part(spec, part, |aside| three_states(spec, aside, watch)),
-        4 => one_part(spec, part, |aside| record::<4, 5>(spec, aside, watch)),
-        5 => one_part(spec, part, |aside| record::<5, 6>(spec, aside, watch)),
-        6 => one_part(spec, part, |aside| record::<6, 7>(spec, aside, watch)),
-        7 => one_part(spec, part, |aside| record::<7, 8>(spec, aside, watch)),
-        8 => one_part(spec, part, |aside| record::<8, 9>(spec, aside, watch)),
-        _ => Err(too_many_states(spec, UP_TO_EIGHT)),
-    }
-}
-
-fn one_part<const D: usize>(
-    spec: &RunSpec,
-    part: Part,
-    run: impl FnOnce(&mut Aside<'_, D>) -> Result<Recording<D>, JobError>,
-) -> Result<(Table, f64, Vec<f64>), JobError> {
-    let mut aside = Aside { part, ..Aside::default() };
-    let recording = run(&mut aside)?;
-    match recording.stop {
-        StopReason::EndTime => {}
-        StopReason::Watch => return Err(JobError::Interrupted),
-        _ => return Err(full(recording.t)),
-    }
-    let rows =
-        Recording::part(spec, &recording.data, 0).ok_or_else(|| JobError::Other("a funnel has no parts".into()))?;
-    Ok((rows, recording.t, aside.end))
-}
-
 /// How a streamed run ended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Streamed {
@@ -165,10 +125,6 @@ struct Aside<'a, const D: usize> {
     sink: Option<Sink<'a, D>>,
     /// Ends a smoothed or hysteretic run.
     until: Option<Until<'a>>,
-    /// Which part of a smoothed or hysteretic run is computed.
-    part: Part,
-    /// The equation's whole state at its end.
-    end: Vec<f64>,
 }
 
 impl<const D: usize> Aside<'_, D> {
@@ -180,7 +136,7 @@ impl<const D: usize> Aside<'_, D> {
 
 impl<const D: usize> Default for Aside<'_, D> {
     fn default() -> Self {
-        Self { sink: None, until: None, part: Part::WHOLE, end: Vec::new() }
+        Self { sink: None, until: None }
     }
 }
 
@@ -352,24 +308,21 @@ fn too_many_states(spec: &RunSpec, rule: &'static str) -> JobError {
     SpecError { field: "system", value: format!("one of {} states", spec.system.dimension()), rule }.into()
 }
 
-/// Three states: by the compiled equations where there are some, which give the same bits as the recorded ones and give them sooner.
+/// Three states: by the paper's own equations where they are the system's, which give the same bits sooner.
 fn three_states(spec: &RunSpec, aside: &mut Aside<'_, 3>, watch: &dyn Watch) -> Result<Recording, JobError> {
     let x0 = start::<3>(spec);
-    match (spec.system.compiled(), spec.switch) {
-        (Some(Compiled::Caricature(system)), SwitchSpec::Smoothed { eps, transition }) => {
-            observe(spec, &Smoothed { system, transition, eps }, x0, aside, watch)
+    match spec.switch {
+        SwitchSpec::Smoothed { eps, transition } => {
+            observe(spec, &*instances::smoothed(&spec.system, transition, eps)?, x0, aside, watch)
         }
-        (Some(Compiled::Caricature(system)), SwitchSpec::Hysteretic { eps, eps_prime, relaxation, phi0 }) => {
-            let field = Hysteretic { system, eps, eps_prime, relaxation };
-            observe(spec, &field, vector![x0[0], x0[1], x0[2], phi0], aside, watch)
+        SwitchSpec::Hysteretic { eps, eps_prime, relaxation, phi0 } => {
+            let field = instances::hysteretic(&spec.system, eps, eps_prime, relaxation)?;
+            observe(spec, &*field, vector![x0[0], x0[1], x0[2], phi0], aside, watch)
         }
-        (Some(Compiled::Caricature(system)), SwitchSpec::Filippov { exit, funnel }) => {
-            discontinuous(spec, &system, x0, exit, funnel, aside, watch)
+        SwitchSpec::Filippov { exit, funnel } if spec.system.faces().is_none() => {
+            discontinuous(spec, &*instances::sliding(&spec.system)?, x0, exit, funnel, aside, watch)
         }
-        (Some(Compiled::Wheel(system)), SwitchSpec::Smoothed { eps, transition }) => {
-            observe(spec, &Smoothed { system, transition, eps }, x0, aside, watch)
-        }
-        _ => record::<3, 4>(spec, aside, watch),
+        SwitchSpec::Filippov { .. } => record::<3, 4>(spec, aside, watch),
     }
 }
 
@@ -380,25 +333,28 @@ fn record<const D: usize, const M: usize>(
     watch: &dyn Watch,
 ) -> Result<Recording<D>, JobError>
 where
-    for<'a> SlidingFlow<'a, Bound<D>, D>: VectorField<M>,
+    BoundField<D>: Orbits<D>,
+    BoundField<M>: Orbits<M>,
+    Bound<D>: Motions<D>,
+    Faces<Bound<D>>: TwoSurfaces<D>,
 {
     let x0 = start::<D>(spec);
     match spec.switch {
         SwitchSpec::Smoothed { eps, transition } => {
             let field = Field::smoothed(&spec.system, transition, eps).bind::<D>()?;
-            observe(spec, &field, x0, aside, watch)
+            observe::<_, D, D>(spec, &field, x0, aside, watch)
         }
         SwitchSpec::Hysteretic { eps, eps_prime, relaxation, phi0 } => {
             let field = Field::hysteretic(&spec.system, eps, eps_prime, relaxation).bind::<M>()?;
             let x0 = SVector::<f64, M>::from_fn(|i, _| if i < D { x0[i] } else { phi0 });
-            observe(spec, &field, x0, aside, watch)
+            observe::<_, D, M>(spec, &field, x0, aside, watch)
         }
         SwitchSpec::Filippov { exit, funnel } => match spec.system.faces() {
             None => discontinuous(spec, &spec.system.bind::<D>()?, x0, exit, funnel, aside, watch),
             Some([[a, b], [c, d]]) => {
                 let faces = [[a.bind()?, b.bind()?], [c.bind()?, d.bind()?]];
                 watched(spec, aside, &mut |settings, observer| {
-                    filippov::run_two_surfaces(&faces, x0, spec.t_end, settings, exit, observer, watch)
+                    faces.motion_on(x0, spec.t_end, settings, exit, observer, watch)
                 })
             }
         },
@@ -410,7 +366,7 @@ fn start<const D: usize>(spec: &RunSpec) -> SVector<f64, D> {
 }
 
 /// The discontinuous system, event by event.
-fn discontinuous<P: PiecewiseSmooth<D>, const D: usize, const M: usize>(
+fn discontinuous<P: Motions<D> + ?Sized, const D: usize>(
     spec: &RunSpec,
     system: &P,
     x0: SVector<f64, D>,
@@ -418,14 +374,11 @@ fn discontinuous<P: PiecewiseSmooth<D>, const D: usize, const M: usize>(
     funnel: Option<FunnelSpec>,
     aside: &mut Aside<'_, D>,
     watch: &dyn Watch,
-) -> Result<Recording<D>, JobError>
-where
-    for<'a> SlidingFlow<'a, P, D>: VectorField<M>,
-{
+) -> Result<Recording<D>, JobError> {
     match funnel {
         Some(funnel) => futures(spec, system, x0, &settings(spec), &funnel),
         None => watched(spec, aside, &mut |settings, observer| {
-            filippov::run_watched(system, x0, spec.t_end, settings, exit, observer, watch)
+            system.motion(x0, spec.t_end, settings, exit, observer, watch)
         }),
     }
 }
@@ -483,29 +436,14 @@ fn watched<const D: usize>(
     }
 }
 
-/// Any observer, so that methods are compiled once for all of them.
-struct AnyObserver<'a, O: ?Sized>(&'a mut O);
-
-impl<const N: usize> Observer<N> for AnyObserver<'_, dyn Observer<N> + '_> {
-    fn step(&mut self, step: &Step<'_, N>) -> Flow {
-        self.0.step(step)
-    }
-    fn kick(&mut self, t: f64, before: &SVector<f64, N>, after: &SVector<f64, N>) {
-        self.0.kick(t, before, after);
-    }
-}
-
 /// The funnel: the approach to the set-valued point, and its futures.
-fn futures<P: PiecewiseSmooth<D>, const D: usize, const M: usize>(
+fn futures<P: Motions<D> + ?Sized, const D: usize>(
     spec: &RunSpec,
     system: &P,
     x0: SVector<f64, D>,
     settings: &filippov::Settings,
     funnel: &FunnelSpec,
-) -> Result<Recording<D>, JobError>
-where
-    for<'a> SlidingFlow<'a, P, D>: VectorField<M>,
-{
+) -> Result<Recording<D>, JobError> {
     let grid = FunnelGrid {
         shortest: funnel.shortest,
         longest: funnel.longest,
@@ -514,7 +452,7 @@ where
         until_two_fold: funnel.until_two_fold,
         per_step: POINTS_PER_STEP,
     };
-    let found = filippov::funnel(system, x0, spec.t_end, settings, &grid)?;
+    let found = system.funnel(x0, spec.t_end, settings, &grid)?;
     let mut statistics = found.statistics.clone();
     let mut most_steps_in_segment = statistics.steps;
     for member in &found.members {
@@ -546,33 +484,31 @@ fn motion<const D: usize>(trajectory: filippov::Trajectory<D>) -> Motion<D> {
     Motion { pieces, events: trajectory.events }
 }
 
-fn observe<F: VectorField<N>, const D: usize, const N: usize>(
+fn observe<F: Orbits<N> + ?Sized, const D: usize, const N: usize>(
     spec: &RunSpec,
     field: &F,
     x0: SVector<f64, N>,
     aside: &mut Aside<'_, D>,
     watch: &dyn Watch,
 ) -> Result<Recording<D>, JobError> {
-    let part = aside.part;
     let (summary, data) = match spec.observe {
         Observation::Path { chord } => {
             let mut draining = Draining { recorder: PathRecorder::<D>::new(&x0, chord), aside: &mut *aside };
-            let end = integrate(spec, field, x0, D, part, &mut draining, watch);
+            let end = integrate(spec, field, x0, D, &mut draining, watch);
             (draining.kept_if_failed(end)?, Data::Path(draining.recorder.into_samples()))
         }
         Observation::Times { every } => {
             let recorder = TimesRecorder::<D>::new(&x0, every).at_most(aside.most());
             let mut draining = Draining { recorder, aside: &mut *aside };
-            let end = integrate(spec, field, x0, D, part, &mut draining, watch);
+            let end = integrate(spec, field, x0, D, &mut draining, watch);
             (draining.kept_if_failed(end)?, Data::Path(draining.recorder.into_samples()))
         }
         Observation::Section { coordinate, value } => {
             let mut draining = Draining { recorder: SectionRecorder::<D>::new(coordinate, value), aside: &mut *aside };
-            let end = integrate(spec, field, x0, D, part, &mut draining, watch);
+            let end = integrate(spec, field, x0, D, &mut draining, watch);
             (draining.kept_if_failed(end)?, Data::Section(draining.recorder.into_crossings()))
         }
     };
-    aside.end = summary.x.as_slice().to_vec();
     Ok(Recording {
         data,
         t: summary.t,
@@ -584,40 +520,18 @@ fn observe<F: VectorField<N>, const D: usize, const N: usize>(
 }
 
 /// The run itself; `states` of the equation's components are the system's.
-fn integrate<'a, F: VectorField<N>, const N: usize>(
+fn integrate<F: Orbits<N> + ?Sized, const N: usize>(
     spec: &RunSpec,
-    field: &'a F,
+    field: &F,
     x0: SVector<f64, N>,
     states: usize,
-    part: Part,
-    observer: &'a mut (dyn Observer<N> + 'a),
-    watch: &'a dyn Watch,
+    observer: &mut dyn Observer<N>,
+    watch: &dyn Watch,
 ) -> Result<Summary<N>, JobError> {
     let MethodSpec { name, tolerance, step_cap, max_steps, precision, order } = spec.method;
     let course = Course { t_end: spec.t_end, schedule: spec.schedule, step_cap, max_steps, kicked_states: states };
-    let orbit = Drive { field, x0, course, part, observer: AnyObserver(observer), watch };
-    match (precision, order) {
-        (None, None) => name.with_stepper(tolerance, orbit),
-        _ => with_extended(precision.unwrap_or(PRECISIONS[0]), order, tolerance, orbit),
-    }
-}
-
-/// A run that waits for its method.
-struct Drive<'a, F, const N: usize> {
-    field: &'a F,
-    x0: SVector<f64, N>,
-    course: Course,
-    part: Part,
-    observer: AnyObserver<'a, dyn Observer<N> + 'a>,
-    watch: &'a dyn Watch,
-}
-
-impl<F: VectorField<N>, const N: usize> WithStepper<N> for Drive<'_, F, N> {
-    type Answer = Result<Summary<N>, JobError>;
-    fn with<M: Stepper<N>>(self, mut stepper: M) -> Self::Answer {
-        let Self { field, x0, course, part, mut observer, watch } = self;
-        Ok(drive_part(field, x0, &course, part, &mut stepper, &mut observer, watch)?.within_budget()?)
-    }
+    let how = How { method: name, tolerance, precision, order, course };
+    Ok(field.orbit(x0, &how, observer, watch)?.within_budget()?)
 }
 
 #[cfg(test)]
@@ -668,26 +582,11 @@ mod tests {
                 assert_eq!((format!("{rows:?}"), parts), (format!("{:?}", points.rows()), vec![5]));
                 assert_eq!((end.t, end.rows, end.stop), (1.0, 5, Stop::Finished));
                 assert_eq!(Some(&end.statistics), whole.statistics.as_ref());
-                if let SwitchSpec::Filippov { .. } = switch {
-                    continue;
-                }
-                // a1 is 1/2 at ln 2, between the first restart and the second.
-                let schedule = Schedule { restart_every: Some(0.4), kick: None };
-                let observe = Observation::Section { coordinate: 0, value: 0.5 };
-                let run = RunSpec { schedule, observe, ..run };
-                let (rows, t, state) = part(&run, Part { from: 0, to: 2 }, &()).unwrap();
-                assert!((rows.numbers("t")[0] - 2.0_f64.ln()).abs() < 1e-8 && rows.len() == 1 && t == 0.8, "{rows:?}");
-                assert_eq!(state.len(), n + usize::from(matches!(switch, SwitchSpec::Hysteretic { .. })));
-                assert!((state[n - 1] - (-0.8 * n as f64).exp()).abs() < 1e-10);
             }
         }
         for switch in switches() {
             let many = cases::run(cases::decays(9), switch, 1.0, Observation::Section { coordinate: 0, value: 0.5 });
-            let said = [
-                answer(&many, &()).unwrap_err(),
-                part(&many, Part::WHOLE, &()).unwrap_err(),
-                stream(&many, &mut |_| true, &()).unwrap_err(),
-            ];
+            let said = [answer(&many, &()).unwrap_err(), stream(&many, &mut |_| true, &()).unwrap_err()];
             assert!(said.iter().all(|e| e.to_string().contains("up to eight states")), "{said:?}");
         }
     }
@@ -703,21 +602,6 @@ mod tests {
             let right = |(t, x): (&f64, &f64)| (x - from * (-rate * t).exp()).abs() < 1e-10;
             assert!(state[0] == from && points.numbers("t").iter().zip(state).all(right), "{state:?}");
         }
-    }
-
-    /// Looked at each 4096 steps: it is not that there was no more room.
-    #[test]
-    fn an_interrupted_part_says_so() {
-        struct Never;
-        impl Watch for Never {
-            fn reached(&self, _: f64) -> bool {
-                false
-            }
-        }
-        let section = Observation::Section { coordinate: 0, value: 0.5 };
-        let mut run = cases::run(cases::decays(1), SwitchSpec::tanh(1e-2), 1.0, section);
-        run.method.step_cap = StepCap::Absolute(1e-4);
-        assert_eq!(part(&run, Part::WHOLE, &Never), Err(JobError::Interrupted));
     }
 
     #[test]

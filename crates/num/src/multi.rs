@@ -1,4 +1,4 @@
-//! Floating-point numbers of 192, 256, 384 or 512 bits, where 32 digits are not enough.
+//! Floating-point numbers of 192 bits and more, where 32 digits are not enough.
 //!
 //! A number is sign, exponent and `L` limbs of 64 bits, most significant bit set: +- 0.mmm 2^e. Sums and products are those of paper and pencil (Knuth, TAOCP
 //! vol. 2, 4.3.1) with one guard limb, quotients and roots are Newton's, each within one or two units in the last place; elementary functions are

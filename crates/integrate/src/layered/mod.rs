@@ -421,6 +421,18 @@ impl<const N: usize> Layered<N> {
     }
 }
 
+/// The method is compiled for systems of up to so many states.
+const MOST_STATES: usize = 4;
+
+impl<const N: usize> Layered<N> {
+    fn too_many_states() -> Failure {
+        Failure::NotApplicable {
+            method: "layered",
+            why: format!("it has {N} states, and the method is there for up to {MOST_STATES}"),
+        }
+    }
+}
+
 impl<const N: usize> Stepper<N> for Layered<N> {
     fn restart<F: VectorField<N>>(
         &mut self,
@@ -430,6 +442,9 @@ impl<const N: usize> Stepper<N> for Layered<N> {
         t_end: f64,
         max_step: f64,
     ) -> Result<(), Failure> {
+        if const { N > MOST_STATES } {
+            return Err(Self::too_many_states());
+        }
         self.read(field.tape()).map_err(|why| Failure::NotApplicable { method: "layered", why: why.to_string() })?;
         self.restart_again(field, t, x, t_end, max_step)
     }
@@ -453,6 +468,10 @@ impl<const N: usize> Stepper<N> for Layered<N> {
     }
 
     fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
+        // Said here, too, so that nothing is compiled for them.
+        if const { N > MOST_STATES } {
+            return Err(Self::too_many_states());
+        }
         let (t0, x0) = (self.t, self.x);
         let mut begin = false;
         let made = loop {

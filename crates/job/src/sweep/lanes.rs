@@ -16,9 +16,10 @@ use crate::spec::{Method, Observation, RunSpec, SwitchSpec};
 use crate::table::Entry;
 use twofold_analyse::SectionRecorder;
 use twofold_analyse::path::MOST_POINTS;
-use twofold_integrate::ensemble::{Common, End, InstructionSet, Plane, Run, Tolerances, ensemble_watched};
+use twofold_instances::{self as instances, Lanes};
+use twofold_integrate::ensemble::{Common, End, InstructionSet, Plane, Run, Tolerances};
 use twofold_integrate::{Course, StopReason, Summary, Watch};
-use twofold_system::{Alike, BindError, BoundField, Compiled, Equations, Field, Smoothed};
+use twofold_system::{Alike, BindError, BoundField, Field};
 
 /// Fewer cells than this are computed one after the other.
 const FEWEST: usize = 3;
@@ -278,19 +279,16 @@ impl Sweep {
         let (cells, run) = (&group.cells[..], group.cells[0].run());
         let SwitchSpec::Smoothed { eps, transition } = run.switch else { return Ok(false) };
         // The compiled equation where there is one: it gives the same bits sooner.
-        if let (true, Some(Compiled::Caricature(system))) = (group.of_one_equation, run.system.compiled()) {
-            let field = Smoothed { system, transition, eps };
-            side_by_side(set, &field, cells, progress, enough, take)?;
-            return Ok(true);
+        if group.of_one_equation
+            && let Some(equations) = instances::smoothed_in_lanes(&run.system, transition, eps)
+        {
+            return side_by_side(set, &equations, cells, progress, enough, take);
         }
         macro_rules! of {
             ($n:literal) => {
-                if group.of_one_equation {
-                    side_by_side(set, &group.equation.bind::<$n>()?, cells, progress, enough, take)?;
-                } else if let Some(alike) = group.alike::<$n>()? {
-                    side_by_side(set, &alike, cells, progress, enough, take)?;
-                } else {
-                    return Ok(false);
+                match group.alike::<$n>()? {
+                    Some(alike) => side_by_side(set, &alike, cells, progress, enough, take),
+                    None => Ok(false),
                 }
             };
         }
@@ -298,20 +296,19 @@ impl Sweep {
             2 => of!(2),
             3 => of!(3),
             4 => of!(4),
-            _ => return Ok(false),
+            _ => Ok(false),
         }
-        Ok(true)
     }
 }
 
-fn side_by_side<E: Equations<N>, const N: usize>(
+fn side_by_side<const N: usize>(
     set: InstructionSet,
-    equations: &E,
+    equations: &dyn Lanes<N>,
     cells: &[Cell],
     progress: &dyn Progress,
     enough: &AtomicBool,
     take: &mut dyn FnMut(Row) -> bool,
-) -> Result<(), JobError> {
+) -> Result<bool, JobError> {
     let first = cells[0].run();
     let plane = cells[0].plane();
     let runs: Vec<Run<N>> = cells.iter().map(|cell| course(cell.run())).collect();
@@ -328,7 +325,7 @@ fn side_by_side<E: Equations<N>, const N: usize>(
     let watch = Both { display: &*display, enough };
     let tolerances: Vec<_> = cells.iter().map(|cell| cell.run().method.tolerance).collect();
     let common = Common { tolerances: Tolerances::Each(&tolerances), plane, corners, carried: None, watch: &watch };
-    let observer = |_| match plane {
+    let section = match plane {
         Some(Plane { coordinate, value }) => SectionRecorder::<N>::new(coordinate, value),
         None => SectionRecorder::<N>::new(0, 0.0),
     };
@@ -336,7 +333,7 @@ fn side_by_side<E: Equations<N>, const N: usize>(
     let mut unfinished = cells.len();
     // Runs whose verdict waits for an exponent, which costs many times what the run does: those are computed together too.
     let mut waiting: Vec<Waiting> = Vec::new();
-    ensemble_watched(set, equations, &runs, common, observer, &mut |i, end| {
+    let computed = equations.sections(set, &runs, common, &section, &mut |i, end| {
         unfinished -= 1;
         if interrupted || enough.load(Ordering::Relaxed) {
             return;
@@ -364,6 +361,10 @@ fn side_by_side<E: Equations<N>, const N: usize>(
             enough.store(true, Ordering::Relaxed);
         }
     });
+    if !computed {
+        display.done("no vector registers here");
+        return Ok(false);
+    }
     let given_up = unfinished > 0 && !enough.load(Ordering::Relaxed);
     if interrupted || given_up {
         display.done("interrupted");
@@ -371,9 +372,10 @@ fn side_by_side<E: Equations<N>, const N: usize>(
     }
     display.done("");
     if enough.load(Ordering::Relaxed) {
-        return Ok(());
+        return Ok(true);
     }
-    exponents(set, cells, waiting, progress, enough, take)
+    exponents(set, cells, waiting, progress, enough, take)?;
+    Ok(true)
 }
 
 /// A run that has come to its end, and the exponent that its verdict waits for.

@@ -129,15 +129,14 @@ impl Program {
     pub fn evaluate<S: Elementary>(&self, x: &[S], out: &mut [S]) {
         assert!(x.len() == self.variables && out.len() == self.outputs.len(), "one number a variable and a value");
         // Wider numbers than `f64` take so long that how a register is found does not matter: one loop is compiled for them, not three.
-        let wide = const { size_of::<S>() > size_of::<f64>() };
         if self.registers <= Self::FEW {
             let mut registers = [S::zero(); Self::FEW];
             registers[..x.len()].copy_from_slice(x);
-            if wide { self.run(registers.as_mut_slice(), out) } else { self.run(&mut registers, out) }
+            if const { wide::<S>() } { self.run(registers.as_mut_slice(), out) } else { self.run(&mut registers, out) }
         } else if self.registers <= Self::ON_STACK {
             let mut registers = [S::zero(); Self::ON_STACK];
             registers[..x.len()].copy_from_slice(x);
-            if wide { self.run(registers.as_mut_slice(), out) } else { self.run(&mut registers, out) }
+            if const { wide::<S>() } { self.run(registers.as_mut_slice(), out) } else { self.run(&mut registers, out) }
         } else {
             let mut registers = vec![S::zero(); self.registers];
             registers[..x.len()].copy_from_slice(x);
@@ -226,6 +225,11 @@ impl Program {
 }
 
 /// Intermediate results.
+/// Whether a number takes so long that how a register is found does not matter.
+const fn wide<S>() -> bool {
+    size_of::<S>() > size_of::<f64>()
+}
+
 trait Results<S> {
     fn get(&self, i: u16) -> S;
     fn set(&mut self, i: u16, value: S);

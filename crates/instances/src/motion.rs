@@ -1,0 +1,187 @@
+//! Motions of discontinuous systems.
+
+use nalgebra::SVector;
+use twofold_analyse::filippov_return;
+use twofold_analyse::floquet::{self, Plane, Returned};
+use twofold_analyse::limit::{
+    AfterVisit, AfterVisitQuestion, Convergence, ConvergenceQuestion, after_visit, convergence,
+};
+use twofold_integrate::Watch;
+use twofold_integrate::filippov::{
+    ExitRule, Faces, FilippovError, FilippovObserver, FilippovSummary, Funnel, FunnelGrid, Settings, funnel,
+    run_two_surfaces, run_watched,
+};
+use twofold_system::{BindError, Bound, Caricature, Compiled, System};
+
+/// Where the smoothed orbits of widths cross the plane behind a visit, or what they failed with.
+pub type Crossing<'a> = &'a mut dyn FnMut(f64) -> Result<Option<Vec<f64>>, FilippovError>;
+
+/// A discontinuous system of `N` states.
+pub trait Motions<const N: usize> {
+    /// As [`run_watched`].
+    ///
+    /// # Errors
+    /// As there.
+    fn motion(
+        &self,
+        x0: SVector<f64, N>,
+        t_end: f64,
+        settings: &Settings,
+        exit: ExitRule,
+        observer: &mut dyn FilippovObserver<N>,
+        watch: &dyn Watch,
+    ) -> Result<FilippovSummary<N>, FilippovError>;
+    /// As [`funnel()`].
+    ///
+    /// # Errors
+    /// As there.
+    fn funnel(
+        &self,
+        x0: SVector<f64, N>,
+        t_end: f64,
+        settings: &Settings,
+        grid: &FunnelGrid,
+    ) -> Result<Funnel<N>, FilippovError>;
+    /// As [`filippov_return::return_map`].
+    ///
+    /// # Errors
+    /// As there.
+    fn return_map(
+        &self,
+        plane: Plane,
+        returns: usize,
+        u: &SVector<f64, N>,
+        settings: &floquet::Settings,
+        derivative: bool,
+    ) -> Result<Returned, filippov_return::Error>;
+}
+
+macro_rules! motions {
+    ($($n:literal $system:ty;)*) => {
+        $(impl Motions<$n> for $system {
+            fn motion(
+                &self,
+                x0: SVector<f64, $n>,
+                t_end: f64,
+                settings: &Settings,
+                exit: ExitRule,
+                observer: &mut dyn FilippovObserver<$n>,
+                watch: &dyn Watch,
+            ) -> Result<FilippovSummary<$n>, FilippovError> {
+                run_watched(self, x0, t_end, settings, exit, observer, watch)
+            }
+            fn funnel(
+                &self,
+                x0: SVector<f64, $n>,
+                t_end: f64,
+                settings: &Settings,
+                grid: &FunnelGrid,
+            ) -> Result<Funnel<$n>, FilippovError> {
+                funnel(self, x0, t_end, settings, grid)
+            }
+            fn return_map(
+                &self,
+                plane: Plane,
+                returns: usize,
+                u: &SVector<f64, $n>,
+                settings: &floquet::Settings,
+                derivative: bool,
+            ) -> Result<Returned, filippov_return::Error> {
+                filippov_return::return_map(self, plane, returns, u, settings, derivative)
+            }
+        })*
+    };
+}
+
+motions! {
+    1 Bound<1>;
+    2 Bound<2>;
+    3 Bound<3>;
+    4 Bound<4>;
+    5 Bound<5>;
+    6 Bound<6>;
+    7 Bound<7>;
+    8 Bound<8>;
+    3 Caricature;
+}
+
+/// What is asked of motions that visit a two-fold.
+pub trait Visited: Motions<3> {
+    /// As [`convergence()`].
+    ///
+    /// # Errors
+    /// As there.
+    fn convergence(&self, question: &ConvergenceQuestion) -> Result<Convergence, FilippovError>;
+    /// As [`after_visit()`].
+    ///
+    /// # Errors
+    /// As there.
+    fn after_visit(&self, question: &AfterVisitQuestion, crossing: Crossing<'_>) -> Result<AfterVisit, FilippovError>;
+}
+
+macro_rules! visited {
+    ($($system:ty),*) => {
+        $(impl Visited for $system {
+            fn convergence(&self, question: &ConvergenceQuestion) -> Result<Convergence, FilippovError> {
+                convergence(self, question)
+            }
+            fn after_visit(
+                &self,
+                question: &AfterVisitQuestion,
+                crossing: Crossing<'_>,
+            ) -> Result<AfterVisit, FilippovError> {
+                after_visit(self, question, crossing)
+            }
+        })*
+    };
+}
+
+visited!(Bound<3>, Caricature);
+
+/// Two switching surfaces of a system of `N` states.
+pub trait TwoSurfaces<const N: usize> {
+    /// As [`run_two_surfaces`].
+    ///
+    /// # Errors
+    /// As there.
+    fn motion_on(
+        &self,
+        x0: SVector<f64, N>,
+        t_end: f64,
+        settings: &Settings,
+        exit: ExitRule,
+        observer: &mut dyn FilippovObserver<N>,
+        watch: &dyn Watch,
+    ) -> Result<FilippovSummary<N>, FilippovError>;
+}
+
+macro_rules! two_surfaces {
+    ($($n:literal),*) => {
+        $(impl TwoSurfaces<$n> for Faces<Bound<$n>> {
+            fn motion_on(
+                &self,
+                x0: SVector<f64, $n>,
+                t_end: f64,
+                settings: &Settings,
+                exit: ExitRule,
+                observer: &mut dyn FilippovObserver<$n>,
+                watch: &dyn Watch,
+            ) -> Result<FilippovSummary<$n>, FilippovError> {
+                run_two_surfaces(self, x0, t_end, settings, exit, observer, watch)
+            }
+        })*
+    };
+}
+
+two_surfaces!(1, 2, 3, 4, 5, 6, 7, 8);
+
+/// The discontinuous system with three states.
+///
+/// # Errors
+/// If it has not three.
+pub fn sliding(system: &System) -> Result<Box<dyn Visited>, BindError> {
+    Ok(match system.compiled() {
+        Some(Compiled::Caricature(system)) => Box::new(system),
+        _ => Box::new(system.bind::<3>()?),
+    })
+}
