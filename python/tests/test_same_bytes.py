@@ -26,6 +26,14 @@ RUNS = {
         ["--t-end", "30", "--method", "dopri5", "--switch", "hysteretic", "--hysteresis", "single", "--eps", "0.01"],
         dict(switch="hysteretic", hysteresis="single", eps=0.01),
     ),
+    "delayed": (
+        ["--t-end", "30", "--switch", "delayed", "--delay", "0.01", "--history", "flow", "--section", "y=0"],
+        dict(switch="delayed", delay=0.01, history="flow", plane="y=0"),
+    ),
+    "delayed-smooth": (
+        ["--t-end", "10", "--switch", "delayed", "--delay", "0.02", "--eps", "0.01", "--transition", "erf", "--method", "radau5"],
+        dict(switch="delayed", delay=0.02, eps=0.01, transition="erf", method="radau5"),
+    ),
     "perturbed": (["--t-end", "30", "--method", "dopri5", "--sigma", "0.1"], dict(sigma=0.1)),
     "arctan": (["--t-end", "30", "--method", "dopri5", "--transition", "arctan"], dict(transition="arctan")),
     "times": (["--t-end", "30", "--method", "dopri5", "--every", "0.5"], dict(every=0.5)),

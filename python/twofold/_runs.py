@@ -103,6 +103,8 @@ def _spec(
     funnel: Optional[Dict[str, Any]] = None,
     *,
     switch: str = "smoothed",
+    delay: Optional[float] = None,
+    history: Optional[str] = None,
     eps: Optional[float] = None,
     transition: Optional[str] = None,
     sigma: Optional[float] = None,
@@ -143,17 +145,28 @@ def _spec(
     of_hysteresis = {"eps_prime": eps_prime, "hysteresis": hysteresis}
     of_smoothing = {"transition": transition, "sigma": sigma}
     of_filippov = {"exit": exit, "plus_probability": plus_probability}
+    shape: Any = transition or "tanh"
+    if sigma is not None and switch in ("smoothed", "delayed"):
+        other = None if transition == "tanh" else transition
+        _refuse({"transition": other}, "sigma perturbs tanh; leave one of the two out")
+        shape = {"perturbed-tanh": {"sigma": _finite("sigma", sigma)}}
+    if switch != "delayed":
+        _refuse({"delay": delay, "history": history}, 'it belongs to switch="delayed"')
     model: Any
     if switch == "smoothed":
         _refuse(of_hysteresis, 'it belongs to switch="hysteretic"')
         _refuse(of_filippov, 'it belongs to switch="filippov"')
-        if sigma is not None:
-            other = None if transition == "tanh" else transition
-            _refuse({"transition": other}, "sigma perturbs tanh; leave one of the two out")
-            shape: Any = {"perturbed-tanh": {"sigma": _finite("sigma", sigma)}}
-        else:
-            shape = transition or "tanh"
         model = {"smoothed": {"eps": width, "transition": shape}}
+    elif switch == "delayed":
+        _refuse(of_hysteresis, 'it belongs to switch="hysteretic"')
+        _refuse(of_filippov, 'it belongs to switch="filippov"')
+        if delay is None:
+            raise SpecError('switch="delayed" needs its delay: give one, such as delay=1e-3', "delay")
+        model = {"delayed": {"delay": _finite("delay", delay), "history": history or "constant"}}
+        if eps is None:
+            _refuse(of_smoothing, "the sharp delayed switch has no transition; give eps, too")
+        else:
+            model["delayed"].update(eps=width, transition=shape)
     elif switch == "hysteretic":
         _refuse(of_smoothing, 'it belongs to switch="smoothed"')
         _refuse(of_filippov, 'it belongs to switch="filippov"')
@@ -163,7 +176,7 @@ def _spec(
         _refuse({"eps": eps}, "the discontinuous system has no eps")
         _refuse(of_smoothing, 'it belongs to switch="smoothed"')
         _refuse(of_hysteresis, 'it belongs to switch="hysteretic"')
-        _refuse({"restart": restart, "kick_every": kick_every, **kicks}, "restarts and kicks belong to smoothed and hysteretic runs")
+        _refuse({"restart": restart, "kick_every": kick_every, **kicks}, "restarts and kicks belong to smoothed, hysteretic and delayed runs")
         if funnel is not None:
             _refuse({"plus_probability": plus_probability, "seed": seed, "stream": stream}, "nothing in a funnel is random")
             model = {"filippov": {"exit": "all", "funnel": funnel}}
@@ -176,7 +189,7 @@ def _spec(
         else:
             model = {"filippov": {"exit": _exit(exit, plus_probability, seed, stream)}}
     else:
-        raise SpecError(f'switch is {switch!r}: give "smoothed", "hysteretic" or "filippov"', "switch")
+        raise SpecError(f'switch is {switch!r}: give "smoothed", "hysteretic", "delayed" or "filippov"', "switch")
     kick = None
     if switch != "filippov":
         if kick_every is None:
@@ -567,6 +580,8 @@ def solve(
     t_end: float = 150.0,
     *,
     switch: str = "smoothed",
+    delay: Optional[float] = None,
+    history: Optional[str] = None,
     eps: Optional[float] = None,
     transition: Optional[str] = None,
     sigma: Optional[float] = None,
@@ -601,13 +616,18 @@ def solve(
         Initial state; without it the one that the system suggests.
     t_end : float
         Final time, in the system's unit of time.
-    switch : {"smoothed", "hysteretic", "filippov"}
+    switch : {"smoothed", "hysteretic", "delayed", "filippov"}
         What stands in for the discontinuity at h = 0: a smooth transition of width ``eps``; a loop of half-width ``eps`` with a state of its
-        own; or nothing: the discontinuous system, in Filippov's sense, event by event.
+        own; a switch that acts late, on h(x(t - delay)); or nothing: the discontinuous system, in Filippov's sense, event by event.
+    delay : float
+        Delay of a delayed switch, in units of time.
+    history : {"constant", "flow"}
+        Where the orbit was before the start of a run with a delayed switch: at the start, or on the orbit without delay that leads
+        there [default "constant"].
     eps : float
-        Width of the layer, in units of h [default 1e-3].
+        Width of the layer, in units of h [default 1e-3; of a delayed switch none, which is the sharp rule].
     transition : {"tanh", "arctan", "algebraic", "erf"}
-        Transition function of a smoothed switch [default "tanh"].
+        Transition function of a smoothed switch, or of a delayed one with ``eps`` [default "tanh"].
     sigma : float
         Perturbs the tanh transition by sigma sqrt(eps) exp(-h^2).
     eps_prime : float
@@ -620,7 +640,8 @@ def solve(
     plus_probability : float
         Probability of leaving to h > 0 under a random exit [default 0.5].
     method : {"dopri5", "lsoda", "radau5", "taylor", "taylor-extended", "layered"}
-        Integration method. Filippov motion is integrated by dopri5.
+        Integration method. Filippov motion is integrated by dopri5, a sharp delayed switch by dopri5, taylor or
+        taylor-extended, a smooth one by dopri5 or radau5.
     rtol, atol : float
         Tolerances of a step's local error [default 10^-7.97727, NDSolve's; 1e-32 for taylor-extended, or what ``precision`` allows].
     max_step : float

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 
 use super::CliError;
-use super::words::{KickLaw, Method, Reading, Relaxation, Transition};
+use super::words::{History, KickLaw, Method, Reading, Relaxation, Transition};
 use crate::integrate;
 use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use crate::integrate::{Kick, Schedule, StepCap, Tolerance};
@@ -50,7 +50,13 @@ pub struct RunFlags {
     /// The caricature's v- [default: -1.4].
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub v_minus: Option<f64>,
-    /// Stiffness parameter [default: 0.001].
+    /// Delay of the delayed switch.
+    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    pub delay: Option<f64>,
+    /// Where the orbit was before the start of a run with a delayed switch [default: constant].
+    #[arg(long, value_enum, help_heading = "System")]
+    pub history: Option<History>,
+    /// Stiffness parameter [default: 0.001; with --switch delayed none, which is the sharp rule].
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub eps: Option<f64>,
     /// How the smoothed switch goes over from one side to the other [default: tanh].
@@ -71,7 +77,7 @@ pub struct RunFlags {
     /// Final time [default: 150; of an exponent 10000].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub t_end: Option<f64>,
-    /// Integration method [default: lsoda; dopri5 with --switch filippov].
+    /// Integration method [default: lsoda; dopri5 with --switch filippov or delayed].
     #[arg(long, value_enum, help_heading = "Method")]
     pub method: Option<Method>,
     /// Relative tolerance [default: 10^-7.97727, NDSolve's; with taylor-extended 1e-32 or what --precision allows; of exponents 1e-9, of closed orbits 1e-11].
@@ -152,6 +158,8 @@ pub enum Switch {
     Smoothed,
     /// Eq. (10).
     Hysteretic,
+    /// f+ while h(x(t - delay)) > 0; smooth with --eps.
+    Delayed,
     /// The discontinuous system itself.
     Filippov,
 }
@@ -212,6 +220,14 @@ impl RunFlags {
     fn filippov(&self) -> bool {
         self.switch() == Switch::Filippov
     }
+    /// Whether phi is a function of h, now or a delay ago.
+    fn has_transition(&self) -> bool {
+        match self.switch() {
+            Switch::Smoothed => true,
+            Switch::Delayed => self.eps.is_some(),
+            _ => false,
+        }
+    }
     fn exit_begins(&self, word: &str) -> bool {
         self.filippov() && self.exit.as_deref().is_some_and(|e| e.split(':').next() == Some(word))
     }
@@ -230,14 +246,15 @@ const OF_THE_CARICATURE: &str = "it belongs to the caricature, and --set NAME=VA
 const OF_FUNNELS: &str =
     "it describes the futures that --switch filippov --exit all follows; leave it out, or follow them";
 const OF_RANDOM: &str = "nothing in this run is random; leave it out, or give --kick-every or a random --exit";
-const NOT_FILIPPOV: &str = "restarts and kicks belong to smoothed and hysteretic runs (kicks to exponents, too); leave it out, or choose another --switch";
+const NOT_FILIPPOV: &str = "restarts and kicks belong to smoothed, hysteretic and delayed runs (kicks to exponents, too); leave it out, or choose another --switch";
+const OF_DELAYS: &str = "it belongs to the delayed switch; leave it out, or use --switch delayed";
 const OF_ORBITS: &str = "a closed orbit's steps are chosen by its tolerance alone; leave it out";
 const OF_EXTENDED: &str =
     "other methods compute in f64, and choose their order; leave it out, or use --method taylor-extended";
 const OF_KICKS: &str = "there are no kicks; leave it out, or give --kick-every";
 
 /// The table. Every flag of [`RunFlags`] but --spec stands in it once.
-const EFFECTS: [Effect; 37] = {
+const EFFECTS: [Effect; 39] = {
     const fn always(flag: &'static str, given: fn(&RunFlags) -> bool) -> Effect {
         Effect { flag, given, works: |_, _| true, why: "" }
     }
@@ -266,6 +283,8 @@ const EFFECTS: [Effect; 37] = {
         when("--beta", |f| f.beta.is_some(), |f, _| f.caricature() && !f.sets("beta"), OF_THE_CARICATURE),
         when("--v-plus", |f| f.v_plus.is_some(), |f, _| f.caricature() && !f.sets("v_plus"), OF_THE_CARICATURE),
         when("--v-minus", |f| f.v_minus.is_some(), |f, _| f.caricature() && !f.sets("v_minus"), OF_THE_CARICATURE),
+        when("--delay", |f| f.delay.is_some(), |f, _| f.switch() == Switch::Delayed, OF_DELAYS),
+        when("--history", |f| f.history.is_some(), |f, _| f.switch() == Switch::Delayed, OF_DELAYS),
         when(
             "--eps",
             |f| f.eps.is_some(),
@@ -275,13 +294,13 @@ const EFFECTS: [Effect; 37] = {
         when(
             "--transition",
             |f| f.transition.is_some(),
-            |f, _| f.switch() == Switch::Smoothed,
-            "it shapes the smoothed switch; leave it out, or use --switch smoothed",
+            |f, _| f.has_transition(),
+            "it shapes the smoothed switch; leave it out, or use --switch smoothed, or delayed with --eps",
         ),
         when(
             "--sigma",
             |f| f.sigma.is_some(),
-            |f, _| f.switch() == Switch::Smoothed && matches!(f.transition, None | Some(Transition::Tanh)),
+            |f, _| f.has_transition() && matches!(f.transition, None | Some(Transition::Tanh)),
             "it perturbs the smoothed switch's tanh; leave it out, or use --switch smoothed and --transition tanh",
         ),
         when(
@@ -402,6 +421,12 @@ enum Misuse {
         "the motion of a discontinuous system has no tangent flow where its future is a set: give --switch smoothed, with a small --eps"
     )]
     NoTangentFlow,
+    #[error("--switch delayed needs its delay: give one by --delay, such as --delay 0.001")]
+    NoDelay,
+    #[error(
+        "--switch delayed: the state is the whole past, of which neither closed orbits nor exponents are computed; follow a long run (twofold run, twofold sweep), or give another --switch"
+    )]
+    Past,
     #[error("--exit all follows many futures and records their paths; a sweep needs passages: give another rule")]
     FunnelInSweep,
     #[error("{file} is not a spec of one run: {reason}; make one with `--only PANEL --reading READING --print-spec`")]
@@ -526,22 +551,27 @@ impl RunFlags {
     fn unchecked(&self, command: Use) -> Result<RunSpec, Misuse> {
         let system = self.described_system()?;
         let eps = self.eps.unwrap_or(1e-3);
+        let transition = match (self.transition.unwrap_or(Transition::Tanh), self.sigma) {
+            (Transition::Tanh, Some(sigma)) => system::Transition::PerturbedTanh { sigma },
+            (Transition::Tanh, None) => system::Transition::Tanh,
+            (Transition::Arctan, _) => system::Transition::Arctan,
+            (Transition::Algebraic, _) => system::Transition::Algebraic,
+            (Transition::Erf, _) => system::Transition::Erf,
+        };
         let switch = match self.switch() {
-            Switch::Smoothed => SwitchSpec::Smoothed {
-                eps,
-                transition: match (self.transition.unwrap_or(Transition::Tanh), self.sigma) {
-                    (Transition::Tanh, Some(sigma)) => system::Transition::PerturbedTanh { sigma },
-                    (Transition::Tanh, None) => system::Transition::Tanh,
-                    (Transition::Arctan, _) => system::Transition::Arctan,
-                    (Transition::Algebraic, _) => system::Transition::Algebraic,
-                    (Transition::Erf, _) => system::Transition::Erf,
-                },
-            },
+            Switch::Smoothed => SwitchSpec::Smoothed { eps, transition },
             Switch::Hysteretic => SwitchSpec::Hysteretic {
                 eps,
                 eps_prime: self.eps_prime.unwrap_or(10.0 * eps),
                 relaxation: self.hysteresis.unwrap_or(Relaxation::Literal).into(),
                 phi0: 1.0,
+            },
+            Switch::Delayed if !command.is_a_run() => return Err(Misuse::Past),
+            Switch::Delayed => SwitchSpec::Delayed {
+                delay: self.delay.ok_or(Misuse::NoDelay)?,
+                eps: self.eps,
+                transition: self.eps.map(|_| transition),
+                history: self.history.map(Into::into).unwrap_or_default(),
             },
             Switch::Filippov if command == Use::Exponent => return Err(Misuse::NoTangentFlow),
             Switch::Filippov => {
@@ -567,7 +597,8 @@ impl RunFlags {
             }
             Some(numbers) => numbers.clone(),
         };
-        let method = self.method.unwrap_or(if self.filippov() { Method::Dopri5 } else { Method::Lsoda });
+        let by_events = matches!(self.switch(), Switch::Delayed | Switch::Filippov);
+        let method = self.method.unwrap_or(if by_events { Method::Dopri5 } else { Method::Lsoda });
         let mut defaults = MethodSpec::defaults(integrate::Method::from(method));
         if let Some(bits) = self.precision {
             let finest = finest_extended(bits);
@@ -738,15 +769,17 @@ mod tests {
 
     /// Every flag with a value that no default has and that every run allows on which the flag has an effect; several, if
     /// none differs from every default.
-    const SAMPLES: [(&str, &[&str]); 37] = [
+    const SAMPLES: [(&str, &[&str]); 39] = [
         ("--system", &["wheel", "two-fold"]),
         ("--set", &["alpha=0.3", "omega0=1.1"]),
-        ("--switch", &["smoothed", "hysteretic", "filippov"]),
+        ("--switch", &["smoothed", "hysteretic", "delayed", "filippov"]),
         ("--reading", &["reconstructed"]),
         ("--alpha", &["0.01"]),
         ("--beta", &["0.02"]),
         ("--v-plus", &["-1.3"]),
         ("--v-minus", &["-1.5"]),
+        ("--delay", &["0.05"]),
+        ("--history", &["flow"]),
         ("--eps", &["0.002"]),
         ("--transition", &["arctan"]),
         ("--sigma", &["0.1"]),
@@ -754,7 +787,7 @@ mod tests {
         ("--hysteresis", &["single"]),
         ("--start", &["0.1,0.1,0.1"]),
         ("--t-end", &["7"]),
-        ("--method", &["radau5"]),
+        ("--method", &["radau5", "taylor"]),
         ("--rtol", &["2e-9"]),
         ("--atol", &["2e-9"]),
         ("--max-step", &["0.1"]),
@@ -787,6 +820,8 @@ mod tests {
                 vec!["--switch", "hysteretic"],
                 vec!["--kick-every", "0.3"],
                 vec!["--switch", "hysteretic", "--kick-every", "0.3"],
+                vec!["--switch", "delayed", "--delay", "0.02"],
+                vec!["--switch", "delayed", "--delay", "0.02", "--eps", "0.01"],
                 vec!["--switch", "filippov", "--exit", "after-time:0.3:minus"],
                 vec!["--switch", "filippov", "--exit", "random:exponential:0.5"],
                 vec!["--switch", "filippov", "--exit", "all"],
@@ -832,9 +867,12 @@ mod tests {
                             kind.contains(&"all") || kind.contains(&"--every") || !kind.contains(&"--exit")
                         }
                         Use::Orbit => {
-                            !kind.contains(&"--section") || kind.contains(&"--kick-every") || kind.contains(&"--exit")
+                            let other = ["--kick-every", "--exit", "delayed"];
+                            !kind.contains(&"--section") || kind.iter().any(|k| other.contains(k))
                         }
-                        Use::Exponent => kind.iter().any(|k| ["filippov", "--section", "--every"].contains(k)),
+                        Use::Exponent => {
+                            kind.iter().any(|k| ["filippov", "delayed", "--section", "--every"].contains(k))
+                        }
                     };
                     assert!(fine, "{command:?} {kind:?}");
                     continue;
@@ -881,6 +919,7 @@ mod tests {
             "interval=1,2",
             "eps=0.01,0.02",
             "eps-prime=0.01,0.02",
+            "delay=0.01,0.02",
             "sigma=0.3,0.4",
             "kick-every=1,2",
             "kick-size=1,2",

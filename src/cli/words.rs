@@ -55,6 +55,16 @@ mirror! {
 }
 
 mirror! {
+    /// Where the orbit was before the start.
+    History = integrate::delay::History {
+        /// At the start, all the time.
+        Constant,
+        /// On the orbit of the system without delay that leads to the start.
+        Flow,
+    }
+}
+
+mirror! {
     /// The law of a kick of size s.
     KickLaw = integrate::KickLaw {
         /// Length exactly s, direction uniform on the sphere.

@@ -16,6 +16,7 @@ mod commands;
 mod conformance;
 mod convergence;
 mod crossings;
+mod delay;
 mod distribution;
 mod dopri5;
 mod ensemble;

@@ -5,14 +5,16 @@
 //! crates above call them, and are compiled without them.
 //!
 //! Equations are a file's, recorded as a program ([`BoundField`], [`Bound`]), in one to eight states (nine with a hysteretic phi). The paper's
-//! own are there as Rust code, too, which gives the same bits sooner: [`smoothed`], [`hysteretic`] and [`sliding`] choose.
+//! own are there as Rust code, too, which gives the same bits sooner: [`smoothed`], [`hysteretic`], [`late`] and [`sliding`] choose.
 #![forbid(unsafe_code)]
 
+mod delayed;
 mod lanes;
 mod motion;
 mod orbit;
 mod tangent;
 
+pub use delayed::{Late, late};
 pub use lanes::{Exponents, Lanes, Section, smoothed_in_lanes};
 pub use motion::{Crossing, Motions, TwoSurfaces, Visited, sliding};
 pub use orbit::{How, Orbits, Visits, hysteretic, smoothed};

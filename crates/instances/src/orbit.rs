@@ -43,12 +43,12 @@ pub trait Orbits<const N: usize>: Sync {
 }
 
 /// A run that waits for its method.
-struct Waiting<'a, F, const N: usize> {
-    field: &'a F,
-    x0: SVector<f64, N>,
-    course: Course,
-    observer: &'a mut dyn Observer<N>,
-    watch: &'a dyn Watch,
+pub(crate) struct Waiting<'a, F, const N: usize> {
+    pub(crate) field: &'a F,
+    pub(crate) x0: SVector<f64, N>,
+    pub(crate) course: Course,
+    pub(crate) observer: &'a mut dyn Observer<N>,
+    pub(crate) watch: &'a dyn Watch,
 }
 
 impl<F: VectorField<N>, const N: usize> WithStepper<N> for Waiting<'_, F, N> {

@@ -5,12 +5,16 @@ use nalgebra::SVector;
 
 use super::guard::Redoable;
 use super::starting_step::starting_step;
-use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
+use super::step::{Driven, DrivenStepper, Failure, Interpolant, Statistics, Steady, Step, Stepper, Tolerance, finite};
 use twofold_num::elementary::{rough_exp2, rough_log2, sqrt};
 use twofold_system::VectorField;
 
 /// Dormand & Prince (1980), table 2.
 pub(super) mod tableau {
+    pub const C2: f64 = 1.0 / 5.0;
+    pub const C3: f64 = 3.0 / 10.0;
+    pub const C4: f64 = 4.0 / 5.0;
+    pub const C5: f64 = 8.0 / 9.0;
     pub const A21: f64 = 1.0 / 5.0;
     pub const A31: f64 = 3.0 / 40.0;
     pub const A32: f64 = 9.0 / 40.0;
@@ -209,11 +213,11 @@ impl<const N: usize> Dopri5<N> {
         sum / N as f64
     }
 
-    fn first_step<F: VectorField<N>>(&mut self, field: &F) -> f64 {
-        let x = self.x;
-        let longest = self.max_step.min(self.t_end - self.t);
+    fn first_step<D: Driven<N>>(&mut self, field: &D) -> f64 {
+        let (t, x) = (self.t, self.x);
+        let longest = self.max_step.min(self.t_end - t);
         let norm = |v: &SVector<f64, N>| self.norm(v, |i| x[i].abs());
-        let h = starting_step(&x, &self.fsal, &norm, 0.2, longest, &|y| field.eval(y));
+        let h = starting_step(&x, &self.fsal, &norm, 0.2, longest, &|y| field.eval(t, y));
         self.statistics.evaluations += 1;
         h
     }
@@ -228,12 +232,34 @@ impl<const N: usize> Stepper<N> for Dopri5<N> {
         t_end: f64,
         max_step: f64,
     ) -> Result<(), Failure> {
+        self.restart_driven(&Steady(field), t, x, t_end, max_step)
+    }
+
+    fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
+        self.step_driven(&Steady(field))
+    }
+
+    fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+}
+
+impl<const N: usize> DrivenStepper<N> for Dopri5<N> {
+    #[inline]
+    fn restart_driven<D: Driven<N>>(
+        &mut self,
+        field: &D,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
         self.t = t;
         self.x = x;
         self.t_end = t_end;
         self.max_step = max_step;
         self.last_log = control::LEAST_LOG;
-        self.fsal = field.eval(&x);
+        self.fsal = field.eval(t, &x);
         self.statistics.evaluations += 1;
         self.statistics.restarts += 1;
         if !finite(&x) || !finite(&self.fsal) {
@@ -247,7 +273,8 @@ impl<const N: usize> Stepper<N> for Dopri5<N> {
         Ok(())
     }
 
-    fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
+    #[inline(always)]
+    fn step_driven<D: Driven<N>>(&mut self, field: &D) -> Result<Step<'_, N>, Failure> {
         let (t0, x0, k1) = (self.t, self.x, self.fsal);
         let mut rejected_before = false;
         loop {
@@ -258,16 +285,18 @@ impl<const N: usize> Stepper<N> for Dopri5<N> {
             if h.abs() <= t0.abs() * f64::EPSILON || h < f64::MIN_POSITIVE {
                 return Err(Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) });
             }
+            let t1 = if last { self.t_end } else { t0 + h };
             // Each sum ends with the derivative that was computed last: nothing but it is waited for.
-            let k2 = field.eval(&(x0 + k1 * (h * A21)));
-            let k3 = field.eval(&(x0 + k1 * (h * A31) + k2 * (h * A32)));
-            let k4 = field.eval(&(x0 + k1 * (h * A41) + k2 * (h * A42) + k3 * (h * A43)));
-            let k5 = field.eval(&(x0 + k1 * (h * A51) + k2 * (h * A52) + k3 * (h * A53) + k4 * (h * A54)));
+            let k2 = field.eval(t0 + h * C2, &(x0 + k1 * (h * A21)));
+            let k3 = field.eval(t0 + h * C3, &(x0 + k1 * (h * A31) + k2 * (h * A32)));
+            let k4 = field.eval(t0 + h * C4, &(x0 + k1 * (h * A41) + k2 * (h * A42) + k3 * (h * A43)));
+            let x5 = x0 + k1 * (h * A51) + k2 * (h * A52) + k3 * (h * A53) + k4 * (h * A54);
+            let k5 = field.eval(t0 + h * C5, &x5);
             let x6 = x0 + k1 * (h * A61) + k2 * (h * A62) + k3 * (h * A63) + k4 * (h * A64) + k5 * (h * A65);
-            let k6 = field.eval(&x6);
+            let k6 = field.eval(t1, &x6);
             // The increment by itself: one rounding at the size of the state, not five.
             let x1 = x0 + (k1 * (h * A71) + k3 * (h * A73) + k4 * (h * A74) + k5 * (h * A75) + k6 * (h * A76));
-            let k7 = field.eval(&x1);
+            let k7 = field.eval(t1, &x1);
             self.statistics.evaluations += 6;
 
             let e = k1 * (h * E1) + k3 * (h * E3) + k4 * (h * E4) + k5 * (h * E5) + k6 * (h * E6) + k7 * (h * E7);
@@ -295,7 +324,7 @@ impl<const N: usize> Stepper<N> for Dopri5<N> {
                 self.h = next.min(self.max_step);
                 self.last_log = log.max(control::LEAST_LOG);
                 self.dense = Dense { h, x0, x1, k: [k1, k3, k4, k5, k6, k7] };
-                self.t = if last { self.t_end } else { t0 + h };
+                self.t = t1;
                 self.x = x1;
                 self.fsal = k7;
                 self.statistics.steps += 1;
@@ -309,10 +338,6 @@ impl<const N: usize> Stepper<N> for Dopri5<N> {
             let factor = rough_exp2(0.5 * control::ALPHA * log) / control::SAFETY;
             self.h = h / factor.min(1.0 / control::SHRINK);
         }
-    }
-
-    fn statistics(&self) -> &Statistics {
-        &self.statistics
     }
 }
 

@@ -27,6 +27,7 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
 
+pub mod delay;
 pub mod dopri5;
 pub mod driver;
 pub mod ensemble;

@@ -11,9 +11,9 @@ use nalgebra::{Complex, Matrix3, SMatrix, SVector, Vector3};
 use super::guard::Redoable;
 use super::linear::Lu;
 use super::starting_step::starting_step;
-use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
+use super::step::{Driven, DrivenStepper, Failure, Interpolant, Statistics, Steady, Step, Stepper, Tolerance, finite};
 use twofold_num::elementary::{rough_pow, sqrt};
-use twofold_system::{VectorField, jacobian};
+use twofold_system::VectorField;
 
 /// The method's numbers, each from its definition.
 #[derive(Clone, Debug)]
@@ -220,11 +220,11 @@ impl<const N: usize> Radau5<N> {
     }
 
     /// A first step size, for an error estimate of order 3.
-    fn first_step<F: VectorField<N>>(&mut self, field: &F) -> f64 {
-        let weights = self.weights();
-        let longest = self.max_step.min(self.t_end - self.t);
+    fn first_step<D: Driven<N>>(&mut self, field: &D) -> f64 {
+        let (t, weights) = (self.t, self.weights());
+        let longest = self.max_step.min(self.t_end - t);
         let norm = |v: &SVector<f64, N>| norm(v, &weights);
-        let h = starting_step(&self.x, &self.derivative, &norm, 0.25, longest, &|y| field.eval(y));
+        let h = starting_step(&self.x, &self.derivative, &norm, 0.25, longest, &|y| field.eval(t, y));
         self.statistics.evaluations += 1;
         h
     }
@@ -248,7 +248,7 @@ impl<const N: usize> Radau5<N> {
     }
 
     /// Solves Z = h A F(x + Z) by simplified Newton iteration in the coordinates that split A^-1 (eq. IV.8.12-13).
-    fn solve<F: VectorField<N>>(&mut self, field: &F, h: f64, weights: &SVector<f64, N>) -> Option<Solved<N>> {
+    fn solve<D: Driven<N>>(&mut self, field: &D, h: f64, weights: &SVector<f64, N>) -> Option<Solved<N>> {
         self.factorise(h)?;
         let (_, matrices) = self.matrices.as_ref()?;
         let t = &self.tableau;
@@ -262,6 +262,7 @@ impl<const N: usize> Radau5<N> {
         };
         let mut w_real = combine(&z, &t.l_real);
         let mut w_complex = combine_complex(&z, &t.l_complex);
+        let times = t.c.map(|c| self.t + c * h);
         let rtol = self.tolerance.rtol.max(1e-14);
         let kappa = (10.0 * f64::EPSILON / rtol).max(sqrt(rtol).min(0.03));
         let mut eta = rough_pow(self.eta.max(f64::EPSILON), 0.8);
@@ -269,7 +270,8 @@ impl<const N: usize> Radau5<N> {
         let mut size_before = 0.0;
         for iteration in 1..=control::MOST_ITERATIONS {
             let [z1, z2, z3] = &z;
-            let f = [field.eval(&(self.x + z1)), field.eval(&(self.x + z2)), field.eval(&(self.x + z3))];
+            let at = |s: usize, z: &SVector<f64, N>| field.eval(times[s], &(self.x + z));
+            let f = [at(0, z1), at(1, z2), at(2, z3)];
             self.statistics.evaluations += 3;
             let right_real = combine(&f, &t.l_real) - w_real * (t.real / h);
             let delta_real = matrices.real.solve(right_real);
@@ -349,11 +351,32 @@ impl<const N: usize> Stepper<N> for Radau5<N> {
         t_end: f64,
         max_step: f64,
     ) -> Result<(), Failure> {
+        self.restart_driven(&Steady(field), t, x, t_end, max_step)
+    }
+
+    fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
+        self.step_driven(&Steady(field))
+    }
+
+    fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+}
+
+impl<const N: usize> DrivenStepper<N> for Radau5<N> {
+    fn restart_driven<D: Driven<N>>(
+        &mut self,
+        field: &D,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
         self.t = t;
         self.x = x;
         self.t_end = t_end;
         self.max_step = max_step;
-        self.derivative = field.eval(&x);
+        self.derivative = field.eval(t, &x);
         self.statistics.evaluations += 1;
         self.statistics.restarts += 1;
         self.statistics.highest_order = 5;
@@ -375,7 +398,7 @@ impl<const N: usize> Stepper<N> for Radau5<N> {
         Ok(())
     }
 
-    fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
+    fn step_driven<D: Driven<N>>(&mut self, field: &D) -> Result<Step<'_, N>, Failure> {
         let (t0, x0) = (self.t, self.x);
         let weights = self.weights();
         let mut failures = 0;
@@ -391,7 +414,7 @@ impl<const N: usize> Stepper<N> for Radau5<N> {
                 return Err(Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) });
             }
             if self.renew_jacobian {
-                self.jacobian = jacobian(field, &x0);
+                self.jacobian = field.jacobian(t0, &x0);
                 self.statistics.jacobians += 1;
                 self.jacobian_is_new = true;
                 self.renew_jacobian = false;
@@ -417,7 +440,7 @@ impl<const N: usize> Stepper<N> for Radau5<N> {
             let mut error = norm(&e, &weights);
             if error >= 1.0 && (self.last.is_none() || self.rejected_before) {
                 // Eq. (IV.8.20): at a start or after a rejection the estimate may be far too large for stiff components.
-                let f = field.eval(&(x0 + e));
+                let f = field.eval(t0, &(x0 + e));
                 self.statistics.evaluations += 1;
                 e = matrices.real.solve(f + combined);
                 error = norm(&e, &weights);
@@ -443,7 +466,8 @@ impl<const N: usize> Stepper<N> for Radau5<N> {
                 self.renew_jacobian = !self.jacobian_is_new;
                 continue;
             }
-            let derivative = field.eval(&x1);
+            let t1 = if last { self.t_end } else { t0 + h };
+            let derivative = field.eval(t1, &x1);
             self.statistics.evaluations += 1;
             if !finite(&derivative) {
                 return Err(Failure::NotFinite { t: t0, state: Failure::state(&x0) });
@@ -469,7 +493,7 @@ impl<const N: usize> Stepper<N> for Radau5<N> {
             };
             let [first, second, third] = &self.tableau.polynomial;
             let p = [combine(&solved.z, first), combine(&solved.z, second), combine(&solved.z, third)];
-            self.t = if last { self.t_end } else { t0 + h };
+            self.t = t1;
             self.x = x1;
             self.derivative = derivative;
             self.statistics.steps += 1;
@@ -477,10 +501,6 @@ impl<const N: usize> Stepper<N> for Radau5<N> {
             let dense = self.dense.insert(Collocation { x0, p, h });
             return Ok(Step { t0, t1: self.t, x0, x1, interpolant: dense });
         }
-    }
-
-    fn statistics(&self) -> &Statistics {
-        &self.statistics
     }
 }
 
@@ -579,11 +599,11 @@ mod tests {
         let h = t_end / f64::from(n);
         let weights = SVector::repeat(resolution.recip());
         for k in 0..n {
-            radau.jacobian = jacobian(field, &radau.x);
+            radau.jacobian = twofold_system::jacobian(field, &radau.x);
             radau.matrices = None;
             radau.dense = None;
             radau.eta = 1.0;
-            let solved = radau.solve(field, h, &weights).expect("converges");
+            let solved = radau.solve(&Steady(field), h, &weights).expect("converges");
             let p = radau.tableau.polynomial.map(|row| combine(&solved.z, &row));
             let dense = Collocation { x0: radau.x, p, h };
             let (t0, t1) = (f64::from(k) * h, f64::from(k + 1) * h);

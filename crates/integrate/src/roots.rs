@@ -89,6 +89,11 @@ pub struct Passages {
 }
 
 impl Passages {
+    /// Of an orbit that was last on the positive side, or on the other.
+    pub fn starting(positive: bool) -> Self {
+        Self { side: if positive { 1.0 } else { -1.0 } }
+    }
+
     /// The passages in `step`, in order. Nothing is allocated unless there is one.
     ///
     /// `g` is sampled at two points more than the interpolant's degree; between samples that keep their sign, a smallest |g| in the

@@ -1,11 +1,11 @@
 //! The nouns every method shares: an accepted step with its interpolant, tolerances, statistics, failures.
 
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 use twofold_num::Tape;
-use twofold_system::VectorField;
 use twofold_system::singular::{leaves_domain, undefined};
+use twofold_system::{VectorField, jacobian};
 
 /// Continuous extension of a method over one step (dense output).
 pub trait Interpolant<const N: usize> {
@@ -138,6 +138,43 @@ pub trait Stepper<const N: usize> {
 
     /// What the method has done since it was made.
     fn statistics(&self) -> &Statistics;
+}
+
+/// A right-hand side that depends on time, x' = f(t, x).
+pub(crate) trait Driven<const N: usize> {
+    /// f(t, x).
+    fn eval(&self, t: f64, x: &SVector<f64, N>) -> SVector<f64, N>;
+    /// The Jacobian matrix df/dx at (t, x).
+    fn jacobian(&self, t: f64, x: &SVector<f64, N>) -> SMatrix<f64, N, N>;
+}
+
+/// A field that does not depend on time.
+pub(crate) struct Steady<'a, F>(pub(crate) &'a F);
+
+impl<F: VectorField<N>, const N: usize> Driven<N> for Steady<'_, F> {
+    #[inline(always)]
+    fn eval(&self, _: f64, x: &SVector<f64, N>) -> SVector<f64, N> {
+        self.0.eval(x)
+    }
+    #[inline(always)]
+    fn jacobian(&self, _: f64, x: &SVector<f64, N>) -> SMatrix<f64, N, N> {
+        jacobian(self.0, x)
+    }
+}
+
+/// A one-step method for right-hand sides that depend on time: [`Stepper::restart`] and [`Stepper::step`] for them.
+pub(crate) trait DrivenStepper<const N: usize>: Stepper<N> {
+    /// [`Stepper::restart`].
+    fn restart_driven<D: Driven<N>>(
+        &mut self,
+        field: &D,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure>;
+    /// [`Stepper::step`].
+    fn step_driven<D: Driven<N>>(&mut self, field: &D) -> Result<Step<'_, N>, Failure>;
 }
 
 /// Work done by a method. Counts that a method does not have stay zero.

@@ -24,6 +24,7 @@ use std::sync::Arc;
 
 use nalgebra::SVector;
 
+use super::delay::Cuttable;
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
 use twofold_num::elementary::{exp, ln, rough_pow};
 use twofold_num::series::{Constants, LayerKind, MarkKind, Solution};
@@ -113,6 +114,8 @@ pub struct Taylor<const N: usize, S = f64> {
     x: SVector<S, N>,
     /// What rounding has taken from `x` since the last restart, to be added with the next step.
     lost: SVector<S, N>,
+    /// Time, state and what rounding had taken at the start of the last step.
+    from: (S, SVector<S, N>, SVector<S, N>),
     t_end: S,
     max_step: f64,
     /// Length of the last step.
@@ -204,6 +207,7 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
             t: S::zero(),
             x: zero,
             lost: zero,
+            from: (S::zero(), zero, zero),
             t_end: S::zero(),
             max_step: f64::INFINITY,
             h: S::zero(),
@@ -245,6 +249,17 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         t_end: f64,
         max_step: f64,
     ) -> Result<(), Failure> {
+        self.restart_between(field, (t, x), S::from_f64(t_end), max_step)
+    }
+
+    /// [`Taylor::restart_from`] towards a time in full precision.
+    fn restart_between<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        (t, x): (S, SVector<S, N>),
+        t_end: S,
+        max_step: f64,
+    ) -> Result<(), Failure> {
         self.tape = field.tape();
         self.solution.set_tape(&self.tape, self.constants);
         self.begin(&|x| field.eval(x), t, x, t_end, max_step)
@@ -256,13 +271,13 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         eval: &dyn Fn(&SVector<f64, N>) -> SVector<f64, N>,
         t: S,
         x: SVector<S, N>,
-        t_end: f64,
+        t_end: S,
         max_step: f64,
     ) -> Result<(), Failure> {
         self.t = t;
         self.x = x;
         self.lost = SVector::from_element(S::zero());
-        self.t_end = S::from_f64(t_end);
+        self.t_end = t_end;
         self.max_step = max_step;
         self.h = S::zero();
         self.landings = 0;
@@ -682,7 +697,7 @@ impl<const N: usize, S: Precision> Stepper<N> for Taylor<N, S> {
         max_step: f64,
     ) -> Result<(), Failure> {
         let x = self.exact(t, x);
-        self.begin(&|x| field.eval(x), S::from_f64(t), x, t_end, max_step)
+        self.begin(&|x| field.eval(x), S::from_f64(t), x, S::from_f64(t_end), max_step)
     }
 
     fn step<F: VectorField<N>>(&mut self, _: &F) -> Result<Step<'_, N>, Failure> {
@@ -731,8 +746,25 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         } else {
             self.landings = 0;
         }
-        // Summed with what the sums before have lost (Moller 1965; Hairer, Lubich & Wanner 2006, sec. VIII.5): an error is then small beside the step's
-        // increment, not beside the state.
+        let before = (self.t, self.x, self.lost);
+        let (x, lost) = self.landing(before.1, before.2);
+        let x1 = x.map(S::to_f64);
+        if !finite(&x1) {
+            return Err(self.stuck(Failure::NotFinite { t: t0, state: Failure::state(&x0) }));
+        }
+        (self.from, self.x, self.lost) = (before, x, lost);
+        self.t = if last { self.t_end } else { self.t + self.h };
+        self.round();
+        self.statistics.steps += 1;
+        Ok(Step { t0, t1: self.t.to_f64(), x0, x1, interpolant: &self.rounded })
+    }
+
+    /// The state after a step of length `h` from `x`, and what rounding has taken from it.
+    ///
+    /// Summed with what the sums before have lost (Moller 1965; Hairer, Lubich & Wanner 2006, sec. VIII.5): an error is then small beside the step's
+    /// increment, not beside the state.
+    #[inline]
+    fn landing(&self, from: SVector<S, N>, lost_before: SVector<S, N>) -> (SVector<S, N>, SVector<S, N>) {
         // All components at once: none waits for another.
         let series: [&[S]; N] = std::array::from_fn(|i| &self.solution.component(i)[..=self.order]);
         let mut increment = SVector::<S, N>::from_element(S::zero());
@@ -741,30 +773,89 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
                 increment[i] = (increment[i] + series[i][k]) * self.h;
             }
         }
-        let mut x = self.x;
-        let mut lost = self.lost;
+        let mut x = from;
+        let mut lost = lost_before;
         for i in 0..N {
-            let increment = increment[i] + self.lost[i];
-            x[i] = self.x[i] + increment;
-            lost[i] = (self.x[i] - x[i]) + increment;
+            let increment = increment[i] + lost_before[i];
+            x[i] = from[i] + increment;
+            lost[i] = (from[i] - x[i]) + increment;
         }
-        let x1 = x.map(S::to_f64);
-        if !finite(&x1) {
-            return Err(self.stuck(Failure::NotFinite { t: t0, state: Failure::state(&x0) }));
-        }
-        (self.x, self.lost) = (x, lost);
-        self.t = if last { self.t_end } else { self.t + self.h };
+        (x, lost)
+    }
 
+    /// The series of a step of length `h`, rounded.
+    #[inline]
+    fn round(&mut self) {
         let mut power = S::one();
         self.rounded.coefficients.resize(self.order + 1, SVector::zeros());
         for (k, rounded) in self.rounded.coefficients.iter_mut().enumerate() {
             for i in 0..N {
-                rounded[i] = (series[i][k] * power).to_f64();
+                rounded[i] = (self.solution.component(i)[k] * power).to_f64();
             }
             power = power * self.h;
         }
-        self.statistics.steps += 1;
-        Ok(Step { t0, t1: self.t.to_f64(), x0, x1, interpolant: &self.rounded })
+    }
+}
+
+impl<const N: usize, S: Precision> Cuttable<N> for Taylor<N, S> {
+    type Number = S;
+    const CUTS_EXACTLY: bool = true;
+
+    fn exactly(&self, t: f64, x: SVector<f64, N>) -> (S, SVector<S, N>) {
+        (S::from_f64(t), self.exact(t, x))
+    }
+
+    fn begin<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        (t, x): (S, SVector<S, N>),
+        end: S,
+        longest: f64,
+        again: bool,
+    ) -> Result<(), Failure> {
+        if again {
+            Taylor::begin(self, &|x| field.eval(x), t, x, end, longest)
+        } else {
+            self.restart_between(field, (t, x), end, longest)
+        }
+    }
+
+    fn advance<F: VectorField<N>>(&mut self, _: &F) -> Result<(), Failure> {
+        Taylor::advance(self).map(|_| ())
+    }
+
+    fn last(&self) -> Step<'_, N> {
+        let (t0, x0, _) = self.from;
+        Step {
+            t0: t0.to_f64(),
+            t1: self.t.to_f64(),
+            x0: x0.map(S::to_f64),
+            x1: self.x.map(S::to_f64),
+            interpolant: &self.rounded,
+        }
+    }
+
+    fn start(&self) -> S {
+        self.from.0
+    }
+
+    fn reached(&self) -> (S, SVector<S, N>) {
+        self.state()
+    }
+
+    fn at(&self, theta: S) -> SVector<S, N> {
+        Taylor::at(self, theta).1
+    }
+
+    fn cut(&mut self, end: S) {
+        self.h = end - self.from.0;
+        (self.x, self.lost) = self.landing(self.from.1, self.from.2);
+        self.t = end;
+        self.round();
+    }
+
+    fn statistics(&self) -> &Statistics {
+        &self.statistics
     }
 }
 

@@ -115,6 +115,7 @@ impl LargestExponent {
             (SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. }, _) => {
                 Field::hysteretic(&self.system, eps, eps_prime, relaxation)
             }
+            (SwitchSpec::Delayed { .. }, _) => return Err(DELAYED.into()),
             (SwitchSpec::Filippov { .. }, _) => return Err("a set-valued motion has no tangent flow".into()),
         };
         let tangent = field.variational(1);
@@ -149,6 +150,9 @@ impl LargestExponent {
         if h[0] > 0.0 { 1.0 } else { 0.0 }
     }
 }
+
+/// Why there is no exponent of a delayed switch here.
+const DELAYED: &str = "the state of a delayed switch is its whole past, whose tangent flow is not computed: compare neighbouring runs instead";
 
 impl Question for LargestExponent {
     fn kind(&self) -> &'static str {

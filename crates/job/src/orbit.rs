@@ -52,6 +52,15 @@ pub struct ClosedOrbit {
     pub along: Option<Along>,
 }
 
+/// Why closed orbits of a delayed switch are not looked for.
+fn delayed() -> SpecError {
+    SpecError {
+        field: "switch",
+        value: "delayed".into(),
+        rule: "a closed orbit of a delayed switch is a closed path of pasts, which this method does not look for; see what a long run settles on",
+    }
+}
+
 /// A parameter, and from where to where.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Along {
@@ -192,6 +201,9 @@ impl ClosedOrbit {
                 "closed orbits are looked for in systems of 2 to 8 states",
             );
         }
+        if let SwitchSpec::Delayed { .. } = self.switch {
+            return Err(delayed().into());
+        }
         if self.plane.axis >= n {
             return wrong(
                 "section",
@@ -235,6 +247,7 @@ impl ClosedOrbit {
                 SwitchSpec::Hysteretic { eps_prime, relaxation, phi0, .. } if value > 0.0 => {
                     SwitchSpec::Hysteretic { eps: value, eps_prime, relaxation, phi0 }
                 }
+                SwitchSpec::Delayed { .. } => return Err(delayed().into()),
                 SwitchSpec::Filippov { .. } => {
                     return Err(JobError::Other("the discontinuous system has no eps to follow".into()));
                 }
@@ -457,6 +470,7 @@ impl Map<'_> {
                     n => Err(JobError::Other(format!("no closed orbits with {n} states")).into()),
                 };
             }
+            SwitchSpec::Delayed { .. } => return Err(JobError::from(delayed()).into()),
             SwitchSpec::Smoothed { eps, transition } => Field::smoothed(&system, transition, eps),
             SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. } => {
                 Field::hysteretic(&system, eps, eps_prime, relaxation)

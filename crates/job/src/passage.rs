@@ -114,6 +114,12 @@ impl Leaving {
     fn eps(&self) -> Result<f64, JobError> {
         match self.switch {
             SwitchSpec::Smoothed { eps, .. } | SwitchSpec::Hysteretic { eps, .. } => Ok(eps),
+            SwitchSpec::Delayed { .. } => Err(SpecError {
+                field: "switch",
+                value: "delayed".into(),
+                rule: "leaving is measured in units of eps, for smoothed and hysteretic runs",
+            }
+            .into()),
             SwitchSpec::Filippov { .. } => Err(SpecError {
                 field: "switch",
                 value: "filippov".into(),
@@ -179,7 +185,7 @@ impl Question for Leaving {
                 let field = instances::hysteretic(&self.system, eps, eps_prime, relaxation)?;
                 self.each(&*field, eps, |[x, y, z]| vector![x, y, z, phi0])
             }
-            SwitchSpec::Filippov { .. } => unreachable!("refused above"),
+            SwitchSpec::Delayed { .. } | SwitchSpec::Filippov { .. } => unreachable!("refused above"),
         }
     }
 }

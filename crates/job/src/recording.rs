@@ -12,7 +12,7 @@ use nalgebra::SVector;
 
 use super::answer::{Answer, NoSuchFact, Stop};
 use super::question::JobError;
-use super::spec::RunSpec;
+use super::spec::{RunSpec, SwitchSpec};
 use super::table::{Cells, Column, Entry, Table};
 use crate::record::hash::canonical_json;
 use twofold_analyse::{Crossing, Direction, Motion, Sample};
@@ -113,10 +113,15 @@ impl<const D: usize> Recording<D> {
             }
         };
         let tables = tables.into_iter().map(|table| signed(run, table)).collect();
-        Answer { statistics: Some(self.statistics.clone()), stop: self.stop.into(), ..Answer::of_tables(tables) }
-            .with_fact("t", &self.t)
-            .with_fact("state", &self.x.as_slice())
-            .with_fact("most_steps_in_segment", &self.most_steps_in_segment)
+        let answer =
+            Answer { statistics: Some(self.statistics.clone()), stop: self.stop.into(), ..Answer::of_tables(tables) }
+                .with_fact("t", &self.t)
+                .with_fact("state", &self.x.as_slice())
+                .with_fact("most_steps_in_segment", &self.most_steps_in_segment);
+        match run.switch {
+            SwitchSpec::Delayed { history, .. } => answer.with_fact("history", &history),
+            _ => answer,
+        }
     }
 
     /// The table of points that [`Recording::to_answer`] begins with, of a part of a recording. Pieces of a motion are counted from
@@ -152,7 +157,7 @@ impl<const D: usize> Recording<D> {
             let approach = members.remove(0).1;
             // A funnel may be empty, a motion never has futures: the question says which it is.
             match run.switch {
-                super::spec::SwitchSpec::Filippov { funnel: Some(_), .. } => Data::Funnel {
+                SwitchSpec::Filippov { funnel: Some(_), .. } => Data::Funnel {
                     approach,
                     futures: members
                         .into_iter()

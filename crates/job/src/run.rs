@@ -10,7 +10,7 @@ use super::spec::{Method, RunSpec, SwitchSpec};
 use twofold_integrate::Watch;
 
 /// A run, and what is recorded of it: see [`Recording`](super::Recording) for the answer's tables. Facts: `t` and `state` at the end,
-/// `most_steps_in_segment`.
+/// `most_steps_in_segment`; of a delayed switch its `history`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run(pub RunSpec);
 
@@ -37,6 +37,7 @@ impl Question for Run {
         let switch = match self.0.switch {
             SwitchSpec::Hysteretic { .. } => 6.0,
             SwitchSpec::Smoothed { .. } => 1.0,
+            SwitchSpec::Delayed { .. } => 2.0,
             SwitchSpec::Filippov { .. } => 0.1,
         };
         let method = match self.0.method.name {

@@ -11,7 +11,8 @@ use super::spec::{FunnelSpec, MethodSpec, Observation, RunSpec, SpecError, Switc
 use super::table::Table;
 use twofold_analyse::path::MOST_POINTS;
 use twofold_analyse::{Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder, TimedMotion, TimesRecorder};
-use twofold_instances::{self as instances, How, Motions, Orbits, TwoSurfaces};
+use twofold_instances::{self as instances, How, Late, Motions, Orbits, TwoSurfaces};
+use twofold_integrate::delay::{DelayError, DelayedSwitch};
 use twofold_integrate::filippov::{
     self, AllModes, ExitRule, Faces, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent,
 };
@@ -319,6 +320,10 @@ fn three_states(spec: &RunSpec, aside: &mut Aside<'_, 3>, watch: &dyn Watch) -> 
             let field = instances::hysteretic(&spec.system, eps, eps_prime, relaxation)?;
             observe(spec, &*field, vector![x0[0], x0[1], x0[2], phi0], aside, watch)
         }
+        SwitchSpec::Delayed { delay, eps, transition, history } => {
+            let switch = DelayedSwitch { delay, smooth: transition.zip(eps), history };
+            late(spec, &*instances::late(&spec.system)?, x0, switch, aside, watch)
+        }
         SwitchSpec::Filippov { exit, funnel } if spec.system.faces().is_none() => {
             discontinuous(spec, &*instances::sliding(&spec.system)?, x0, exit, funnel, aside, watch)
         }
@@ -335,7 +340,7 @@ fn record<const D: usize, const M: usize>(
 where
     BoundField<D>: Orbits<D>,
     BoundField<M>: Orbits<M>,
-    Bound<D>: Motions<D>,
+    Bound<D>: Motions<D> + Late<D>,
     Faces<Bound<D>>: TwoSurfaces<D>,
 {
     let x0 = start::<D>(spec);
@@ -348,6 +353,10 @@ where
             let field = Field::hysteretic(&spec.system, eps, eps_prime, relaxation).bind::<M>()?;
             let x0 = SVector::<f64, M>::from_fn(|i, _| if i < D { x0[i] } else { phi0 });
             observe::<_, D, M>(spec, &field, x0, aside, watch)
+        }
+        SwitchSpec::Delayed { delay, eps, transition, history } => {
+            let switch = DelayedSwitch { delay, smooth: transition.zip(eps), history };
+            late(spec, &spec.system.bind::<D>()?, x0, switch, aside, watch)
         }
         SwitchSpec::Filippov { exit, funnel } => match spec.system.faces() {
             None => discontinuous(spec, &spec.system.bind::<D>()?, x0, exit, funnel, aside, watch),
@@ -484,6 +493,30 @@ fn motion<const D: usize>(trajectory: filippov::Trajectory<D>) -> Motion<D> {
     Motion { pieces, events: trajectory.events }
 }
 
+/// A run with a delayed switch.
+fn late<P: Late<D> + ?Sized, const D: usize>(
+    spec: &RunSpec,
+    system: &P,
+    x0: SVector<f64, D>,
+    switch: DelayedSwitch,
+    aside: &mut Aside<'_, D>,
+    watch: &dyn Watch,
+) -> Result<Recording<D>, JobError> {
+    observed(spec, x0, aside, &mut |observer| {
+        let end = system.late_orbit(&spec.system, switch, x0, &how(spec, D), observer, watch);
+        let end = end.map_err(|error| match error {
+            DelayError::NoHistory { .. } => {
+                let (value, rule) = (format!("{}, and {error}", switch.history.name()), NO_HISTORY);
+                JobError::from(SpecError { field: "history", value, rule })
+            }
+            _ => JobError::Other(error.to_string()),
+        });
+        Ok(end??.within_budget()?)
+    })
+}
+
+const NO_HISTORY: &str = "take the constant history, or another start";
+
 fn observe<F: Orbits<N> + ?Sized, const D: usize, const N: usize>(
     spec: &RunSpec,
     field: &F,
@@ -491,21 +524,34 @@ fn observe<F: Orbits<N> + ?Sized, const D: usize, const N: usize>(
     aside: &mut Aside<'_, D>,
     watch: &dyn Watch,
 ) -> Result<Recording<D>, JobError> {
+    observed(spec, x0, aside, &mut |observer| Ok(field.orbit(x0, &how(spec, D), observer, watch)?.within_budget()?))
+}
+
+/// A run, given what looks on.
+type AnyRun<'a, const N: usize> = dyn FnMut(&mut dyn Observer<N>) -> Result<Summary<N>, JobError> + 'a;
+
+/// A run, and what is to be recorded of it.
+fn observed<const D: usize, const N: usize>(
+    spec: &RunSpec,
+    x0: SVector<f64, N>,
+    aside: &mut Aside<'_, D>,
+    run: &mut AnyRun<'_, N>,
+) -> Result<Recording<D>, JobError> {
     let (summary, data) = match spec.observe {
         Observation::Path { chord } => {
             let mut draining = Draining { recorder: PathRecorder::<D>::new(&x0, chord), aside: &mut *aside };
-            let end = integrate(spec, field, x0, D, &mut draining, watch);
+            let end = run(&mut draining);
             (draining.kept_if_failed(end)?, Data::Path(draining.recorder.into_samples()))
         }
         Observation::Times { every } => {
             let recorder = TimesRecorder::<D>::new(&x0, every).at_most(aside.most());
             let mut draining = Draining { recorder, aside: &mut *aside };
-            let end = integrate(spec, field, x0, D, &mut draining, watch);
+            let end = run(&mut draining);
             (draining.kept_if_failed(end)?, Data::Path(draining.recorder.into_samples()))
         }
         Observation::Section { coordinate, value } => {
             let mut draining = Draining { recorder: SectionRecorder::<D>::new(coordinate, value), aside: &mut *aside };
-            let end = integrate(spec, field, x0, D, &mut draining, watch);
+            let end = run(&mut draining);
             (draining.kept_if_failed(end)?, Data::Section(draining.recorder.into_crossings()))
         }
     };
@@ -519,19 +565,11 @@ fn observe<F: Orbits<N> + ?Sized, const D: usize, const N: usize>(
     })
 }
 
-/// The run itself; `states` of the equation's components are the system's.
-fn integrate<F: Orbits<N> + ?Sized, const N: usize>(
-    spec: &RunSpec,
-    field: &F,
-    x0: SVector<f64, N>,
-    states: usize,
-    observer: &mut dyn Observer<N>,
-    watch: &dyn Watch,
-) -> Result<Summary<N>, JobError> {
+/// How the run is made; `states` of the equation's components are the system's.
+fn how(spec: &RunSpec, states: usize) -> How {
     let MethodSpec { name, tolerance, step_cap, max_steps, precision, order } = spec.method;
     let course = Course { t_end: spec.t_end, schedule: spec.schedule, step_cap, max_steps, kicked_states: states };
-    let how = How { method: name, tolerance, precision, order, course };
-    Ok(field.orbit(x0, &how, observer, watch)?.within_budget()?)
+    How { method: name, tolerance, precision, order, course }
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 pub use twofold_integrate::Method;
+use twofold_integrate::delay::{History, SHARP_METHODS, SMOOTH_METHODS};
 use twofold_integrate::filippov::ExitRule;
 use twofold_integrate::{PRECISIONS, Schedule, StepCap, Tolerance, layered};
 use twofold_num::elementary::exp10;
@@ -53,6 +54,21 @@ pub enum SwitchSpec {
         /// phi at the start.
         phi0: f64,
     },
+    /// The switch acts late (the end of sec. 4.3): f+ while h(x(t - delay)) > 0 and f- otherwise; with `eps`, phi is a function of
+    /// h(x(t - delay))/eps.
+    Delayed {
+        /// The delay.
+        delay: f64,
+        /// Stiffness parameter of the smooth rule.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        eps: Option<f64>,
+        /// Transition function; given if `eps` is.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        transition: Option<Transition>,
+        /// Where the orbit was before the start.
+        #[serde(default)]
+        history: History,
+    },
     /// The discontinuous system itself, in Filippov's sense (sec. 3).
     Filippov {
         /// How repelling sliding ends: the choice that the equations do not make.
@@ -83,6 +99,11 @@ impl SwitchSpec {
     /// tanh smoothing, sec. 4.1.
     pub fn tanh(eps: f64) -> Self {
         SwitchSpec::Smoothed { eps, transition: Transition::Tanh }
+    }
+
+    /// The sharp delayed switch, from a constant history.
+    pub fn delayed(delay: f64) -> Self {
+        SwitchSpec::Delayed { delay, eps: None, transition: None, history: History::Constant }
     }
 
     /// The hysteretic system of sec. 4.3 with eps' = 10 eps and phi(0) = 1.
@@ -261,6 +282,7 @@ impl RunSpec {
                 positive("eps-prime", eps_prime)?;
                 finite("phi0", phi0)?;
             }
+            SwitchSpec::Delayed { delay, eps, transition, .. } => self.validate_delayed(delay, eps, transition)?,
             SwitchSpec::Filippov { exit, funnel } => self.validate_filippov(exit, funnel)?,
         }
         self.method.validate()?;
@@ -295,6 +317,55 @@ impl RunSpec {
             }),
             None => Ok(()),
         }
+    }
+
+    fn validate_delayed(&self, delay: f64, eps: Option<f64>, transition: Option<Transition>) -> Checked {
+        positive("delay", delay)?;
+        if delay >= self.t_end {
+            let rule = "the switch would never see the run: give a delay below the end time, or a later end";
+            return wrong("delay", delay, rule);
+        }
+        if self.system.definition().second().is_some() {
+            return Err(SpecError {
+                field: "switch",
+                value: "delayed".into(),
+                rule: "a delayed switch is for systems with one switching surface; this one has two, so smooth them or take filippov",
+            });
+        }
+        if let Some(eps) = eps {
+            positive("eps", eps)?;
+        }
+        if eps.is_some() != transition.is_some() {
+            return Err(SpecError {
+                field: "transition",
+                value: if transition.is_some() { "given".into() } else { "missing".into() },
+                rule: "the smooth delayed switch has both eps and a transition, the sharp one neither",
+            });
+        }
+        if let Some(Transition::PerturbedTanh { sigma }) = transition {
+            finite("sigma", sigma)?;
+        }
+        let name = self.method.name;
+        let refused = |rule| Err(SpecError { field: "method", value: name.name().into(), rule });
+        if eps.is_none() && !SHARP_METHODS.contains(&name) {
+            return refused("it cannot end its steps at a delayed switch; take dopri5, taylor or taylor-extended");
+        }
+        if eps.is_some() && !SMOOTH_METHODS.contains(&name) {
+            return refused("it cannot follow an equation with a past; take dopri5 or radau5");
+        }
+        if let Some(bits) = self.method.precision.filter(|bits| *bits != PRECISIONS[0]) {
+            let rule = "a delayed switch is followed with 106 bits at most; leave it out";
+            return wrong_choice("precision", bits, rule);
+        }
+        let events = [("restart", self.schedule.restart_every), ("kick-every", self.schedule.kick.map(|k| k.every))];
+        for (field, every) in events {
+            if let Some(every) = every.filter(|every| *every <= delay) {
+                let rule =
+                    "the first would come before the switch has seen the start: give an interval longer than the delay";
+                return wrong(field, every, rule);
+            }
+        }
+        Ok(())
     }
 
     fn validate_filippov(&self, exit: ExitRule, funnel: Option<FunnelSpec>) -> Checked {
@@ -467,6 +538,12 @@ mod tests {
     fn filippov() -> RunSpec {
         let exit = ExitRule::AtOnce { side: Side::Plus };
         let run = RunSpec { switch: SwitchSpec::Filippov { exit, funnel: None }, ..smoothed() };
+        assert_eq!(run.validate(), Ok(()));
+        run
+    }
+
+    fn delayed() -> RunSpec {
+        let run = RunSpec { switch: SwitchSpec::delayed(1e-3), ..smoothed() };
         assert_eq!(run.validate(), Ok(()));
         run
     }
@@ -656,6 +733,51 @@ mod tests {
         assert_eq!(two().validate(), Ok(()));
         let hysteresis: Change = |r| r.switch = SwitchSpec::hysteretic(1e-3, Relaxation::Single);
         refused(two, &[(hysteresis, "switch", "this one has two")]);
+    }
+
+    #[test]
+    fn every_rule_of_a_delayed_run_is_kept() {
+        fn smooth(run: &mut RunSpec, eps: Option<f64>, transition: Option<Transition>) {
+            run.switch = SwitchSpec::Delayed { delay: 1e-3, eps, transition, history: History::Flow };
+        }
+        let cases: &[(Change, &str, &str)] = &[
+            (|r| r.switch = SwitchSpec::delayed(0.0), "delay", "above zero"),
+            (|r| r.switch = SwitchSpec::delayed(f64::NAN), "delay", "finite"),
+            (|r| r.t_end = 1e-3, "delay", "below the end time"),
+            (|r| r.system = two_surfaces(), "switch", "this one has two"),
+            (|r| smooth(r, Some(0.0), Some(Transition::Erf)), "eps", "above zero"),
+            (|r| smooth(r, Some(1e-3), None), "transition", "both"),
+            (|r| smooth(r, None, Some(Transition::Erf)), "transition", "neither"),
+            (|r| smooth(r, Some(1e-3), Some(Transition::PerturbedTanh { sigma: f64::NAN })), "sigma", "finite"),
+            (|r| r.method.name = Method::Lsoda, "method", "taylor-extended"),
+            (|r| r.method.name = Method::Radau5, "method", "taylor-extended"),
+            (
+                |r| {
+                    smooth(r, Some(1e-3), Some(Transition::Erf));
+                    r.method.name = Method::Taylor;
+                },
+                "method",
+                "radau5",
+            ),
+            (|r| extended(r, Some(192), None, 1e-30), "precision", "106 bits"),
+            (|r| r.schedule.restart_every = Some(1e-3), "restart", "longer than the delay"),
+            (|r| r.schedule.kick = Some(Kick { every: 1e-4, ..KICK }), "kick-every", "longer than the delay"),
+        ];
+        refused(delayed, cases);
+        let fine: [Change; 4] = [
+            |r| extended(r, Some(106), Some(40), 1e-30),
+            |r| r.schedule.restart_every = Some(2e-3),
+            |r| {
+                smooth(r, Some(1e-3), Some(Transition::Erf));
+                r.method.name = Method::Radau5;
+            },
+            |r| smooth(r, None, None),
+        ];
+        for (i, change) in fine.iter().enumerate() {
+            let mut run = delayed();
+            change(&mut run);
+            assert_eq!(run.validate(), Ok(()), "case {i}");
+        }
     }
 
     /// 106 bits hold 32 digits; more bits, their last one beside a leading 1.

@@ -80,6 +80,10 @@ pub fn switch(switch: &SwitchSpec) -> String {
             number(*eps),
             number(*eps_prime)
         ),
+        SwitchSpec::Delayed { delay, eps, .. } => match eps {
+            Some(eps) => format!("switch delayed by {}, smoothed, *ε* = {}", number(*delay), number(*eps)),
+            None => format!("switch delayed by {}", number(*delay)),
+        },
         SwitchSpec::Filippov { exit, .. } => format!("discontinuous (Filippov), exit {}", exit_rule(exit)),
     }
 }

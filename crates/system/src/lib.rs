@@ -49,7 +49,7 @@ pub use field::{BoundField, Field};
 pub use hysteretic::{Hysteretic, Relaxation};
 pub use instance::{BindError, Bound, Compiled, ParameterError, System};
 pub use reversed::Reversed;
-pub use smoothed::Smoothed;
+pub use smoothed::{Blended, Smoothed};
 pub use transition::Transition;
 pub use wheel::Wheel;
 

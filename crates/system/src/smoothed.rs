@@ -39,3 +39,19 @@ pub(super) fn blend<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(
     }
     blended
 }
+
+/// f- + (f+ - f-) phi for a number phi that is given, whatever the state: what a switch that is decided elsewhere makes of a system.
+#[derive(Clone, Copy, Debug)]
+pub struct Blended<'a, P> {
+    /// The piecewise-smooth system.
+    pub system: &'a P,
+    /// The weight of f+.
+    pub phi: f64,
+}
+
+impl<P: PiecewiseSmooth<N>, const N: usize> VectorField<N> for Blended<'_, P> {
+    #[inline(always)]
+    fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
+        blend(self.system, x, S::from_f64(self.phi))
+    }
+}

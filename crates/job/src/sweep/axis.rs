@@ -38,6 +38,8 @@ pub enum Coordinate {
     Eps,
     /// `eps-prime`: relaxation time of a hysteretic switch.
     EpsPrime,
+    /// `delay` of a delayed switch.
+    Delay,
     /// `sigma`: perturbation of the transition function.
     Sigma,
     /// `kick-every`: time between kicks.
@@ -53,7 +55,7 @@ pub enum Coordinate {
 }
 
 /// The coordinates without a dot, by name.
-const PLAIN: [(&str, Coordinate); 14] = [
+const PLAIN: [(&str, Coordinate); 15] = [
     ("rtol", Coordinate::Rtol),
     ("atol", Coordinate::Atol),
     ("tolerance", Coordinate::Tolerance),
@@ -62,6 +64,7 @@ const PLAIN: [(&str, Coordinate); 14] = [
     ("interval", Coordinate::Interval),
     ("eps", Coordinate::Eps),
     ("eps-prime", Coordinate::EpsPrime),
+    ("delay", Coordinate::Delay),
     ("sigma", Coordinate::Sigma),
     ("kick-every", Coordinate::KickEvery),
     ("kick-size", Coordinate::KickSize),
@@ -433,16 +436,29 @@ impl Coordinate {
                 _ => run.schedule.restart_every = Some(number),
             },
             Coordinate::Eps => match &mut run.switch {
-                SwitchSpec::Smoothed { eps, .. } | SwitchSpec::Hysteretic { eps, .. } => *eps = number,
+                SwitchSpec::Smoothed { eps, .. }
+                | SwitchSpec::Hysteretic { eps, .. }
+                | SwitchSpec::Delayed { eps: Some(eps), .. } => *eps = number,
+                SwitchSpec::Delayed { .. } => {
+                    return Err("the sharp delayed switch has no eps; give the run one".into());
+                }
                 SwitchSpec::Filippov { .. } => return Err("the discontinuous system has no eps".into()),
             },
             Coordinate::EpsPrime => match &mut run.switch {
                 SwitchSpec::Hysteretic { eps_prime, .. } => *eps_prime = number,
                 _ => return Err("eps-prime belongs to the hysteretic switch".into()),
             },
+            Coordinate::Delay => match &mut run.switch {
+                SwitchSpec::Delayed { delay, .. } => *delay = number,
+                _ => return Err("delay belongs to the delayed switch".into()),
+            },
             Coordinate::Sigma => match &mut run.switch {
                 SwitchSpec::Smoothed {
                     transition: t @ (Transition::Tanh | Transition::PerturbedTanh { .. }), ..
+                }
+                | SwitchSpec::Delayed {
+                    transition: Some(t @ (Transition::Tanh | Transition::PerturbedTanh { .. })),
+                    ..
                 } => {
                     *t = Transition::PerturbedTanh { sigma: number };
                 }
@@ -573,13 +589,14 @@ mod tests {
         plain.schedule.kick = None;
         let arctan =
             RunSpec { switch: SwitchSpec::Smoothed { eps: 1e-3, transition: Transition::Arctan }, ..plain.clone() };
+        let delayed = RunSpec { switch: SwitchSpec::delayed(1e-3), ..plain.clone() };
         let changed = |run: &RunSpec, text: &str| {
             let axis: Axis = text.parse().unwrap();
             let mut run = run.clone();
             axis.coordinate.apply(&mut run, &axis.value(0, 0.5)).map(|()| serde_json::to_value(&run).unwrap())
         };
         type Change = fn(&mut RunSpec);
-        let cases: [(&RunSpec, &str, Change); 21] = [
+        let cases: [(&RunSpec, &str, Change); 22] = [
             (&tanh, "params.alpha=0.2", |r| r.system = Caricature::with_reinjection(0.2, 1e-5).into()),
             (&tanh, "start.y=7", |r| r.start[1] = 7.0),
             (&tanh, "shift.z=0.25", |r| r.start[2] = 1.25),
@@ -611,6 +628,7 @@ mod tests {
             (&tanh, "method=radau5", |r| r.method.name = Method::Radau5),
             (&tanh, "method=lsoda,taylor", |r| r.method.name = Method::Lsoda),
             (&plain, "t-end=30", |r| r.t_end = 30.0),
+            (&delayed, "delay=1e-2", |r| r.switch = SwitchSpec::delayed(1e-2)),
         ];
         for (run, text, change) in cases {
             let mut wanted = run.clone();
@@ -638,6 +656,8 @@ mod tests {
             (&tanh, "shift.q=1", "no state q"),
             (&plain, "interval=3", "restarts belong"),
             (&plain, "eps=1", "no eps"),
+            (&delayed, "eps=1", "no eps"),
+            (&tanh, "delay=1", "delayed switch"),
             (&tanh, "eps-prime=1", "hysteretic switch"),
             (&plain, "eps-prime=1", "hysteretic switch"),
             (&hysteretic, "sigma=1", "with tanh"),

@@ -187,9 +187,10 @@ impl Fate {
         let run = &self.0.run;
         match (&self.is_far(), run.switch) {
             // Filippov motion has no layer to be stiff in: it gets to its end.
-            (Some(is_far), SwitchSpec::Smoothed { .. } | SwitchSpec::Hysteretic { .. }) => {
-                Ok(simulate_until(run, is_far, watch)?.to_answer(run))
-            }
+            (
+                Some(is_far),
+                SwitchSpec::Smoothed { .. } | SwitchSpec::Hysteretic { .. } | SwitchSpec::Delayed { .. },
+            ) => Ok(simulate_until(run, is_far, watch)?.to_answer(run)),
             _ => Run(run.clone()).compute(desk, watch),
         }
     }

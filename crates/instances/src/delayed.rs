@@ -1,0 +1,80 @@
+//! Orbits of systems with a delayed switch.
+
+use nalgebra::SVector;
+use twofold_integrate::delay::{DelayError, Delayed, DelayedSwitch, Own, Sides};
+use twofold_integrate::{Failure, Observer, Summary, Watch};
+use twofold_system::{BindError, Bound, Caricature, Compiled, PiecewiseSmooth, System};
+
+use crate::orbit::{How, Waiting};
+
+/// A system of `N` states whose switch may act late.
+pub trait Late<const N: usize> {
+    /// The orbit of `x0`; `data` describes this system.
+    ///
+    /// # Errors
+    /// If there is no such run; inside, as [`drive`](twofold_integrate::drive).
+    fn late_orbit(
+        &self,
+        data: &System,
+        switch: DelayedSwitch,
+        x0: SVector<f64, N>,
+        how: &How,
+        observer: &mut dyn Observer<N>,
+        watch: &dyn Watch,
+    ) -> Result<Result<Summary<N>, Failure>, DelayError>;
+}
+
+fn late_orbit<P: PiecewiseSmooth<N> + Clone, const N: usize>(
+    system: &P,
+    data: &System,
+    switch: DelayedSwitch,
+    x0: SVector<f64, N>,
+    how: &How,
+    observer: &mut dyn Observer<N>,
+    watch: &dyn Watch,
+) -> Result<Result<Summary<N>, Failure>, DelayError> {
+    let How { method, tolerance, order, course, .. } = *how;
+    let delayed = Delayed { sides: Sides::new(system, data), switch, x0 };
+    delayed.with_stepper(method, order, tolerance, Waiting { field: &Own, x0, course, observer, watch })
+}
+
+macro_rules! late {
+    ($($n:literal $system:ty;)*) => {
+        $(impl Late<$n> for $system {
+            fn late_orbit(
+                &self,
+                data: &System,
+                switch: DelayedSwitch,
+                x0: SVector<f64, $n>,
+                how: &How,
+                observer: &mut dyn Observer<$n>,
+                watch: &dyn Watch,
+            ) -> Result<Result<Summary<$n>, Failure>, DelayError> {
+                late_orbit(self, data, switch, x0, how, observer, watch)
+            }
+        })*
+    };
+}
+
+late! {
+    1 Bound<1>;
+    2 Bound<2>;
+    3 Bound<3>;
+    4 Bound<4>;
+    5 Bound<5>;
+    6 Bound<6>;
+    7 Bound<7>;
+    8 Bound<8>;
+    3 Caricature;
+}
+
+/// The system with three states.
+///
+/// # Errors
+/// If it has not three.
+pub fn late(system: &System) -> Result<Box<dyn Late<3>>, BindError> {
+    Ok(match system.compiled() {
+        Some(Compiled::Caricature(system)) => Box::new(system),
+        _ => Box::new(system.bind::<3>()?),
+    })
+}

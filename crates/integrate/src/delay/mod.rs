@@ -1,0 +1,293 @@
+//! A switch that acts late: x' = f- + (f+ - f-) phi(h(x(t - delay))/eps), and its limit eps -> 0, f+ while h(x(t - delay)) > 0 and f- otherwise.
+//!
+//! Jeffrey (2013), end of sec. 4.3, names this fourth way to resolve a discontinuity and leaves it out.
+//!
+//! - The sharp rule: between switches the motion is a smooth field's. An orbit's zeros of h are located on dense output, and each is a switch one delay
+//!   later: a queue of coming switches is all the past that is kept. Every switch ends a step.
+//! - The smooth rule: the method of steps (Bellman 1961; Hairer, Norsett & Wanner 1993, sec. II.17; Bellen & Zennaro 2003). No step is longer than the delay, so
+//!   that its stages ask only for a past that is known: the continuous extensions of the steps in the last delay. Where a jump of a derivative
+//!   arrives that the method's order can see, a step ends.
+//!
+//! Both are followed by [`Stepper`](super::Stepper)s with the equation inside: the field that a driver hands them is not looked at ([`Own`]).
+
+mod past;
+mod sharp;
+mod smooth;
+
+use std::sync::Arc;
+
+use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
+
+use super::method::{Method, WithStepper};
+use super::roots::{Passage, Passages};
+use super::step::{Failure, Statistics, Step, Tolerance};
+use super::taylor::Precision;
+use super::{Dopri5, Guarded, Radau5, Taylor};
+use past::Cut;
+use twofold_num::tape::{Operation, Replay};
+use twofold_num::{Elementary, Tape};
+use twofold_system::{Field, PiecewiseSmooth, System, Transition, VectorField};
+
+use sharp::Sharp;
+use smooth::Smooth;
+
+/// Where the orbit was before the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum History {
+    /// At the start, all the time.
+    #[default]
+    Constant,
+    /// On the orbit of the system without delay that leads to the start.
+    Flow,
+}
+
+impl History {
+    /// The name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            History::Constant => "constant",
+            History::Flow => "flow",
+        }
+    }
+}
+
+/// Why a run with a delayed switch cannot begin.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DelayError {
+    /// The method cannot follow this switch.
+    #[error("{method} cannot follow a delayed switch of this kind: take {instead}")]
+    Method {
+        /// Its name.
+        method: &'static str,
+        /// Those that can.
+        instead: &'static str,
+    },
+    /// The orbit without delay cannot be followed backwards for one delay.
+    #[error(
+        "no single orbit leads to the start: followed backwards it {what} at t = {t}; take the constant history, or another start"
+    )]
+    NoHistory {
+        /// When; not above zero.
+        t: f64,
+        /// What happens there.
+        what: String,
+    },
+}
+
+/// Methods that follow the sharp rule.
+pub const SHARP_METHODS: [Method; 3] = [Method::Dopri5, Method::Taylor, Method::TaylorExtended];
+/// Methods that follow the smooth rule.
+pub const SMOOTH_METHODS: [Method; 2] = [Method::Dopri5, Method::Radau5];
+
+/// The field that is handed to a driver whose stepper has the equation inside. Never evaluated by it.
+#[derive(Clone, Copy, Debug)]
+pub struct Own;
+
+impl<const N: usize> VectorField<N> for Own {
+    fn eval<S: Elementary>(&self, _: &SVector<S, N>) -> SVector<S, N> {
+        SVector::from_element(S::zero())
+    }
+}
+
+/// f+ or f- of a system, on both sides of the surface.
+#[derive(Clone, Debug)]
+struct OneSide<'a, P> {
+    system: &'a P,
+    plus: bool,
+    tape: Arc<Tape>,
+}
+
+impl<P: PiecewiseSmooth<N>, const N: usize> VectorField<N> for OneSide<'_, P> {
+    #[inline(always)]
+    fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
+        if self.plus { self.system.plus(x) } else { self.system.minus(x) }
+    }
+    fn tape(&self) -> Arc<Tape> {
+        self.tape.clone()
+    }
+}
+
+/// A field with time running backwards.
+struct Backwards<'a, F>(&'a F);
+
+impl<F: VectorField<N>, const N: usize> VectorField<N> for Backwards<'_, F> {
+    fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
+        self.0.eval(x).map(|c| -c)
+    }
+    fn tape(&self) -> Arc<Tape> {
+        let tape = self.0.tape();
+        Arc::new(Tape::record(N, |x| {
+            let mut field = Replay::new(&tape, x);
+            (0..N).map(|i| -field.output(i)).collect()
+        }))
+    }
+}
+
+/// A system with one switching surface, ready to be followed on either side of it.
+#[derive(Clone, Debug)]
+pub struct Sides<'a, P> {
+    system: &'a P,
+    /// f- and f+.
+    fields: [OneSide<'a, P>; 2],
+    h: Tape,
+    /// The coordinate that h is, if it is one.
+    plane: Option<usize>,
+}
+
+impl<'a, P> Sides<'a, P> {
+    /// Of `system`, which `data` describes.
+    pub fn new(system: &'a P, data: &System) -> Self {
+        let side = |plus: bool| {
+            let field = if plus { Field::plus(data) } else { Field::minus(data) };
+            OneSide { system, plus, tape: field.tape().clone() }
+        };
+        let h = data.tape().select([0]);
+        let plane = match h.operations()[h.outputs()[0]] {
+            Operation::Variable(i) => Some(i),
+            _ => None,
+        };
+        Self { system, fields: [side(false), side(true)], h, plane }
+    }
+
+    /// f+ or f-.
+    fn field(&self, plus: bool) -> &OneSide<'a, P> {
+        &self.fields[usize::from(plus)]
+    }
+
+    /// A failure with what the equations show of its cause.
+    fn diagnosed(&self, failure: Failure) -> Failure {
+        self.fields.iter().fold(failure, |failure, side| failure.diagnosed(&side.tape))
+    }
+
+    fn h<const N: usize>(&self, x: &SVector<f64, N>) -> f64
+    where
+        P: PiecewiseSmooth<N>,
+    {
+        self.system.switching(x)
+    }
+
+    /// Where the orbit passes the surface in `step`.
+    fn passages<const N: usize>(&self, passages: &mut Passages, step: &Step<'_, N>) -> Vec<Passage>
+    where
+        P: PiecewiseSmooth<N>,
+    {
+        match self.plane {
+            Some(coordinate) => passages.through_plane(step, coordinate, 0.0),
+            None => passages.in_step(step, |x| self.h(x)),
+        }
+    }
+}
+
+/// A method whose last step can be ended earlier, in its own arithmetic.
+pub(super) trait Cuttable<const N: usize> {
+    /// The numbers that it computes in.
+    type Number: Precision;
+    /// Whether a step that is cut short is as exact as a step of that length.
+    const CUTS_EXACTLY: bool;
+    /// A time and a state as they are meant.
+    fn exactly(&self, t: f64, x: SVector<f64, N>) -> (Self::Number, SVector<Self::Number, N>);
+    /// Starts towards `end` with steps no longer than `longest`; `again` says that the field is the last one.
+    fn begin<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        from: (Self::Number, SVector<Self::Number, N>),
+        end: Self::Number,
+        longest: f64,
+        again: bool,
+    ) -> Result<(), Failure>;
+    /// Makes a step.
+    fn advance<F: VectorField<N>>(&mut self, field: &F) -> Result<(), Failure>;
+    /// The last step, as far as it was cut.
+    fn last(&self) -> Step<'_, N>;
+    /// The last step's beginning.
+    fn start(&self) -> Self::Number;
+    /// Time and state reached.
+    fn reached(&self) -> (Self::Number, SVector<Self::Number, N>);
+    /// The state at the fraction `theta` of the last step.
+    fn at(&self, theta: Self::Number) -> SVector<Self::Number, N>;
+    /// Ends the last step at the time `end` within it.
+    fn cut(&mut self, end: Self::Number);
+    /// What it has done.
+    fn statistics(&self) -> &Statistics;
+}
+
+/// Times nearer to each other than this part of them are one.
+const ONE_TIME: f64 = 4.0 * f64::EPSILON;
+
+/// Whether `t` has come to `due`, as far as a step could tell.
+fn is_due(due: f64, t: f64) -> bool {
+    due - t <= ONE_TIME * due.abs()
+}
+
+/// A switch that acts late.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DelayedSwitch {
+    /// The delay.
+    pub delay: f64,
+    /// The transition function and its eps; none: the sharp rule.
+    pub smooth: Option<(Transition, f64)>,
+    /// Where the orbit was before the start.
+    pub history: History,
+}
+
+/// A system with a delayed switch, and where it starts.
+#[derive(Clone, Debug)]
+pub struct Delayed<'a, P, const N: usize> {
+    /// The system.
+    pub sides: Sides<'a, P>,
+    /// Its switch.
+    pub switch: DelayedSwitch,
+    /// The start.
+    pub x0: SVector<f64, N>,
+}
+
+impl<P: PiecewiseSmooth<N> + Clone, const N: usize> Delayed<'_, P, N> {
+    /// Gives a stepper of this switch by `method` to `user`. `order` is the degree of extended series, where another is asked for than the tolerance
+    /// does.
+    ///
+    /// # Errors
+    ///
+    /// If the method cannot follow this switch, or there is no such history.
+    pub fn with_stepper<U: WithStepper<N>>(
+        &self,
+        method: Method,
+        order: Option<u16>,
+        tolerance: Tolerance,
+        user: U,
+    ) -> Result<U::Answer, DelayError> {
+        let refused = |instead| Err(DelayError::Method { method: method.name(), instead });
+        match (self.switch.smooth, method) {
+            (None, Method::Dopri5) => {
+                let dopri5 = || Cut::new(Guarded::new(Dopri5::new(tolerance), tolerance));
+                Ok(user.with(Sharp::new(self, [dopri5(), dopri5()])?))
+            }
+            (None, Method::Taylor) => {
+                let taylor = || Taylor::<N>::new(tolerance);
+                Ok(user.with(Sharp::new(self, [taylor(), taylor()])?))
+            }
+            (None, Method::TaylorExtended) => {
+                let taylor = || {
+                    let taylor = Taylor::<N, _>::extended(tolerance).with_decimal_constants();
+                    match order {
+                        Some(order) => taylor.with_order(usize::from(order)),
+                        None => taylor,
+                    }
+                };
+                Ok(user.with(Sharp::new(self, [taylor(), taylor()])?))
+            }
+            (None, _) => refused("dopri5, taylor or taylor-extended"),
+            (Some(layer), Method::Dopri5) => {
+                Ok(user.with(Smooth::new(self, layer, Dopri5::new(tolerance), tolerance)?))
+            }
+            (Some(layer), Method::Radau5) => {
+                Ok(user.with(Smooth::new(self, layer, Radau5::new(tolerance), tolerance)?))
+            }
+            (Some(_), _) => refused("dopri5 or radau5"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

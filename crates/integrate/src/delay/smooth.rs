@@ -1,0 +1,228 @@
+//! The smooth rule: phi(h(x(t - delay))/eps), by the method of steps.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::past::{Look, Past};
+use super::{Backwards, DelayError, Delayed, DelayedSwitch, History, ONE_TIME, Sides, is_due};
+use crate::driver::{Course, Observer, drive};
+use crate::guard::Redoable;
+use crate::roots::Passages;
+use crate::step::{Driven, DrivenStepper, Failure, Flow, Statistics, Step, Stepper, Tolerance};
+use crate::{Dopri5, Guarded};
+use twofold_system::{Blended, PiecewiseSmooth, Smoothed, Transition, VectorField, jacobian};
+
+/// The stepper of the smooth rule.
+#[derive(Clone, Debug)]
+pub(super) struct Smooth<'a, P, M, const N: usize> {
+    sides: Sides<'a, P>,
+    delay: f64,
+    transition: Transition,
+    eps: f64,
+    method: M,
+    past: Past<N>,
+    /// Where steps end, in order: jumps of derivatives that arrive, and passages of the delayed orbit through the layer.
+    ends: Vec<f64>,
+    /// On which side of the surface the orbit was last.
+    passages: Passages,
+    reached: (f64, SVector<f64, N>),
+    t_end: f64,
+    max_step: f64,
+    /// Where the method under way is to end.
+    end: Option<f64>,
+}
+
+/// A jump of a derivative is seen by a method of order 5 until it is one of the sixth.
+const SEEN: u32 = 5;
+/// No step is longer than this part of the delay: methods lengthen a last step a little.
+const LONGEST: f64 = 0.999;
+/// The layer's half-width in eps: tanh differs from 1 by 4e-9 there.
+const LAYER: f64 = 10.0;
+/// Places in a step at which its distance from the layer is looked at.
+const LOOKS: usize = 8;
+
+/// The equation while its past is known: a field that depends on time.
+struct Weighted<'a, P, const N: usize> {
+    system: &'a P,
+    transition: Transition,
+    eps: f64,
+    delay: f64,
+    past: &'a Past<N>,
+    /// The end of the stretch under way, up to which the past is looked at from before.
+    end: f64,
+}
+
+impl<P: PiecewiseSmooth<N>, const N: usize> Weighted<'_, P, N> {
+    fn at(&self, t: f64) -> Blended<'_, P> {
+        let slack = 2.0 * ONE_TIME * t.abs();
+        let look = if is_due(self.end, t) { Look::Before } else { Look::After };
+        let h = self.system.switching(&self.past.at(t - self.delay, look, slack));
+        Blended { system: self.system, phi: self.transition.eval(h, self.eps) }
+    }
+}
+
+impl<P: PiecewiseSmooth<N>, const N: usize> Driven<N> for Weighted<'_, P, N> {
+    fn eval(&self, t: f64, x: &SVector<f64, N>) -> SVector<f64, N> {
+        self.at(t).eval(x)
+    }
+    fn jacobian(&self, t: f64, x: &SVector<f64, N>) -> SMatrix<f64, N, N> {
+        jacobian(&self.at(t), x)
+    }
+}
+
+impl<'a, P: PiecewiseSmooth<N> + Clone, M, const N: usize> Smooth<'a, P, M, N> {
+    pub(super) fn new(
+        delayed: &Delayed<'a, P, N>,
+        (transition, eps): (Transition, f64),
+        method: M,
+        tolerance: Tolerance,
+    ) -> Result<Self, DelayError> {
+        let Delayed { sides, switch: DelayedSwitch { delay, history, .. }, x0 } = delayed;
+        let mut smooth = Self {
+            sides: sides.clone(),
+            delay: *delay,
+            transition,
+            eps,
+            method,
+            past: Past::constant(*x0),
+            ends: Vec::new(),
+            passages: Passages::starting(sides.h(x0) > 0.0),
+            reached: (0.0, *x0),
+            t_end: 0.0,
+            max_step: f64::INFINITY,
+            end: None,
+        };
+        if *history == History::Flow {
+            smooth.look_back(tolerance)?;
+        }
+        for k in 1..=SEEN {
+            smooth.end_at(f64::from(k) * delay);
+        }
+        Ok(smooth)
+    }
+
+    /// Follows the orbit without delay backwards from the start for one delay.
+    fn look_back(&mut self, tolerance: Tolerance) -> Result<(), DelayError> {
+        let Self { sides, transition, eps, .. } = self;
+        let smoothed = Smoothed { system: sides.system.clone(), transition: *transition, eps: *eps };
+        let (mut dopri5, mut ends) = (Guarded::new(Dopri5::new(tolerance), tolerance), Vec::new());
+        let (past, mut passages) = (&mut self.past, self.passages);
+        let mut back = |step: &Step<'_, N>| {
+            past.put_before(step);
+            ends.extend(in_layer(sides, *eps, &mut passages, step));
+        };
+        let mut back = Each(&mut back);
+        let end = drive(&Backwards(&smoothed), self.reached.1, &Course::to(self.delay), &mut dopri5, &mut back, &());
+        if let Err(failure) = end {
+            return Err(DelayError::NoHistory { t: -self.delay, what: format!("cannot be followed ({failure})") });
+        }
+        ends.into_iter().for_each(|t| self.end_at(self.delay - t));
+        Ok(())
+    }
+}
+
+impl<P, M, const N: usize> Smooth<'_, P, M, N> {
+    /// A step will end at the time `t`.
+    fn end_at(&mut self, t: f64) {
+        let index = self.ends.partition_point(|end| *end < t);
+        self.ends.insert(index, t);
+    }
+}
+
+/// An observer that is a function.
+struct Each<'a, const N: usize>(&'a mut dyn FnMut(&Step<'_, N>));
+
+impl<const N: usize> Observer<N> for Each<'_, N> {
+    fn step(&mut self, step: &Step<'_, N>) -> Flow {
+        (self.0)(step);
+        Flow::Continue
+    }
+}
+
+/// When the orbit passes the surface in `step`, or comes nearest to it within the layer.
+fn in_layer<P: PiecewiseSmooth<N>, const N: usize>(
+    sides: &Sides<'_, P>,
+    eps: f64,
+    passages: &mut Passages,
+    step: &Step<'_, N>,
+) -> Vec<f64> {
+    let mut times: Vec<f64> = sides.passages(passages, step).iter().map(|p| step.time(p.theta)).collect();
+    let edge = LAYER * eps;
+    let (h0, h1) = (sides.h(&step.x0), sides.h(&step.x1));
+    let is_far = |i: usize| h0.abs().min(h1.abs()) - step.interpolant.reach(i) > edge;
+    if sides.plane.is_some_and(|i| (h0 > 0.0) == (h1 > 0.0) && is_far(i)) {
+        return times;
+    }
+    let fraction = |k: usize| k as f64 / LOOKS as f64;
+    let looks: [f64; LOOKS + 1] = std::array::from_fn(|k| sides.h(&step.at(fraction(k))));
+    for k in 1..LOOKS {
+        let [a, b, c] = [looks[k - 1], looks[k], looks[k + 1]].map(f64::abs);
+        let one_side = looks[k - 1] * looks[k] > 0.0 && looks[k] * looks[k + 1] > 0.0;
+        if one_side && b <= a && b <= c {
+            // The vertex of the parabola through the three.
+            let (slope, bend) = (0.5 * (c - a), c - 2.0 * b + a);
+            let shift = if bend > 0.0 { (-slope / bend).clamp(-1.0, 1.0) } else { 0.0 };
+            if b + 0.5 * slope * shift <= edge {
+                times.push(step.time(fraction(k) + shift / LOOKS as f64));
+            }
+        }
+    }
+    times
+}
+
+impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N>, const N: usize> Smooth<'_, P, M, N> {
+    fn advance(&mut self) -> Result<(), Failure> {
+        let t = self.reached.0;
+        while self.ends.first().is_some_and(|end| is_due(*end, t)) {
+            self.ends.remove(0);
+            self.end = None;
+        }
+        let next = self.ends.first().copied().filter(|end| self.t_end - end > ONE_TIME * self.t_end);
+        let end = next.unwrap_or(self.t_end);
+        let Self { sides, delay, transition, eps, past, method, .. } = self;
+        let field = Weighted { system: sides.system, transition: *transition, eps: *eps, delay: *delay, past, end };
+        if self.end != Some(end) {
+            let longest = self.max_step.min(LONGEST * *delay);
+            method.restart_driven(&field, t, self.reached.1, end, longest)?;
+            self.end = Some(end);
+        }
+        let step = method.step_driven(&field)?;
+        let times = in_layer(sides, *eps, &mut self.passages, &step);
+        self.reached = (step.t1, step.x1);
+        self.past.put(&step, step.t1 - 1.5 * self.delay);
+        times.into_iter().for_each(|t| self.end_at(t + self.delay));
+        Ok(())
+    }
+}
+
+impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N> + Redoable<N>, const N: usize> Stepper<N> for Smooth<'_, P, M, N> {
+    fn restart<F: VectorField<N>>(
+        &mut self,
+        _: &F,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
+        // The past stays: it is part of the equation's state, not of the method's. A jump of the state is one of the field a delay later, and of each next
+        // derivative at each next delay.
+        if t > 0.0 && x != self.reached.1 {
+            for k in 1..=SEEN + 1 {
+                self.end_at(t + f64::from(k) * self.delay);
+            }
+            self.passages = Passages::starting(self.sides.h(&x) > 0.0);
+        }
+        (self.reached, self.t_end, self.max_step, self.end) = ((t, x), t_end, max_step, None);
+        Ok(())
+    }
+
+    fn step<F: VectorField<N>>(&mut self, _: &F) -> Result<Step<'_, N>, Failure> {
+        let (t0, x0) = self.reached;
+        self.advance().map_err(|failure| self.sides.diagnosed(failure))?;
+        let (t1, x1) = self.reached;
+        Ok(Step { t0, t1, x0, x1, interpolant: self.method.last() })
+    }
+
+    fn statistics(&self) -> &Statistics {
+        self.method.statistics()
+    }
+}

@@ -1,0 +1,371 @@
+use nalgebra::{SVector, vector};
+
+use super::*;
+use crate::{Course, Flow, Kick, KickLaw, Observer, Schedule, StepCap, Stepper, Summary, drive};
+use twofold_system::{Bound, Caricature, Definition};
+
+/// Takes every step's end, and the passages through x\[coordinate\] = 0 with their senses.
+struct Seen<const N: usize> {
+    coordinate: usize,
+    passages: Passages,
+    crossings: Vec<(f64, SVector<f64, N>, bool)>,
+    ends: Vec<(f64, SVector<f64, N>)>,
+}
+
+impl<const N: usize> Observer<N> for Seen<N> {
+    fn step(&mut self, step: &Step<'_, N>) -> Flow {
+        let last = self.ends.last().map_or(0.0, |(t, _)| *t);
+        assert_eq!(last, step.t0, "steps follow each other");
+        for p in self.passages.through_plane(step, self.coordinate, 0.0) {
+            self.crossings.push((step.time(p.theta), step.at(p.theta), p.upward));
+        }
+        self.ends.push((step.t1, step.x1));
+        Flow::Continue
+    }
+}
+
+struct Run<const N: usize> {
+    course: Course,
+    coordinate: usize,
+    x0: SVector<f64, N>,
+}
+
+impl<const N: usize> WithStepper<N> for Run<N> {
+    type Answer = (Seen<N>, Summary<N>);
+    fn with<M: Stepper<N>>(self, mut stepper: M) -> Self::Answer {
+        let mut seen = Seen {
+            coordinate: self.coordinate,
+            passages: Passages::default(),
+            crossings: Vec::new(),
+            ends: Vec::new(),
+        };
+        let end = drive(&Own, self.x0, &self.course, &mut stepper, &mut seen, &()).unwrap();
+        assert_eq!(end.statistics.steps, seen.ends.len() as u64);
+        (seen, end)
+    }
+}
+
+fn system(text: &str) -> System {
+    System::new(Definition::from_toml(text, "").unwrap_or_else(|e| panic!("{e}")))
+}
+
+fn tolerance(size: f64) -> Tolerance {
+    Tolerance { rtol: size, atol: size }
+}
+
+#[derive(Clone, Copy)]
+struct How {
+    delay: f64,
+    smooth: Option<(Transition, f64)>,
+    history: History,
+    method: Method,
+    tolerance: f64,
+    course: Course,
+    coordinate: usize,
+}
+
+impl How {
+    fn sharp(delay: f64, t_end: f64) -> Self {
+        Self {
+            delay,
+            smooth: None,
+            history: History::Constant,
+            method: Method::Dopri5,
+            tolerance: 1e-10,
+            course: Course::to(t_end),
+            coordinate: 0,
+        }
+    }
+    fn run<const N: usize>(&self, data: &System, x0: [f64; N]) -> Result<(Seen<N>, Summary<N>), DelayError> {
+        let (bound, x0): (Bound<N>, _) = (data.bind().unwrap(), SVector::from(x0));
+        let sides = Sides::new(&bound, data);
+        let switch = DelayedSwitch { delay: self.delay, smooth: self.smooth, history: self.history };
+        let delayed = Delayed { sides, switch, x0 };
+        let run = Run { course: self.course, coordinate: self.coordinate, x0 };
+        delayed.with_stepper(self.method, None, tolerance(self.tolerance), run)
+    }
+}
+
+/// x' = -fall while x(t - delay) > 0, rise otherwise.
+fn relay(fall: f64, rise: f64) -> System {
+    system(&format!("states = ['x']\nh = 'x'\nplus = ['-{fall}']\nminus = ['{rise}']"))
+}
+
+const SHARP: [(Method, f64); 3] = [(Method::Dopri5, 1e-10), (Method::Taylor, 1e-14), (Method::TaylorExtended, 1e-30)];
+
+/// A relay with a delay of 1: from 0.3 it falls to -1 and swings between -1 and 1 with period 4.
+#[test]
+fn a_relay_swings_with_four_delays() {
+    let wave = |t: f64| if t < 1.3 { 0.3 - t } else { 1.0 - ((t - 1.3).rem_euclid(4.0) - 2.0).abs() };
+    for (method, tolerance) in SHARP {
+        let how = How { method, tolerance, ..How::sharp(1.0, 21.0) };
+        let (seen, end) = how.run(&relay(1.0, 1.0), [0.3]).unwrap();
+        for (t, x) in &seen.ends {
+            assert!((x[0] - wave(*t)).abs() < 1e-13, "{method:?}: {x} at {t}, not {}", wave(*t));
+        }
+        assert_eq!(seen.crossings.len(), 11);
+        for (k, (t, _, upward)) in seen.crossings.iter().enumerate() {
+            assert!((t - 0.3 - 2.0 * k as f64).abs() < 1e-13 && *upward == (k % 2 == 1), "{method:?}: {t}");
+        }
+        assert_eq!(end.t, 21.0);
+    }
+}
+
+/// The chatter of sliding: x overshoots by what each field does in one delay, and one period is delay (2 + fall/rise + rise/fall).
+#[test]
+fn chatter_has_its_period_and_its_overshoot() {
+    let (fall, rise, delay) = (0.7, 1.9, 1e-3);
+    let (seen, _) = How::sharp(delay, 0.1).run(&relay(fall, rise), [0.0]).unwrap();
+    let up: Vec<f64> = seen.crossings.iter().filter(|c| c.2 && c.0 > 0.01).map(|c| c.0).collect();
+    assert!(up.len() > 15);
+    let period = delay * (2.0 + fall / rise + rise / fall);
+    for pair in up.windows(2) {
+        assert!((pair[1] - pair[0] - period).abs() < 1e-14, "{pair:?} {period}");
+    }
+    let x = seen.ends.iter().filter(|(t, _)| *t > 0.01).map(|(_, x)| x[0]);
+    let (low, high) = x.fold((0.0_f64, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
+    assert!((high - rise * delay).abs() < 1e-15 && (low + fall * delay).abs() < 1e-15, "{low} {high}");
+}
+
+/// A switch that turns seven times within one delay: h = cos(2 pi t) decides of x' = +-1 three and a half units of time later.
+#[test]
+fn passages_wait_in_line() {
+    let pi = std::f64::consts::PI;
+    let data = system(&format!(
+        "states = ['c', 's', 'x']\nh = 'c'\nplus = ['-w*s', 'w*c', '1']\nminus = ['-w*s', 'w*c', '-1']\n\
+         [parameters]\nw = {}",
+        2.0 * pi
+    ));
+    let wanted = |t: f64| {
+        // Before the delay has passed h is 1; then the integral of the sign of cos(2 pi s).
+        let s = t - 3.5;
+        let whole = (4.0 * s.max(0.0)).floor();
+        let sign = |quarter: f64| if matches!(quarter.rem_euclid(4.0) as u8, 0 | 3) { 1.0 } else { -1.0 };
+        let quarters: f64 = (0..whole as u32).map(|k| 0.25 * sign(f64::from(k))).sum();
+        t.min(3.5) + quarters + sign(whole) * (s.max(0.0) - 0.25 * whole)
+    };
+    for (method, tolerance) in SHARP {
+        let how = How { method, tolerance, ..How::sharp(3.5, 9.0) };
+        let (seen, _) = how.run(&data, [1.0, 0.0, 0.0]).unwrap();
+        let worst = seen.ends.iter().fold(0.0_f64, |a, (t, x)| a.max((x[2] - wanted(*t)).abs()));
+        assert!(worst < 1e-8, "{method:?}: {worst}");
+    }
+}
+
+/// The start's own zero: on the surface the switch is f-'s, and an orbit that leaves to the other side has passed it at once.
+#[test]
+fn a_start_on_the_surface_counts_as_not_above() {
+    let (seen, end) = How::sharp(0.5, 0.75).run(&relay(1.0, 1.0), [0.0]).unwrap();
+    assert!(seen.ends.iter().any(|(t, x)| *t == 0.5 && (x[0] - 0.5).abs() < 1e-15));
+    assert!((end.x[0] - 0.25).abs() < 1e-15);
+    let (_, end) = How::sharp(0.5, 0.75).run(&relay(1.0, -1.0), [0.0]).unwrap();
+    assert!((end.x[0] + 0.75).abs() < 1e-15);
+}
+
+#[test]
+fn a_kick_moves_the_switch_one_delay_later_and_a_restart_does_nothing() {
+    let kick = |size: f64| Kick { every: 1.0, size, law: KickLaw::Sphere, seed: 3, stream: 0 };
+    let course = |schedule| Course { schedule, kicked_states: 1, ..Course::to(1.75) };
+    let run =
+        |schedule| How { course: course(schedule), ..How::sharp(0.5, 1.75) }.run(&relay(1.0, 1.0), [2.0]).unwrap();
+    let (_, plain) = run(Schedule::default());
+    assert!((plain.x[0] - 0.25).abs() < 1e-14);
+    let (_, restarted) = run(Schedule { restart_every: Some(0.6), kick: None });
+    assert!((restarted.x[0] - 0.25).abs() < 1e-14);
+    // From 1 to 1 +- 3; below zero the switch turns at 1.5 and the last quarter is gone upwards.
+    let (_, kicked) = run(Schedule { restart_every: None, kick: Some(kick(3.0)) });
+    let ends = [1.0 + 3.0 - 0.75, 1.0 - 3.0 - 0.5 + 0.25];
+    assert!(ends.iter().any(|end| (kicked.x[0] - end).abs() < 1e-14), "{}", kicked.x);
+    let seeds =
+        (0..20).map(|seed| run(Schedule { restart_every: None, kick: Some(Kick { seed, ..kick(3.0) }) }).1.x[0]);
+    let below: Vec<f64> = seeds.filter(|x| *x < 0.0).collect();
+    assert!(!below.is_empty() && below.iter().all(|x| (x - ends[1]).abs() < 1e-14), "{below:?}");
+}
+
+/// From f- = 2 to f+ = 1 at 0: the orbit was at the surface 0.05 before the start.
+#[test]
+fn a_history_on_the_flow_has_its_switches() {
+    let through = system("states = ['x']\nh = 'x'\nplus = ['1']\nminus = ['2']");
+    for (method, tolerance) in SHARP {
+        let how = How { method, tolerance, history: History::Flow, ..How::sharp(0.1, 1.0) };
+        let (seen, end) = how.run(&through, [0.05]).unwrap();
+        assert!(
+            seen.ends.iter().any(|(t, _)| (t - 0.05).abs() < 1e-15) && (end.x[0] - 1.1).abs() < 1e-14,
+            "{method:?}: {}",
+            end.x
+        );
+        // Never at the surface.
+        let (_, far) = how.run(&through, [0.2]).unwrap();
+        assert!((far.x[0] - 1.2).abs() < 1e-14);
+        // It comes from a surface that pushes away on both sides: from which?
+        let away = system("states = ['x']\nh = 'x'\nplus = ['1']\nminus = ['-1']");
+        for x0 in [0.05, 0.0] {
+            let Err(DelayError::NoHistory { t, .. }) = how.run(&away, [x0]) else { panic!("{x0}") };
+            assert!((t + x0).abs() < 1e-12, "{t}");
+        }
+    }
+    // Smoothed widely enough the orbit without delay goes through the layer: x' = 2 - phi, once more from the start.
+    let layer = Some((Transition::Tanh, 0.01));
+    let how = How { smooth: layer, history: History::Flow, tolerance: 1e-12, ..How::sharp(0.1, 0.3) };
+    let (_, end) = how.run(&through, [0.05]).unwrap();
+    // By the midpoint rule: backwards, then x(0.1) = 0.05 + integral of 2 - phi(x(s - 0.1)).
+    let phi = |x: f64| 0.5 * (1.0 + (x / 0.01).tanh());
+    let mut past = vec![0.05];
+    let n = 20_000;
+    let h = 0.1 / f64::from(n);
+    for _ in 0..n {
+        let x: f64 = past[past.len() - 1];
+        let middle = x - 0.5 * h * (2.0 - phi(x));
+        past.push(x - h * (2.0 - phi(middle)));
+    }
+    let first = 0.05 + past.windows(2).map(|w| h * (2.0 - phi(0.5 * (w[0] + w[1])))).sum::<f64>();
+    // The rest is far above the layer: x' = 1.
+    assert!((end.x[0] - (first + 0.2)).abs() < 1e-6, "{} {first}", end.x);
+}
+
+/// x' = -x(t - 1) from the constant 1: on [k - 1, k] a polynomial of degree k (Bellman 1961): sum over j of (-1)^j (t - j + 1)^j / j!, j <= k.
+/// As a switch: phi = (1 + x/9)/2 where h = x/sqrt(81 - x^2) and phi(h) is the algebraic transition of width 1, f+- = -+9.
+fn linear() -> System {
+    system("states = ['x']\nh = 'x/sqrt(81 - x*x)'\nplus = ['-9']\nminus = ['9']")
+}
+
+fn bellman(t: f64) -> f64 {
+    let (mut sum, mut factorial) = (1.0, 1.0);
+    for j in 1..40 {
+        let base = t - f64::from(j) + 1.0;
+        if base <= 0.0 {
+            break;
+        }
+        factorial *= f64::from(j);
+        sum += (0..j).fold(1.0, |power, _| power * -base) / factorial;
+    }
+    sum
+}
+
+const SMOOTH: How = How {
+    delay: 1.0,
+    smooth: Some((Transition::Algebraic, 1.0)),
+    history: History::Constant,
+    method: Method::Dopri5,
+    tolerance: 1e-10,
+    course: Course {
+        t_end: 12.0,
+        schedule: Schedule { restart_every: None, kick: None },
+        step_cap: StepCap::None,
+        max_steps: u64::MAX,
+        kicked_states: 1,
+    },
+    coordinate: 0,
+};
+
+#[test]
+fn a_linear_delay_equation_is_its_polynomials() {
+    for (method, tolerance, allowed) in
+        [(Method::Dopri5, 1e-10, 1e-9), (Method::Radau5, 1e-10, 1e-8), (Method::Dopri5, 1e-6, 1e-5)]
+    {
+        let (seen, end) = How { method, tolerance, ..SMOOTH }.run(&linear(), [1.0]).unwrap();
+        let worst = seen.ends.iter().fold(0.0_f64, |a, (t, x)| a.max((x[0] - bellman(*t)).abs()));
+        assert!(worst < allowed, "{method:?} {tolerance}: {worst}");
+        assert_eq!(end.t, 12.0);
+        // The jumps that arrive end steps.
+        for k in 1..=5 {
+            assert!(seen.ends.iter().any(|(t, _)| *t == f64::from(k)), "{k}");
+        }
+    }
+}
+
+/// With equal steps: the error falls with their fifth power, at the ends as between.
+#[test]
+fn the_smooth_rule_keeps_the_methods_order() {
+    let oscillating = system("states = ['x', 'v']\nh = 'x'\nplus = ['v', '-1 - x']\nminus = ['v', '1 - x']");
+    let end = |method: Method, steps: u32, tolerance: f64| {
+        let cap = 0.7 / f64::from(steps);
+        let course = Course { step_cap: StepCap::Absolute(cap), kicked_states: 2, ..Course::to(7.0) };
+        let how = How { delay: 0.7, smooth: Some((Transition::Tanh, 1.0)), method, tolerance, course, ..SMOOTH };
+        how.run(&oscillating, [0.9, 0.2]).unwrap().1.x
+    };
+    let exact = end(Method::Dopri5, 64, 1e-13);
+    for (method, order) in [(Method::Dopri5, 5.0), (Method::Radau5, 4.0)] {
+        let errors = [4, 8, 16].map(|n| (end(method, n, 1e3) - exact).amax());
+        let orders = [0, 1].map(|i| (errors[i] / errors[i + 1]).log2());
+        assert!(orders.iter().all(|found| *found > order - 0.5), "{method:?}: {errors:?} {orders:?}");
+    }
+}
+
+/// Steps are remembered for one delay and a half at most.
+#[test]
+fn the_past_is_one_delay() {
+    let mut past = past::Past::constant(vector![0.0]);
+    let bound: Bound<1> = linear().bind().unwrap();
+    let mut dopri5 = Dopri5::new(tolerance(1e-8));
+    let field = twofold_system::Blended { system: &bound, phi: 0.0 };
+    dopri5.restart(&field, 0.0, vector![0.0], 100.0, 0.1).unwrap();
+    let mut t = 0.0;
+    while t < 50.0 {
+        let step = dopri5.step(&field).unwrap();
+        t = step.t1;
+        past.put(&step, t - 1.5);
+        assert!(past.len() <= 18);
+        let look = |t: f64| past.at(t, past::Look::After, 1e-12)[0];
+        assert!((look(t - 0.73) - 9.0 * (t - 0.73).max(0.0)).abs() < 1e-9);
+    }
+}
+
+const START: [f64; 3] = [0.2, 0.0, -1.0];
+
+/// The first rows of references in 113-bit arithmetic by an independent program: `tests/data/delay-sharp.csv` has all of them.
+#[test]
+fn the_caricature_follows_an_independent_program() {
+    let rows = [(1.170_311_546_805_946, -0.720_921_494_588_762_4), (4.706_130_432_412_76, 1.542_515_130_537_061_6)];
+    let data = System::from(Caricature::with_reinjection(1e-1, 1e-5));
+    for (method, tolerance) in SHARP {
+        let how = How { method, tolerance, coordinate: 1, ..How::sharp(1e-3, 5.0) };
+        let (seen, _) = how.run(&data, START).unwrap();
+        let found: Vec<_> = seen.crossings.iter().map(|c| (c.0, c.1[0])).collect();
+        assert_eq!(found.len(), 2);
+        for (a, b) in found.iter().zip(rows) {
+            let allowed = if method == Method::Dopri5 { 1e-8 } else { 1e-13 };
+            assert!((a.0 - b.0).abs() < allowed && (a.1 - b.1).abs() < allowed, "{method:?}: {a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn without_delay_the_rules_are_those_without_it() {
+    let data = System::from(Caricature::with_reinjection(1e-1, 1e-5));
+    let at = |how: How| how.run(&data, START).unwrap().1.x;
+    // Filippov's sliding motion at t = 3 is what is left of the chatter's mean: the distance falls with the delay.
+    let sharp = |delay| at(How { tolerance: 1e-9, ..How::sharp(delay, 3.0) });
+    let [a, b, c] = [4e-2, 2e-2, 1e-2].map(sharp);
+    let ratio = (a - b).norm() / (b - c).norm();
+    assert!((b - c).norm() < 0.05 && ratio > 1.3, "{ratio} {a} {b} {c}");
+    // The smooth rule with a delay far below eps is smoothing.
+    let layer = Some((Transition::Tanh, 0.05));
+    let smooth = |delay| at(How { smooth: layer, tolerance: 1e-9, ..How::sharp(delay, 3.0) });
+    let field = twofold_system::Smoothed {
+        system: Caricature::with_reinjection(1e-1, 1e-5),
+        transition: Transition::Tanh,
+        eps: 0.05,
+    };
+    let mut dopri5 = Dopri5::new(tolerance(1e-11));
+    let limit = drive(&field, START.into(), &Course::to(3.0), &mut dopri5, &mut crate::Ignore, &()).unwrap().x;
+    let errors = [4e-3, 2e-3, 1e-3].map(|delay| (smooth(delay) - limit).norm());
+    assert!(errors[2] < 0.01 && errors.windows(2).all(|e| (e[0] / e[1] - 2.0).abs() < 0.5), "{errors:?}");
+}
+
+#[test]
+fn methods_that_cannot_say_what_can() {
+    for (smooth, able) in [(None, &SHARP_METHODS[..]), (SMOOTH.smooth, &SMOOTH_METHODS[..])] {
+        for method in Method::ALL {
+            let found = How { smooth, method, tolerance: 1e-6, ..SMOOTH }.run(&linear(), [1.0]);
+            match found {
+                Ok(_) => assert!(able.contains(&method)),
+                Err(error) => {
+                    let said = error.to_string();
+                    assert!(!able.contains(&method) && said.contains(method.name()), "{said}");
+                    assert!(able.iter().all(|m| said.contains(m.name())), "{said}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! The delayed switch against programs that share nothing with this one but the equations.
+
+use std::process::Command;
+
+use twofold::analyse::{Crossing, Direction};
+use twofold::integrate::delay::History;
+use twofold::integrate::{Kick, KickLaw, Schedule, StepCap, Tolerance};
+use twofold::job::recording::Data;
+use twofold::job::simulate::simulate;
+use twofold::job::spec::*;
+use twofold::job::{Desk, Run};
+use twofold::system::{Caricature, Transition};
+
+fn spec(alpha: f64, switch: SwitchSpec, method: Method, tolerance: f64, t_end: f64) -> RunSpec {
+    RunSpec {
+        system: Caricature::with_reinjection(alpha, 1e-5).into(),
+        switch,
+        start: vec![0.2, 0.0, -1.0],
+        t_end,
+        method: MethodSpec {
+            name: method,
+            tolerance: Tolerance { rtol: tolerance, atol: tolerance },
+            step_cap: StepCap::None,
+            max_steps: 1_000_000,
+            precision: None,
+            order: None,
+        },
+        schedule: Schedule::default(),
+        observe: Observation::Section { coordinate: 1, value: 0.0 },
+    }
+}
+
+fn crossings(spec: &RunSpec) -> Vec<Crossing> {
+    match simulate(spec, &()).unwrap().data {
+        Data::Section(crossings) => crossings,
+        _ => unreachable!("a section was asked for"),
+    }
+}
+
+fn numbers(text: &str) -> impl Iterator<Item = Vec<&str>> {
+    text.lines().filter(|l| l.starts_with(|c: char| c.is_ascii_digit())).map(|l| l.split(',').collect())
+}
+
+/// The distance of the first `rows` crossings from a reference's, by time, x and z, the largest.
+fn apart(found: &[Crossing], reference: &str, rows: usize) -> f64 {
+    let mut worst = 0.0_f64;
+    assert!(found.len() >= rows, "{} crossings", found.len());
+    for (c, row) in found.iter().zip(numbers(reference).take(rows)) {
+        let n = |i: usize| row[i].parse::<f64>().unwrap();
+        assert_eq!(c.direction == Direction::Up, row[3] == "up");
+        for (a, b) in [(c.t, n(0)), (c.x[0], n(1)), (c.x[2], n(2))] {
+            worst = worst.max((a - b).abs() / b.abs().max(1.0));
+        }
+    }
+    worst
+}
+
+const RECONSTRUCTED: &str = include_str!("../data/delay-sharp-reconstructed.csv");
+const PRINTED: &str = include_str!("../data/delay-sharp-printed.csv");
+
+/// Before the two-fold: a method is as far from 113 bits as its tolerance says.
+#[test]
+fn crossings_before_the_two_fold_are_those_of_113_bits() {
+    for (alpha, text, rows, t_end) in [(1e-1, RECONSTRUCTED, 2, 5.0), (1e-3, PRINTED, 4, 30.0)] {
+        for (method, tolerance, allowed) in
+            [(Method::Dopri5, 1e-9, 1e-7), (Method::Dopri5, 1e-12, 1e-10), (Method::Taylor, 1e-16, 1e-12)]
+        {
+            let found = crossings(&spec(alpha, SwitchSpec::delayed(1e-3), method, tolerance, t_end));
+            let worst = apart(&found, text, rows);
+            assert!(worst < allowed, "{method:?} {tolerance}: {worst:e}");
+        }
+    }
+}
+
+/// Through the two-fold and out again, in double-double arithmetic: all rows to 13.4, after 2,900 switches, to the rounding of the section's f64.
+#[test]
+fn double_double_follows_113_bits_through_the_two_fold() {
+    let found = crossings(&spec(1e-1, SwitchSpec::delayed(1e-3), Method::TaylorExtended, 1e-30, 13.4));
+    let worst = apart(&found, RECONSTRUCTED, 9);
+    assert!(found.len() == 9 && worst < 1e-14, "{worst:e}");
+}
+
+/// SciPy's DOP853 as a method of steps (scripts/delay_reference.py). The orbit magnifies an error by some 10^3 until t = 12, as the reference's own
+/// uncertainty shows.
+#[test]
+fn the_smooth_rule_agrees_with_scipy() {
+    let rows: Vec<Vec<f64>> = numbers(include_str!("../data/delay-smooth.csv"))
+        .map(|row| row.iter().map(|cell| cell.parse().unwrap()).collect())
+        .collect();
+    assert_eq!(rows.len(), 24);
+    for case in rows.chunks(12) {
+        let (delay, eps) = (case[0][0], Some(case[0][1]));
+        let (transition, history) = (Some(Transition::Tanh), History::Constant);
+        let switch = SwitchSpec::Delayed { delay, eps, transition, history };
+        for (method, tolerance, allowed) in
+            [(Method::Dopri5, 1e-8, 1e-5), (Method::Dopri5, 1e-11, 1e-8), (Method::Radau5, 1e-9, 1e-6)]
+        {
+            let observe = Observation::Times { every: 1.0 };
+            let run = RunSpec { observe, ..spec(1e-1, switch, method, tolerance, 12.0) };
+            let Data::Path(found) = simulate(&run, &()).unwrap().data else { unreachable!("times were asked for") };
+            for (sample, row) in found[1..].iter().zip(case) {
+                let worst = (0..3).map(|i| (sample.x[i] - row[3 + i]).abs()).fold(0.0, f64::max);
+                assert!(worst < allowed + row[6], "{delay} {method:?} {tolerance} at {}: {worst:e}", sample.t);
+            }
+        }
+    }
+}
+
+/// The same bytes however the run is asked for and whatever looks on; the answer names the history.
+#[test]
+fn an_answer_is_its_questions() {
+    let run = spec(1e-1, SwitchSpec::delayed(1e-2), Method::Dopri5, 1e-9, 12.0);
+    let answer = Desk::quiet().ask(&Run(run.clone())).unwrap();
+    assert_eq!(answer.fact::<String>("history").unwrap(), "constant");
+    let json = serde_json::to_value(&run).unwrap();
+    assert_eq!(json["switch"], serde_json::json!({ "delayed": { "delay": 1e-2, "history": "constant" } }));
+    let again: RunSpec = serde_json::from_value(json).unwrap();
+    assert_eq!(*Desk::quiet().ask(&Run(again)).unwrap(), *answer);
+    // A question without a delay has no word of one.
+    let smoothed = serde_json::to_string(&spec(1e-1, SwitchSpec::tanh(1e-3), Method::Dopri5, 1e-9, 12.0)).unwrap();
+    assert!(!smoothed.contains("delay") && !smoothed.contains("history"));
+}
+
+/// Kicks and restarts; those that are asked for before the switch has seen the start are refused.
+#[test]
+fn kicks_and_restarts_are_as_with_other_switches() {
+    for switch in [
+        SwitchSpec::delayed(1e-2),
+        SwitchSpec::Delayed {
+            delay: 1e-2,
+            eps: Some(1e-2),
+            transition: Some(Transition::Tanh),
+            history: History::Flow,
+        },
+    ] {
+        let plain = spec(1e-1, switch, Method::Dopri5, 1e-11, 6.0);
+        let schedule = Schedule { restart_every: Some(0.37), kick: None };
+        let (a, b) = (simulate(&plain, &()).unwrap(), simulate(&RunSpec { schedule, ..plain.clone() }, &()).unwrap());
+        assert!((0..3).all(|i| (a.x[i] - b.x[i]).abs() < 1e-8), "{:?} {:?}", a.x, b.x);
+        let kick = Kick { every: 0.3, size: 1e-2, law: KickLaw::Sphere, seed: 1, stream: 0 };
+        let kicked = RunSpec { schedule: Schedule { restart_every: None, kick: Some(kick) }, ..plain.clone() };
+        let c = simulate(&kicked, &()).unwrap();
+        assert!((0..3).any(|i| (a.x[i] - c.x[i]).abs() > 1e-3) && c.x.iter().all(|x| x.abs() < 5.0), "{:?}", c.x);
+    }
+}
+
+/// While it slides at t = 9, without a choice before: the mean of the chatter is Filippov's motion, up to the delay's first power.
+#[test]
+fn the_chatters_mean_tends_to_filippovs_motion() {
+    let at = |switch, tolerance| simulate(&spec(1e-1, switch, Method::Dopri5, tolerance, 9.0), &()).unwrap().x;
+    let exit = twofold::integrate::filippov::ExitRule::Undecided;
+    let limit = at(SwitchSpec::Filippov { exit, funnel: None }, 1e-11);
+    let apart = [4e-3, 2e-3, 1e-3, 5e-4].map(|delay| {
+        let x = at(SwitchSpec::delayed(delay), 1e-9);
+        assert!(x[0].abs() < delay, "the surface is not far: {x:?}");
+        x[1] - limit[1]
+    });
+    assert!(apart[3] < 5e-3 && apart.windows(2).all(|e| (e[0] / e[1] - 2.0).abs() < 0.2), "{apart:?}");
+}
+
+/// What is wrong is said before anything is computed, with exit code 2.
+#[test]
+fn wrong_questions_are_refused() {
+    let told = |arguments: &str| {
+        let base = ["run", "--switch", "delayed", "--t-end", "1", "--out", "-"];
+        let output = Command::new(env!("CARGO_BIN_EXE_twofold"))
+            .args(base.iter().copied().chain(arguments.split_whitespace()))
+            .output()
+            .unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    for (arguments, word) in [
+        ("", "--delay"),
+        ("--delay 0", "above zero"),
+        ("--delay -1", "above zero"),
+        ("--delay inf", "finite"),
+        ("--delay nan", "finite"),
+        ("--delay 1", "below the end time"),
+        ("--delay 0.1 --method lsoda", "dopri5, taylor or taylor-extended"),
+        ("--delay 0.1 --method layered", "dopri5, taylor or taylor-extended"),
+        ("--delay 0.1 --eps 0.1 --method taylor", "dopri5 or radau5"),
+        ("--delay 0.1 --eps 0", "above zero"),
+        ("--delay 0.1 --transition erf", "--eps"),
+        ("--delay 0.1 --restart 0.1", "longer than the delay"),
+        ("--delay 0.1 --kick-every 0.05 --kick-size 0.1", "longer than the delay"),
+        ("--delay 0.1 --method taylor-extended --precision 192", "106"),
+        ("--delay 0.5 --history flow --start=0.2,-1,-1", "constant history"),
+        ("--delay 0.1 --system relay-square --start=1,1", "one switching surface"),
+    ] {
+        let (code, said) = told(arguments);
+        assert!(code == Some(2) && said.contains(word), "{arguments}: {code:?} {said}");
+    }
+    assert_eq!(told("--delay 0.1").0, Some(0));
+}
