@@ -65,9 +65,7 @@ pub enum DelayError {
         instead: &'static str,
     },
     /// The orbit without delay cannot be followed backwards for one delay.
-    #[error(
-        "no single orbit leads to the start: followed backwards it {what} at t = {t}; take the constant history, or another start"
-    )]
+    #[error("no single orbit leads to the start: followed backwards it {what} at t = {t}")]
     NoHistory {
         /// When; not above zero.
         t: f64,
