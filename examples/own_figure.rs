@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use twofold::cli::{CliError, make};
 use twofold::integrate::Schedule;
-use twofold::job::Desk;
+use twofold::job::Executor;
 use twofold::job::spec::*;
 use twofold::paper::{Figure, Panel, Picture, Reading, View};
 
@@ -42,7 +42,7 @@ pub fn figure() -> Figure {
 
 fn main() -> Result<(), CliError> {
     let out = std::env::args_os().nth(1).map_or_else(|| PathBuf::from("target/own"), PathBuf::from);
-    for record in make(&[figure()], &out, &Desk::quiet())? {
+    for record in make(&[figure()], &out, &Executor::quiet())? {
         println!(
             "{}: data {}, pixels {}",
             record.hashes.name,

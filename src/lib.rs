@@ -33,7 +33,7 @@
 //! # In five lines
 //!
 //! ```
-//! use twofold::job::{Desk, Run, spec::*};
+//! use twofold::job::{Executor, Run, spec::*};
 //! use twofold::system::Caricature;
 //! let run = RunSpec {
 //!     system: Caricature::with_reinjection(1e-1, 1e-5).into(),
@@ -44,7 +44,7 @@
 //!     schedule: Default::default(),
 //!     observe: Observation::Section { coordinate: 1, value: 0.0 },
 //! };
-//! let answer = Desk::quiet().ask(&Run(run))?;
+//! let answer = Executor::quiet().ask(&Run(run))?;
 //! assert!(answer.table("section").is_some_and(|section| section.len() >= 3));
 //! # Ok::<(), twofold::job::JobError>(())
 //! ```
@@ -70,10 +70,10 @@ pub use twofold_verify as verify;
 /// What speaks of a paper: readings, claims, verdicts; and this paper's figures as data.
 ///
 /// ```
-/// use twofold::job::Desk;
+/// use twofold::job::Executor;
 /// use twofold::paper::{figures, pipeline};
 /// let figure = figures::all().into_iter().find(|f| f.id == "fig1").expect("the first figure");
-/// let picture = pipeline::compute(&figure.pictures[0], &Desk::quiet())?;
+/// let picture = pipeline::compute(&figure.pictures[0], &Executor::quiet())?;
 /// assert!(picture.rendered.svg.starts_with(b"<?xml") || picture.rendered.svg.starts_with(b"<svg"));
 /// // The committed reference holds the same hashes.
 /// let reference = figures::reference("fig1").expect("every figure has one");

@@ -13,7 +13,7 @@ use twofold::job::question::question_hash;
 use twofold::job::spec::{RunSpec, SwitchSpec};
 use twofold::job::sweep::{Axis, Draws, Fate, Outcome, Rows, Shard, Sweep};
 use twofold::job::table::Cells;
-use twofold::job::{Answer, Classification, Desk, JobError, Question, Run, Stop, Table, encode};
+use twofold::job::{Answer, Classification, Executor, JobError, Question, Run, Stop, Table, encode};
 
 use crate::errors;
 use crate::supervise::{Work, supervise};
@@ -25,9 +25,9 @@ fn spec(text: &str) -> PyResult<RunSpec> {
     Ok(spec)
 }
 
-/// The answer to a run, moved out of the desk that asked.
+/// The answer to a run, moved out of the executor that asked.
 fn ask(run: RunSpec, work: &Work) -> Result<Answer, JobError> {
-    let answer = Desk::new(None, work).ask(&Run(run))?;
+    let answer = Executor::new(None, work).ask(&Run(run))?;
     let answer = Arc::try_unwrap(answer).unwrap_or_else(|shared| (*shared).clone());
     if answer.stop == Stop::Interrupted { Err(JobError::Interrupted) } else { Ok(answer) }
 }
@@ -101,7 +101,7 @@ pub fn written(py: Python<'_>, text: &str, format: &str, show: Option<&Bound<'_,
 pub fn classify(py: Python<'_>, text: &str, show: Option<&Bound<'_, PyAny>>) -> PyResult<String> {
     let spec = spec(text)?;
     supervise(py, show, move |work| {
-        let evidence = Classification::of(spec).ask(&Desk::new(None, work))?;
+        let evidence = Classification::of(spec).ask(&Executor::new(None, work))?;
         Ok(json!(evidence).to_string())
     })
 }
@@ -187,7 +187,7 @@ fn fate(spec: &RunSpec, k: usize, start: Vec<f64>, work: &Work) -> Result<Value,
     if let SwitchSpec::Filippov { exit: ExitRule::Random { stream, .. }, .. } = &mut run.switch {
         *stream = stream.wrapping_add(more);
     }
-    let answer = Desk::new(None, work).ask(&Fate(Classification::of(run)));
+    let answer = Executor::new(None, work).ask(&Fate(Classification::of(run)));
     match answer.and_then(|a| Ok(a.fact::<Outcome>("outcome")?)) {
         Ok(outcome) => Ok(json!({ "outcome": outcome })),
         Err(JobError::Interrupted) => Err(JobError::Interrupted),

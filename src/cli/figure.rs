@@ -13,7 +13,7 @@ use super::words::{Method, Readings};
 use super::{CliError, Exit, LONG_VERSION, in_pool, interrupt};
 use crate::integrate::filippov::ExitRule;
 use crate::job::spec::{RunSpec, SwitchSpec};
-use crate::job::{Desk, Store};
+use crate::job::{Executor, Store};
 use crate::paper::pipeline::{Computed, PictureRecord, PipelineError, compute_with_tables, questions};
 use crate::paper::standing::{Standing, Stands};
 use crate::paper::{Alterations, Figure, Panel, Picture, View, figures};
@@ -152,8 +152,8 @@ pub fn run(figures: Vec<Figure>, arguments: &FigureFlags) -> Result<(), CliError
             recompute(figures::data(figure.id), &arguments.out.join(figure.id), arguments.threads, &progress)?;
         }
     }
-    let desk = Desk::new(arguments.store.store(), &progress);
-    let made = in_pool(arguments.threads, || make_what_is_missing(&figures, &arguments.out, &desk))??;
+    let executor = Executor::new(arguments.store.store(), &progress);
+    let made = in_pool(arguments.threads, || make_what_is_missing(&figures, &arguments.out, &executor))??;
     say_how(&figures, &made, arguments, &progress)?;
     if arguments.json {
         print_json(&made.into_iter().map(|m| m.record).collect::<Vec<_>>())?;
@@ -162,15 +162,15 @@ pub fn run(figures: Vec<Figure>, arguments: &FigureFlags) -> Result<(), CliError
 }
 
 /// Makes these figures, each in a folder of its own under `out`: all their questions first, side by side, the longest first; then the
-/// pictures. Answers that the desk's store keeps are not lost if this is killed. What this program has made in `out` before and nobody has changed since stands,
+/// pictures. Answers that the executor's store keeps are not lost if this is killed. What this program has made in `out` before and nobody has changed since stands,
 /// if there is a store to know it by.
 ///
 /// # Errors
 ///
 /// If a computation or a drawing failed, a file could not be written, or what was written has been removed by the time that all is done;
 /// what could be made is there all the same.
-pub fn make(figures: &[Figure], out: &Path, desk: &Desk<'_>) -> Result<Vec<PictureRecord>, CliError> {
-    Ok(make_what_is_missing(figures, out, desk)?.into_iter().map(|made| made.record).collect())
+pub fn make(figures: &[Figure], out: &Path, executor: &Executor<'_>) -> Result<Vec<PictureRecord>, CliError> {
+    Ok(make_what_is_missing(figures, out, executor)?.into_iter().map(|made| made.record).collect())
 }
 
 /// A picture that is there.
@@ -181,14 +181,14 @@ struct Made {
     anew: bool,
 }
 
-fn make_what_is_missing(figures: &[Figure], out: &Path, desk: &Desk<'_>) -> Result<Vec<Made>, CliError> {
+fn make_what_is_missing(figures: &[Figure], out: &Path, executor: &Executor<'_>) -> Result<Vec<Made>, CliError> {
     let pictures: Vec<(PathBuf, &Picture)> =
         figures.iter().flat_map(|f| f.pictures.iter().map(|p| (out.join(f.id), p))).collect();
-    let standing = desk.store().and_then(Standing::of);
+    let standing = executor.store().and_then(Standing::of);
     let found = |(folder, picture): &(PathBuf, &Picture)| standing.as_ref().and_then(|s| s.find(picture, folder));
     let standing_there: Vec<Option<Stands>> = pictures.par_iter().with_max_len(1).map(found).collect();
     let missing = pictures.iter().zip(&standing_there).filter(|(_, stands)| stands.is_none());
-    desk.gather(&questions(missing.map(|((_, picture), _)| *picture)));
+    executor.gather(&questions(missing.map(|((_, picture), _)| *picture)));
     // One by one: in larger portions a thread would be left with several while others have none.
     let results: Vec<Result<(Made, Vec<Written>), CliError>> = pictures
         .par_iter()
@@ -197,7 +197,7 @@ fn make_what_is_missing(figures: &[Figure], out: &Path, desk: &Desk<'_>) -> Resu
         .map(|((folder, picture), stands)| {
             let png = folder.join(format!("{}.png", picture.name));
             if let Some(Stands { record, files }) = stands {
-                desk.progress().line(&format!("stands {}", png.display()));
+                executor.progress().line(&format!("stands {}", png.display()));
                 return Ok((Made { record, anew: false }, files));
             }
             let mut written = Vec::new();
@@ -205,16 +205,16 @@ fn make_what_is_missing(figures: &[Figure], out: &Path, desk: &Desk<'_>) -> Resu
                 written.push(put(folder, file, bytes)?);
                 Ok(())
             };
-            let computed = compute_with_tables(picture, desk, &mut keep).map_err(|error| match error {
+            let computed = compute_with_tables(picture, executor, &mut keep).map_err(|error| match error {
                 PipelineError::Table(file) => CliError::from(file),
                 other => other.into(),
             })?;
             write_picture(folder, &computed, &mut written)?;
-            desk.forget();
-            desk.progress().line(&format!("wrote {}", png.display()));
+            executor.forget();
+            executor.progress().line(&format!("wrote {}", png.display()));
             if let Some(Err(error)) = standing.as_ref().map(|s| s.remember(picture, &computed.record)) {
                 // The picture is there; only the next run will have to draw it again.
-                desk.progress().line(&format!("not kept for the next run: {error}"));
+                executor.progress().line(&format!("not kept for the next run: {error}"));
             }
             Ok((Made { record: computed.record, anew: true }, written))
         })

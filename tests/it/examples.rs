@@ -14,7 +14,7 @@ mod own_system;
 mod returns;
 
 use twofold::integrate::filippov::EventKind;
-use twofold::job::Desk;
+use twofold::job::Executor;
 
 #[test]
 fn own_system_slides_on_its_surface() {
@@ -36,7 +36,7 @@ fn own_method_agrees_with_dormand_prince() {
 #[test]
 fn own_figure_is_written_whole() {
     let folder = tempfile::tempdir().unwrap();
-    let records = twofold::cli::make(&[own_figure::figure()], folder.path(), &Desk::quiet()).unwrap();
+    let records = twofold::cli::make(&[own_figure::figure()], folder.path(), &Executor::quiet()).unwrap();
     assert_eq!(records.len(), 1);
     for file in ["own.png", "own.svg", "own.pdf", "own.json", "own-a.csv", "own-b.csv"] {
         assert!(folder.path().join("own").join(file).metadata().unwrap().len() > 500, "{file}");

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use twofold::cli::in_pool;
-use twofold::job::Desk;
+use twofold::job::Executor;
 use twofold::paper::figures;
 use twofold::paper::pipeline::{compute, compute_with_tables, questions};
 use twofold::paper::{Alterations, Figure};
@@ -26,12 +26,12 @@ const QUICK: [&str; 7] = ["fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "workp
 
 #[test]
 fn golden_quick_figures_have_the_committed_hashes() {
-    let desk = Desk::quiet();
+    let executor = Executor::quiet();
     for figure in quick() {
         let expected = manifest(&figure);
         assert_eq!(expected.pictures.len(), figure.pictures.len(), "{}", figure.id);
         for picture in &figure.pictures {
-            let actual = compute(picture, &desk).unwrap().record.hashes;
+            let actual = compute(picture, &executor).unwrap().record.hashes;
             let difference = expected.picture(&picture.name).unwrap().first_difference(&actual);
             assert_eq!(difference, None, "{} differs", picture.name);
         }
@@ -51,13 +51,13 @@ const SHORTENED: [(&str, &str); 6] = [
 
 #[test]
 fn golden_shortened_figures_have_the_committed_hashes() {
-    let desk = Desk::quiet();
+    let executor = Executor::quiet();
     let mut found = Vec::new();
     for figure in figures::all().iter().filter(|f| ["fig7", "fig8", "fig9"].contains(&f.id)) {
         for picture in &figure.pictures {
             let mut picture = picture.clone();
             picture.alter(&Alterations { t_end: Some(300.0), ..Alterations::default() });
-            let hashes = compute(&picture, &desk).unwrap().record.hashes;
+            let hashes = compute(&picture, &executor).unwrap().record.hashes;
             let all = [&hashes.spec, &hashes.data, &hashes.verdict, &hashes.pixels, &hashes.svg, &hashes.pdf];
             let joined: Vec<&str> = all.iter().map(|h| h.as_str()).collect();
             found.push((hashes.name, Hash::of(joined.join(" ").as_bytes())));
@@ -102,13 +102,13 @@ fn short(figure: &Figure) -> Figure {
 fn all_hashes(threads: usize) -> Vec<String> {
     in_pool(threads, || {
         let pictures: Vec<_> = figures::all().iter().flat_map(|f| short(f).pictures).collect();
-        let desk = Desk::quiet();
-        desk.gather(&questions(&pictures));
+        let executor = Executor::quiet();
+        executor.gather(&questions(&pictures));
         pictures
             .iter()
             .map(|p| {
                 let mut tables = Vec::new();
-                let computed = compute_with_tables(p, &desk, &mut |name, bytes| {
+                let computed = compute_with_tables(p, &executor, &mut |name, bytes| {
                     tables.push((name.to_owned(), Hash::of(bytes)));
                     Ok(())
                 });
@@ -132,7 +132,7 @@ fn a_changed_question_changes_every_layer_it_should() {
     let base = &short(&figure).pictures[0];
     let mut other = base.clone();
     other.panels[0].run.start[0] += 1e-6;
-    let hashes = |p| compute(p, &Desk::quiet()).unwrap().record.hashes;
+    let hashes = |p| compute(p, &Executor::quiet()).unwrap().record.hashes;
     let (a, b) = (hashes(base), hashes(&other));
     let difference = a.first_difference(&b).unwrap();
     assert_eq!(difference.layer, twofold::record::Layer::Spec);

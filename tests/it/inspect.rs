@@ -10,7 +10,7 @@ use assert_cmd::Command;
 use common::{copy, figures, small_figure, write_references};
 use serde_json::Value;
 use twofold::cli;
-use twofold::job::Desk;
+use twofold::job::Executor;
 use twofold::render::{decode_png, encode_png};
 
 fn twofold(arguments: &[&str]) -> Output {
@@ -77,7 +77,7 @@ fn the_manifests_know_the_committed_file_from_others() {
     }
     // The same name and an unbroken seal, other numbers: made by another program, or forged.
     let other = folder.path().join("other");
-    cli::make(&[small_figure(40.0)], &other, &Desk::quiet()).unwrap();
+    cli::make(&[small_figure(40.0)], &other, &Executor::quiet()).unwrap();
     let (code, said) = inspect(&other.join("fig7/fig7-printed.png"), &expected);
     assert_eq!((code, said["seal"].as_str()), (1, Some("intact")), "{said}");
     assert_eq!(said["committed"]["state"], "different");
@@ -92,7 +92,7 @@ fn the_manifests_know_the_committed_file_from_others() {
     let mut altered = small_figure(50.0);
     altered.pictures.truncate(1);
     altered.pictures[0].name = "fig7-printed-shortened".into();
-    cli::make(&[altered], &other, &Desk::quiet()).unwrap();
+    cli::make(&[altered], &other, &Executor::quiet()).unwrap();
     let (code, said) = inspect(&other.join("fig7/fig7-printed-shortened.png"), &expected);
     assert_eq!((code, &said["committed"]["state"]), (0, &"unlisted".into()), "{said}");
 }

@@ -8,7 +8,7 @@ use assert_cmd::Command;
 use twofold::integrate::filippov::{ExitRule, Side};
 use twofold::integrate::{Kick, KickLaw, Schedule, Tolerance};
 use twofold::job::spec::*;
-use twofold::job::{Desk, LargestExponent, Run};
+use twofold::job::{Executor, LargestExponent, Run};
 use twofold::system::{Caricature, Definition, Relaxation, System};
 
 /// Uncoupled oscillators x_i' = v_i, v_i' = -x_i, `n` states, switched by a coordinate of their own decay.
@@ -48,7 +48,7 @@ fn every_dimension_by_every_switch() {
         ];
         for switch in switches {
             let spec = question(rotors(n), switch, Observation::Path { chord: 1e-2 });
-            let answer = Desk::quiet().ask(&Run(spec.clone())).unwrap_or_else(|e| panic!("{n}: {e}"));
+            let answer = Executor::quiet().ask(&Run(spec.clone())).unwrap_or_else(|e| panic!("{n}: {e}"));
             let state: Vec<f64> = answer.fact("state").unwrap();
             assert_eq!(state.len(), n);
             for i in (0..n / 2 * 2).step_by(2) {
@@ -74,7 +74,7 @@ fn every_method_takes_data() {
     for name in Method::ALL {
         let mut spec = question(rotors(5), SwitchSpec::tanh(1e-3), Observation::Section { coordinate: 1, value: 0.0 });
         spec.method.name = name;
-        let answer = Desk::quiet().ask(&Run(spec)).unwrap_or_else(|e| panic!("{name:?}: {e}"));
+        let answer = Executor::quiet().ask(&Run(spec)).unwrap_or_else(|e| panic!("{name:?}: {e}"));
         let section = answer.table("section").unwrap();
         // x1 = -sin t is zero at pi (upwards).
         let t = section.numbers("t");
@@ -107,7 +107,7 @@ fn fast_paths_give_the_bits_of_the_record() {
             if !matches!(switch, SwitchSpec::Filippov { .. }) {
                 spec.schedule = Schedule { restart_every: Some(20.0), kick: Some(kick) };
             }
-            let answer = Desk::quiet().ask(&Run(spec)).unwrap();
+            let answer = Executor::quiet().ask(&Run(spec)).unwrap();
             let section = answer.table("section").unwrap();
             let numbers = |i: usize| section.numbers(&section.columns[i].name).iter().map(|v| v.to_bits()).collect();
             (0..4).map(numbers).collect::<Vec<Vec<u64>>>()
@@ -120,7 +120,7 @@ fn fast_paths_give_the_bits_of_the_record() {
         let settings = twofold::analyse::lyapunov::Settings { transient: 5.0, duration: 40.0, ..Default::default() };
         let start = vec![0.2, 0.0, -1.0];
         let question = LargestExponent { system: system.clone(), switch: SwitchSpec::tanh(1e-2), start, settings };
-        Desk::quiet().ask(&question).unwrap().facts.clone()
+        Executor::quiet().ask(&question).unwrap().facts.clone()
     };
     assert_eq!(exponent(&compiled), exponent(&recorded));
 }
@@ -133,7 +133,7 @@ fn exponents_of_data() {
     let settings = twofold::analyse::lyapunov::Settings { transient: 1.0, duration: 50.0, ..Default::default() };
     let question = LargestExponent { system, switch: SwitchSpec::tanh(1e-3), start: vec![1.0], settings };
     let exponent: twofold::analyse::lyapunov::Exponent =
-        Desk::quiet().ask(&question).unwrap().fact("exponent").unwrap();
+        Executor::quiet().ask(&question).unwrap().fact("exponent").unwrap();
     assert!((exponent.value + 0.5).abs() < 1e-7, "{exponent:?}");
 }
 

@@ -11,7 +11,7 @@ use twofold::integrate::filippov::{ExitRule, Side};
 use twofold::integrate::{Schedule, StepCap, Tolerance};
 use twofold::job::orbit::Along;
 use twofold::job::spec::*;
-use twofold::job::{Answer, ClosedOrbit, Desk, LargestExponent, Run};
+use twofold::job::{Answer, ClosedOrbit, Executor, LargestExponent, Run};
 use twofold::num::linear::eigenvalues;
 use twofold::system::{Field, System, jacobian};
 
@@ -32,7 +32,7 @@ fn run(system: &System, switch: SwitchSpec, t_end: f64, observe: Observation) ->
     };
     let start = system.definition().start().unwrap().to_vec();
     let spec = RunSpec { system: system.clone(), switch, start, t_end, method, schedule: Schedule::default(), observe };
-    Desk::quiet().ask(&Run(spec)).unwrap_or_else(|e| panic!("{}: {e}", system.name()))
+    Executor::quiet().ask(&Run(spec)).unwrap_or_else(|e| panic!("{}: {e}", system.name()))
 }
 
 /// Times and states of the events of a kind.
@@ -62,7 +62,7 @@ fn orbit(system: &System, switch: SwitchSpec, axis: usize, settle: f64) -> Close
 }
 
 fn ask(question: &ClosedOrbit) -> Arc<Answer> {
-    Desk::quiet().ask(question).unwrap_or_else(|e| panic!("{}: {e}", question.system.name()))
+    Executor::quiet().ask(question).unwrap_or_else(|e| panic!("{}: {e}", question.system.name()))
 }
 
 /// The zero of `f` between `a` and `b`.
@@ -263,7 +263,7 @@ fn chua_eigenvalues_and_exponent() {
     let settings = Settings { transient: 100.0, duration: 6000.0, ..Settings::default() };
     let start = s.definition().start().unwrap().to_vec();
     let question = LargestExponent { system: s, switch: SwitchSpec::tanh(1e-3), start, settings };
-    let exponent: Exponent = Desk::quiet().ask(&question).unwrap().fact("exponent").unwrap();
+    let exponent: Exponent = Executor::quiet().ask(&question).unwrap().fact("exponent").unwrap();
     let allowed = 4.0 * exponent.standard_error;
     assert!((exponent.value - 0.3271).abs() < allowed && allowed < 0.05, "{exponent:?}");
 }
@@ -345,7 +345,7 @@ fn grazing_and_set_valued_orbits_are_refused() {
     assert!((period - 2.0 * PI).abs() < 1e-8 && (m[0][0] - (-4.0 * PI).exp()).abs() < 1e-6, "{period} {m:?}");
     let refused = |s: &System, axis: usize, start: &[f64]| {
         let question = ClosedOrbit { start: start.to_vec(), ..orbit(s, FILIPPOV, axis, 0.0) };
-        Desk::quiet().ask(&question).unwrap_err().to_string()
+        Executor::quiet().ask(&question).unwrap_err().to_string()
     };
     let grazing = refused(&s.clone().with("level", 1.0).unwrap(), 1, &[1.0, 0.0]);
     assert!(grazing.contains("grazes"), "{grazing}");
@@ -425,15 +425,15 @@ fn two_blocks_that_stick_at_once_go_on() {
         schedule: Schedule::default(),
         observe: Observation::Path { chord: 1e-3 },
     };
-    let sharp = Desk::quiet().ask(&Run(of(FILIPPOV))).unwrap();
-    let smoothed = Desk::quiet().ask(&Run(of(SwitchSpec::tanh(1e-3)))).unwrap();
+    let sharp = Executor::quiet().ask(&Run(of(FILIPPOV))).unwrap();
+    let smoothed = Executor::quiet().ask(&Run(of(SwitchSpec::tanh(1e-3)))).unwrap();
     let last = |answer: &Answer, table: &str, of: &str| *answer.table(table).unwrap().numbers(of).last().unwrap();
     assert!((last(&smoothed, "path", "t") - 20.0).abs() < 1e-12);
     assert!((last(&sharp, "motion", "x2") - 0.046_148_351_9).abs() < 1e-8);
     // A layer of width eps shifts a block by a few eps.
     assert!((last(&sharp, "motion", "x1") - last(&smoothed, "path", "x1")).abs() < 2e-2);
     let hysteretic = SwitchSpec::hysteretic(1e-3, twofold::system::Relaxation::Single);
-    let refused = Desk::quiet().ask(&Run(of(hysteretic))).unwrap_err().to_string();
+    let refused = Executor::quiet().ask(&Run(of(hysteretic))).unwrap_err().to_string();
     assert!(refused.contains("one switching surface"), "{refused}");
 }
 

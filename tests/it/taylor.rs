@@ -168,7 +168,7 @@ fn equations_with_other_layers_need_no_telling() {
 #[test]
 fn a_run_by_name_is_the_reference() {
     use twofold::job::spec::{Method, MethodSpec, Observation, RunSpec, SwitchSpec};
-    use twofold::job::{Desk, Run};
+    use twofold::job::{Executor, Run};
     // Through the first visit, which multiplies by 1e12 whatever the default tolerance or 0.1 as a binary number leave out.
     let run = RunSpec {
         system: Caricature::with_reinjection(1e-1, 1e-5).into(),
@@ -179,7 +179,7 @@ fn a_run_by_name_is_the_reference() {
         schedule: Schedule::default(),
         observe: Observation::Section { coordinate: 1, value: 0.0 },
     };
-    let answer = Desk::quiet().ask(&Run(run)).unwrap();
+    let answer = Executor::quiet().ask(&Run(run)).unwrap();
     let table = answer.table("section").unwrap();
     let wanted = rows(include_str!("../../crates/verify/data/crossings-reconstructed.csv"));
     assert!(table.len() >= 5, "{} crossings", table.len());

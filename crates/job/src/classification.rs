@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use super::answer::{Answer, Stop};
-use super::desk::Desk;
+use super::executor::Executor;
 use super::exponent::LargestExponent;
 use super::question::{AnyQuestion, JobError, Question};
 use super::run::Run;
@@ -37,8 +37,8 @@ impl Classification {
     /// # Errors
     ///
     /// Whatever the computation met.
-    pub fn ask(&self, desk: &Desk<'_>) -> Result<Evidence, JobError> {
-        Ok(desk.ask(self)?.fact("evidence")?)
+    pub fn ask(&self, executor: &Executor<'_>) -> Result<Evidence, JobError> {
+        Ok(executor.ask(self)?.fact("evidence")?)
     }
 }
 
@@ -68,8 +68,8 @@ impl Question for Classification {
         std::iter::once(self.run.clone()).chain(twins).map(|run| Arc::new(Run(run)) as _).collect()
     }
 
-    fn compute(&self, desk: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
-        let evidence = self.evidence(desk)?;
+    fn compute(&self, executor: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        let evidence = self.evidence(executor)?;
         Ok(Answer::of_tables(Vec::new()).with_fact("evidence", &evidence))
     }
 }
@@ -108,29 +108,29 @@ pub(super) enum SoFar<T> {
 }
 
 impl Classification {
-    fn evidence(&self, desk: &Desk<'_>) -> Result<Evidence, JobError> {
+    fn evidence(&self, executor: &Executor<'_>) -> Result<Evidence, JobError> {
         // What cannot be judged is not computed.
         plane(&self.run)?;
-        self.evidence_of(desk, &*desk.ask(&Run(self.run.clone()))?)
+        self.evidence_of(executor, &*executor.ask(&Run(self.run.clone()))?)
     }
 
     /// The evidence that an answer to the run's question gives.
-    fn evidence_of(&self, desk: &Desk<'_>, answer: &Answer) -> Result<Evidence, JobError> {
-        match self.so_far(desk, answer)? {
+    fn evidence_of(&self, executor: &Executor<'_>, answer: &Answer) -> Result<Evidence, JobError> {
+        match self.so_far(executor, answer)? {
             SoFar::Judged(evidence) => Ok(evidence),
-            SoFar::Awaits(exponent) => self.with_exponent(answer, exponent.found(&*desk.ask(&*exponent)?)),
+            SoFar::Awaits(exponent) => self.with_exponent(answer, exponent.found(&*executor.ask(&*exponent)?)),
         }
     }
 
     /// What an answer to the run's question comes to without the orbit's exponent.
-    pub(super) fn so_far(&self, desk: &Desk<'_>, answer: &Answer) -> Result<SoFar<Evidence>, JobError> {
+    pub(super) fn so_far(&self, executor: &Executor<'_>, answer: &Answer) -> Result<SoFar<Evidence>, JobError> {
         let run = &self.run;
         let (end, section) = section(run, answer)?;
         let random_exits = matches!(run.switch, SwitchSpec::Filippov { exit: ExitRule::Random { .. }, .. });
         let mut question = self.asked();
         if question.kicked {
             // Without its chance a random exit rule is no rule: there is nothing to compare with.
-            let reference = if random_exits { None } else { Some(self.noise_free_structure(desk)?) };
+            let reference = if random_exits { None } else { Some(self.noise_free_structure(executor)?) };
             question.reference = reference.as_deref();
             return Ok(SoFar::Judged(classify(&section, &question, &self.thresholds)));
         }
@@ -186,10 +186,10 @@ impl Classification {
     }
 
     /// The structure that noise can wash out: sections of its twins without kicks, each as long as it was not captured by a closed orbit.
-    fn noise_free_structure(&self, desk: &Desk<'_>) -> Result<Vec<Vec<SectionPoint>>, JobError> {
+    fn noise_free_structure(&self, executor: &Executor<'_>) -> Result<Vec<Vec<SectionPoint>>, JobError> {
         let mut free = Vec::new();
         for twin in self.noise_free_twins() {
-            let (_, section) = section(&twin, &*desk.ask(&Run(twin.clone()))?)?;
+            let (_, section) = section(&twin, &*executor.ask(&Run(twin.clone()))?)?;
             let question = attractor::Question {
                 t_end: Some(twin.t_end),
                 shown_from: 0.5 * twin.t_end,
@@ -270,7 +270,7 @@ mod tests {
             schedule: Schedule::default(),
             observe: Observation::Section { coordinate: 1, value: 0.0 },
         };
-        Classification::of(run).ask(&Desk::quiet())
+        Classification::of(run).ask(&Executor::quiet())
     }
 
     #[test]
@@ -313,27 +313,27 @@ mod tests {
         assert_eq!((kicked.len(), &kicked[1]), (9, &Run(free.run).json()));
         question.run.observe = Observation::Path { chord: 1.0 };
         assert!(runs(&question).is_empty());
-        assert!(question.ask(&Desk::quiet()).unwrap_err().to_string().contains("--section"));
+        assert!(question.ask(&Executor::quiet()).unwrap_err().to_string().contains("--section"));
     }
 
     /// Decays at the rates 1 and 2; a hysteretic one is followed for less long; x' = x^2 leaves and has none.
     #[test]
     fn exponents_are_those_of_the_runs_system() {
         use crate::cases;
-        let desk = Desk::quiet();
+        let executor = Executor::quiet();
         let hysteretic = SwitchSpec::hysteretic(1e-2, twofold_system::Relaxation::Single);
         for (switch, duration) in [(SwitchSpec::tanh(1e-2), 10_000.0), (hysteretic, 2000.0)] {
             let question = run(cases::decays(2), switch, 9.0);
             let of = |q: &Classification| {
                 let exponent = q.exponent(vec![1.0, 1.0]);
-                exponent.found(&desk.ask(&exponent).unwrap())
+                exponent.found(&executor.ask(&exponent).unwrap())
             };
             let exponent = of(&question).unwrap();
             assert!((exponent.value + 1.0).abs() < 1e-5 && exponent.duration == duration, "{exponent:?}");
         }
         let leaving = run(cases::smooth(&["x", "y"], "x + 1", &["x*x", "-y"]), SwitchSpec::tanh(1e-2), 0.5);
         let exponent = leaving.exponent(vec![1.0, 1.0]);
-        assert_eq!(exponent.found(&desk.ask(&exponent).unwrap()), None);
+        assert_eq!(exponent.found(&executor.ask(&exponent).unwrap()), None);
     }
 
     /// Three oscillators of frequencies that have no common measure, seen in the positions of two of them: nothing captures that.
@@ -349,7 +349,7 @@ mod tests {
         let twins = question.noise_free_twins();
         let shifts: Vec<f64> = twins.iter().map(|twin| twin.start[0] - 1.0).collect();
         assert!(shifts.iter().enumerate().all(|(k, s)| (s - 1e-9 * k as f64).abs() < 1e-15), "{shifts:?}");
-        let free = question.noise_free_structure(&Desk::quiet()).unwrap();
+        let free = question.noise_free_structure(&Executor::quiet()).unwrap();
         assert_eq!(free.len(), 8);
         // Two passages a turn.
         let wanted = 6500.0 / std::f64::consts::PI;

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::answer::Answer;
-use super::desk::Desk;
+use super::executor::Executor;
 use super::question::{JobError, Question};
 use super::recording::{Data, Recording};
 use super::run::Run;
@@ -34,8 +34,8 @@ impl Question for PathComparison {
         Run(self.0.clone()).cost() + Run(self.1.clone()).cost()
     }
 
-    fn compute(&self, desk: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
-        let (a, b) = (path(desk, &self.0)?, path(desk, &self.1)?);
+    fn compute(&self, executor: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        let (a, b) = (path(executor, &self.0)?, path(executor, &self.1)?);
         let range = common_box([&a[..], &b[..]]);
         let (a, b) = (DividerWalk::new(&a, &range), DividerWalk::new(&b, &range));
         Ok(Answer::of_tables(Vec::new())
@@ -44,9 +44,9 @@ impl Question for PathComparison {
     }
 }
 
-fn path(desk: &Desk<'_>, run: &RunSpec) -> Result<Vec<Sample>, JobError> {
+fn path(executor: &Executor<'_>, run: &RunSpec) -> Result<Vec<Sample>, JobError> {
     // Many pairs are compared, of paths that nobody else looks at and that together fill much memory.
-    let recording = Recording::of_answer(run, &*desk.ask_in_passing(&Run(run.clone()))?)?.whole()?;
+    let recording = Recording::of_answer(run, &*executor.ask_in_passing(&Run(run.clone()))?)?.whole()?;
     match recording.data {
         Data::Path(samples) => Ok(samples),
         _ => Err(JobError::Other("only paths can be compared as paths; leave out --section".into())),
@@ -67,12 +67,12 @@ mod tests {
             cases::run(cases::smooth(&["x", "v", "z"], "x + 9", &field), SwitchSpec::tanh(1e-2), 20.0, observe)
         };
         let path = run(Observation::Path { chord: 1e-3 });
-        let answer = PathComparison(path.clone(), path.clone()).compute(&Desk::quiet(), &()).unwrap();
+        let answer = PathComparison(path.clone(), path.clone()).compute(&Executor::quiet(), &()).unwrap();
         let [a, b] = answer.fact::<[f64; 2]>("freshness").unwrap();
         assert!(a == b && a > 0.0 && a <= 1.0, "{a} {b}");
         let section = run(Observation::Section { coordinate: 0, value: 0.0 });
         for pair in [PathComparison(path.clone(), section.clone()), PathComparison(section, path)] {
-            let said = pair.compute(&Desk::quiet(), &()).unwrap_err().to_string();
+            let said = pair.compute(&Executor::quiet(), &()).unwrap_err().to_string();
             assert!(said.contains("only paths can be compared"), "{said}");
         }
     }

@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::answer::{Answer, Stop};
-use super::desk::Desk;
+use super::executor::Executor;
 use super::question::{JobError, Question};
 use super::table::{Column, Entry, Table};
 use twofold_analyse::digits::DigitsQuestion;
@@ -41,7 +41,7 @@ impl Question for MethodDigits {
         500.0 * self.compared.t_end * (1e-3 / self.eps).max(1.0)
     }
 
-    fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
         let found = instances::smoothed(&self.system, Transition::Tanh, self.eps)?.digits(&self.compared)?;
         let columns = [Column::words("method"), Column::numbers("tolerance"), Column::integers("crossing")];
         let mut rows =
@@ -93,7 +93,7 @@ mod tests {
                 max_steps: 10_000,
             },
         };
-        let answer = question.compute(&Desk::quiet(), &()).unwrap();
+        let answer = question.compute(&Executor::quiet(), &()).unwrap();
         let rows = answer.table("agreement").unwrap();
         assert_eq!(rows.integers("crossing"), [1, 2, 1, 2]);
         assert!(rows.words("method").all(|word| word == "dopri5") && answer.table("visits").unwrap().is_empty());

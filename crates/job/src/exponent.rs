@@ -5,7 +5,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::answer::{Answer, Stop};
-use super::desk::Desk;
+use super::executor::Executor;
 use super::question::{JobError, Question};
 use super::spec::SwitchSpec;
 use twofold_analyse::lyapunov::{self, Estimate, Exponent};
@@ -176,7 +176,7 @@ impl Question for LargestExponent {
         self.settings.transient + self.settings.duration
     }
 
-    fn compute(&self, _: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
         let found = self.exponent(watch);
         let mut answer = Answer::of_tables(Vec::new());
         if let Ok(Estimate { exponent, .. }) = &found
@@ -221,7 +221,7 @@ mod tests {
     fn the_slowest_of_many_decays_is_the_exponent() {
         for n in 1..=9 {
             for switch in [SwitchSpec::tanh(1e-2), hysteretic()].into_iter().take(if n < 9 { 2 } else { 1 }) {
-                let answer = question(cases::decays(n), switch, 10.0).compute(&Desk::quiet(), &()).unwrap();
+                let answer = question(cases::decays(n), switch, 10.0).compute(&Executor::quiet(), &()).unwrap();
                 let exponent: Exponent = answer.fact("exponent").unwrap_or_else(|e| panic!("{n} {switch:?}: {e}"));
                 assert!((exponent.value + 1.0).abs() < 1e-5, "{n} {switch:?}: {exponent:?}");
                 assert_eq!((exponent.duration, answer.stop), (10.0, Stop::Finished));
@@ -239,7 +239,7 @@ mod tests {
             let [a, b] = [&compiled, &recorded].map(|system| {
                 let question =
                     LargestExponent { start: vec![0.2, 0.0, -1.0], ..question(system.clone(), switch, 30.0) };
-                question.compute(&Desk::quiet(), &()).unwrap().fact::<Exponent>("exponent").unwrap()
+                question.compute(&Executor::quiet(), &()).unwrap().fact::<Exponent>("exponent").unwrap()
             });
             assert!((a.value - b.value).abs() < 1e-4, "{a:?} {b:?}");
         }
@@ -306,7 +306,7 @@ mod tests {
         for (questions, together) in all {
             let alone: Vec<Option<Exponent>> = questions
                 .iter()
-                .map(|question| question.found(&question.compute(&Desk::quiet(), &()).unwrap()))
+                .map(|question| question.found(&question.compute(&Executor::quiet(), &()).unwrap()))
                 .collect();
             let bits = |all: &[Option<Exponent>]| -> Vec<_> {
                 all.iter().map(|e| e.map(|e| [e.value, e.standard_error, e.duration].map(f64::to_bits))).collect()
@@ -328,7 +328,7 @@ mod tests {
 
     #[test]
     fn what_has_no_exponent_says_why() {
-        let said = |q: LargestExponent| q.compute(&Desk::quiet(), &()).unwrap().fact::<String>("failure").unwrap();
+        let said = |q: LargestExponent| q.compute(&Executor::quiet(), &()).unwrap().fact::<String>("failure").unwrap();
         let few = LargestExponent { start: vec![1.0], ..question(cases::decays(2), SwitchSpec::tanh(1e-2), 9.0) };
         assert!(said(few).contains("1 numbers, the system 2 states"));
         let exit = ExitRule::AtOnce { side: Side::Plus };
@@ -361,10 +361,10 @@ mod tests {
         }
         let turning =
             |duration| question(cases::smooth(&["x", "v"], "x + 9", &["v", "-x"]), SwitchSpec::tanh(1e-2), duration);
-        let third = turning(3000.0).compute(&Desk::quiet(), &Until(1000.0)).unwrap();
+        let third = turning(3000.0).compute(&Executor::quiet(), &Until(1000.0)).unwrap();
         assert_eq!(third.stop, Stop::Interrupted);
         let exponent: Exponent = third.fact("exponent").unwrap();
         assert!((900.0..2500.0).contains(&exponent.duration) && exponent.value.abs() < 1e-2, "{exponent:?}");
-        assert_eq!(turning(30_000.0).compute(&Desk::quiet(), &Until(1.0)), Err(JobError::Interrupted));
+        assert_eq!(turning(30_000.0).compute(&Executor::quiet(), &Until(1.0)), Err(JobError::Interrupted));
     }
 }

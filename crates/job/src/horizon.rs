@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use super::answer::{Answer, Stop};
-use super::desk::Desk;
+use super::executor::Executor;
 use super::question::{AnyQuestion, JobError, Question};
 use super::run::Run;
 use super::spec::{MethodSpec, Observation, RunSpec, SpecError, finest_extended};
@@ -58,7 +58,7 @@ impl Question for Horizon {
         10.0 * Run(self.run.clone()).cost()
     }
 
-    fn compute(&self, desk: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, executor: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
         let method = &self.run.method;
         if method.name != Method::TaylorExtended {
             let rule =
@@ -76,8 +76,8 @@ impl Question for Horizon {
             self.variant(other, None, finest),
             self.variant(bits, Some(order + MORE_DEGREES), method.tolerance),
         ];
-        desk.gather(&runs);
-        let answers = runs.iter().map(|r| desk.ask(&**r)).collect::<Result<Vec<_>, _>>()?;
+        executor.gather(&runs);
+        let answers = runs.iter().map(|r| executor.ask(&**r)).collect::<Result<Vec<_>, _>>()?;
         let names = self.run.system.coordinates();
         let rows = answers.iter().map(|a| a.tables[0].len()).min().unwrap_or(0);
         let stop = answers.iter().map(|a| a.stop).find(|s| *s != Stop::Finished).unwrap_or(Stop::Finished);
@@ -145,7 +145,7 @@ mod tests {
     fn a_coarse_tolerance_shows_as_a_short_horizon() {
         let horizon = |rtol: f64| {
             let answer = Horizon { run: run(Method::TaylorExtended, rtol), within: 1e-9 };
-            let answer = answer.compute(&Desk::quiet(), &()).unwrap();
+            let answer = answer.compute(&Executor::quiet(), &()).unwrap();
             assert_eq!((answer.stop, answer.rows()), (Stop::Finished, Horizon::SAMPLES + 1));
             let fact = |name: &str| answer.fact::<f64>(name).unwrap();
             assert_eq!(fact("horizon"), fact("by_precision").min(fact("by_order")));
@@ -170,7 +170,7 @@ mod tests {
         for (precision, rtol, bits, other) in
             [(None, 1e-20, 106, 192), (Some(106), 1e-20, 106, 192), (Some(192), 1e-20, 192, 106)]
         {
-            let answer = decay(precision, Some(30), rtol).compute(&Desk::quiet(), &()).unwrap();
+            let answer = decay(precision, Some(30), rtol).compute(&Executor::quiet(), &()).unwrap();
             let fact = |name: &str| answer.fact::<u16>(name).unwrap();
             assert_eq!([fact("precision"), fact("other_precision"), fact("order")], [bits, other, 30]);
             assert_eq!(fact("other_order"), 38);
@@ -182,13 +182,13 @@ mod tests {
     fn differences_are_in_units_of_one_and_the_state() {
         let mut horizon = decay(None, Some(4), 1e-6);
         // Half of the largest difference: some lie above it.
-        let all = horizon.compute(&Desk::quiet(), &()).unwrap().tables.remove(0);
+        let all = horizon.compute(&Executor::quiet(), &()).unwrap().tables.remove(0);
         let largest = |name: &str| all.numbers(name).iter().fold(0.0_f64, |a, b| a.max(*b));
         horizon.within = 0.5 * largest("by_precision").max(largest("by_order"));
-        let answer = horizon.compute(&Desk::quiet(), &()).unwrap();
+        let answer = horizon.compute(&Executor::quiet(), &()).unwrap();
         let [own, other] = [4, 12].map(|order| {
             let run = horizon.variant(106, Some(order), horizon.run.method.tolerance);
-            Desk::quiet().ask(&*run).unwrap().tables[0].clone()
+            Executor::quiet().ask(&*run).unwrap().tables[0].clone()
         });
         let table = &answer.tables[0];
         let mut first_beyond = None;
@@ -227,14 +227,15 @@ mod tests {
         }
         // Some ten thousand steps of the order 4; the others have few and are not asked.
         let horizon = decay(None, Some(4), 1e-20);
-        let answer = horizon.compute(&Desk::new(None, &Impatient), &()).unwrap();
+        let answer = horizon.compute(&Executor::new(None, &Impatient), &()).unwrap();
         assert_eq!(answer.stop, Stop::Interrupted);
         assert!(answer.rows() < Horizon::SAMPLES, "{}", answer.rows());
     }
 
     #[test]
     fn other_methods_have_none() {
-        let error = Horizon { run: run(Method::Lsoda, 1e-9), within: 1e-9 }.compute(&Desk::quiet(), &()).unwrap_err();
+        let error =
+            Horizon { run: run(Method::Lsoda, 1e-9), within: 1e-9 }.compute(&Executor::quiet(), &()).unwrap_err();
         assert!(error.to_string().contains("taylor-extended"), "{error}");
     }
 }

@@ -1,7 +1,7 @@
 //! The job: a question as data, its computation, and its answer.
 //!
 //! A [`Question`] says everything that a computation depends on. Its [`Answer`] is named columns with units, facts, the work that
-//! it took, and why it ended. A [`Desk`] computes each question once and keeps answers in a [`Store`]. Everything that is shown, checked
+//! it took, and why it ended. An [`Executor`] computes each question once and keeps answers in a [`Store`]. Everything that is shown, checked
 //! or published is a view of answers.
 //!
 //! | question | asks |
@@ -20,7 +20,7 @@
 //! Rooms above add their own by implementing [`Question`].
 //!
 //! ```
-//! use twofold_job::{Desk, Run, Recording, spec::*};
+//! use twofold_job::{Executor, Run, Recording, spec::*};
 //! use twofold_system::Caricature;
 //! let run = RunSpec {
 //!     system: Caricature::with_reinjection(1e-1, 1e-5).into(),
@@ -31,7 +31,7 @@
 //!     schedule: Default::default(),
 //!     observe: Observation::Section { coordinate: 1, value: 0.0 },
 //! };
-//! let answer = Desk::quiet().ask(&Run(run))?;
+//! let answer = Executor::quiet().ask(&Run(run))?;
 //! let section = answer.table("section").expect("a section was asked for");
 //! assert_eq!(section.numbers("t").len(), section.len());
 //! assert_eq!(answer.stop, twofold_job::Stop::Finished);
@@ -43,9 +43,9 @@
 pub mod answer;
 pub mod classification;
 pub mod comparison;
-pub mod desk;
 pub mod digits;
 pub mod encode;
+pub mod executor;
 pub mod exponent;
 pub mod horizon;
 pub mod limit;
@@ -67,8 +67,10 @@ pub mod table;
 pub use answer::{Answer, Stop};
 pub use classification::Classification;
 pub use comparison::PathComparison;
-pub use desk::{Desk, JobWatch, Progress};
 pub use digits::MethodDigits;
+#[doc(hidden)]
+pub use executor::Executor as Desk;
+pub use executor::{Executor, JobWatch, Progress};
 pub use exponent::LargestExponent;
 pub use horizon::Horizon;
 pub use limit::{AfterVisit, SmoothingLimit};

@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::answer::{Answer, Stop};
-use super::desk::Desk;
+use super::executor::Executor;
 use super::passage::TwoFoldPassage;
 use super::question::{AnyQuestion, JobError, Question};
 use super::recording::side_word;
@@ -44,7 +44,7 @@ impl Question for SmoothingLimit {
         5e4
     }
 
-    fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
         let found = instances::sliding(&self.system)?.convergence(&self.compared)?;
         let columns =
             [Column::numbers("eps"), Column::numbers("t"), Column::words("mode"), Column::numbers("distance")];
@@ -86,12 +86,12 @@ impl AfterVisit {
     }
 
     /// Where they cross.
-    fn smoothed(&self, desk: &Desk<'_>) -> Result<Vec<Smoothed>, JobError> {
+    fn smoothed(&self, executor: &Executor<'_>) -> Result<Vec<Smoothed>, JobError> {
         let passages = self.passages()?;
         let mut found = Vec::with_capacity(passages.len());
         for passage in passages {
             let eps = passage.eps;
-            let answer = desk.ask(&passage)?;
+            let answer = executor.ask(&passage)?;
             let far = |c: &str| answer.table("passage").and_then(|t| t.numbers(c).first().copied());
             let place: Option<Vec<f64>> = ["far_x", "far_y", "far_z"].into_iter().map(far).collect();
             found.push((eps, place.filter(|p| p.iter().all(|c| c.is_finite()))));
@@ -121,8 +121,8 @@ impl Question for AfterVisit {
         self.passages().unwrap_or_default().into_iter().map(|passage| Arc::new(passage) as _).collect()
     }
 
-    fn compute(&self, desk: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
-        let crossings = self.smoothed(desk)?;
+    fn compute(&self, executor: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        let crossings = self.smoothed(executor)?;
         let mut crossing = |eps: f64| Ok(crossings.iter().find(|c| c.0 == eps).and_then(|c| c.1.clone()));
         let found = instances::sliding(&self.system)?.after_visit(&self.compared, &mut crossing)?;
         let kinds = |name: &str| if name.ends_with("side") { Column::words(name) } else { Column::numbers(name) };
@@ -168,7 +168,7 @@ mod tests {
         let recorded = cases::of(&caricature().definition().to_toml().replace("\"-y\"", "\"0 - y\""));
         let tables = [caricature(), recorded].map(|system| {
             let question = SmoothingLimit { system, compared: compared.clone() };
-            question.compute(&Desk::quiet(), &()).unwrap().tables.remove(0)
+            question.compute(&Executor::quiet(), &()).unwrap().tables.remove(0)
         });
         let table = &tables[0];
         assert_eq!(
@@ -210,16 +210,16 @@ mod tests {
             table.push([x.into(), 2.0.into(), 3.0.into()]);
             store.put(&key(passage), passage, &Answer::of_tables(vec![table])).unwrap();
         }
-        let desk = Desk::new(Some(store), &());
+        let executor = Executor::new(Some(store), &());
         let crossings = vec![(1e-2, Some(vec![1.0, 2.0, 3.0])), (3e-3, None)];
-        assert_eq!(question.smoothed(&desk).unwrap(), crossings);
+        assert_eq!(question.smoothed(&executor).unwrap(), crossings);
         // So the table after the visit has the one place, and no row of the other.
-        let after = question.compute(&desk, &()).unwrap().tables.remove(1);
+        let after = question.compute(&executor, &()).unwrap().tables.remove(1);
         assert_eq!([after.numbers("eps"), after.numbers("y"), after.numbers("z")], [[1e-2], [2.0], [3.0]]);
         let keys: Vec<_> = question.rests_on().iter().map(|q| key(&**q)).collect();
         assert_eq!(keys, passages.iter().map(|p| key(p)).collect::<Vec<_>>());
         question.compared.start.pop();
         assert!(question.rests_on().is_empty());
-        assert!(question.compute(&desk, &()).unwrap_err().to_string().contains("2 components, not three"));
+        assert!(question.compute(&executor, &()).unwrap_err().to_string().contains("2 components, not three"));
     }
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::answer::{Answer, Stop};
-use super::desk::Desk;
+use super::executor::Executor;
 use super::question::{JobError, Question};
 use super::rest::{self, Rest};
 use super::run::Run;
@@ -115,9 +115,9 @@ impl Question for ClosedOrbit {
         10.0 * (self.settle + members * 50.0)
     }
 
-    fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, executor: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
         self.validate()?;
-        let (guess, returns) = match self.guess(desk)? {
+        let (guess, returns) = match self.guess(executor)? {
             Guess::Loop { point, returns } => (point, returns),
             Guess::Rest(rest) => return Ok(self.at_rest(&rest)),
         };
@@ -259,7 +259,7 @@ impl ClosedOrbit {
         Ok((system, self.switch))
     }
 
-    fn guess(&self, desk: &Desk<'_>) -> Result<Guess, JobError> {
+    fn guess(&self, executor: &Executor<'_>) -> Result<Guess, JobError> {
         let (system, switch) = self.at(self.along.as_ref().map_or(0.0, |a| a.from))?;
         let mut point = self.start.clone();
         let mut returns = self.returns;
@@ -280,11 +280,11 @@ impl ClosedOrbit {
                 schedule: Schedule::default(),
                 observe: Observation::Section { coordinate: self.plane.axis, value: self.plane.value },
             };
-            let settled = desk.ask(&Run(spec.clone()))?;
+            let settled = executor.ask(&Run(spec.clone()))?;
             if settled.stop == Stop::Interrupted {
                 return Err(JobError::Interrupted);
             }
-            if let Some(rest) = rest::at_end(desk, &spec, &settled)? {
+            if let Some(rest) = rest::at_end(executor, &spec, &settled)? {
                 return Ok(Guess::Rest(rest));
             }
             let section = settled.table("section").ok_or_else(|| JobError::Other("a section was asked for".into()))?;
@@ -598,7 +598,7 @@ mod tests {
         let known = (-0.4 * PI).exp();
         for n in 2..=8 {
             for switch in switches() {
-                let answer = question(circle(n), switch, 1).compute(&Desk::quiet(), &()).unwrap();
+                let answer = question(circle(n), switch, 1).compute(&Executor::quiet(), &()).unwrap();
                 let fact = |name: &str| answer.fact::<f64>(name).unwrap();
                 let near = |a: f64, b: f64, by: f64| assert!((a - b).abs() < by, "{n} {switch:?}: {a} {b}");
                 near(fact("period"), 2.0 * PI, 1e-6);
@@ -627,7 +627,7 @@ mod tests {
         // The other way through the plane.
         let mut down = question(circle(2), SwitchSpec::tanh(1e-2), 1);
         (down.plane.upward, down.start) = (false, vec![-0.3, 0.0]);
-        let answer = down.compute(&Desk::quiet(), &()).unwrap();
+        let answer = down.compute(&Executor::quiet(), &()).unwrap();
         let orbit = answer.table("orbit").unwrap();
         assert_eq!(orbit.words("direction").collect::<Vec<_>>(), ["down", "up"]);
         assert!(orbit.numbers("x")[0] < 0.0 && orbit.numbers("x")[1] > 0.0);
@@ -655,7 +655,7 @@ mod tests {
     fn a_branch_of_circles_has_known_multipliers() {
         for (side, from, to) in [(1.0, 0.1, 0.3), (-1.0, 0.1, 0.2), (1.0, 0.2, 0.1)] {
             let heard = Heard(Mutex::default(), 1000);
-            let answer = along(side, from, to).compute(&Desk::quiet(), &heard).unwrap();
+            let answer = along(side, from, to).compute(&Executor::quiet(), &heard).unwrap();
             assert_eq!((answer.stop, answer.fact("end")), (Stop::Finished, Ok(End::Reached)));
             let branch = answer.table("branch").unwrap();
             let names: Vec<&str> = branch.columns.iter().map(|c| c.name.as_str()).collect();
@@ -690,7 +690,7 @@ mod tests {
                 "{heard:?}"
             );
         }
-        let cut = along(1.0, 0.1, 0.3).compute(&Desk::quiet(), &Heard(Mutex::default(), 2)).unwrap();
+        let cut = along(1.0, 0.1, 0.3).compute(&Executor::quiet(), &Heard(Mutex::default(), 2)).unwrap();
         assert_eq!((cut.stop, cut.fact("end")), (Stop::Interrupted, Ok(End::Interrupted)));
         assert_eq!(cut.table("branch").unwrap().len(), 3);
     }
@@ -702,7 +702,7 @@ mod tests {
         let field = ["x*(1 - x*x - y*y) - y", "y*(1 - x*x - y*y) + x", "-z + x*x - y*y - 4*x*y"];
         let system = cases::smooth(&["x", "y", "z"], "x + 9", &field);
         let question = ClosedOrbit { settle: 40.0, ..question(system, SwitchSpec::tanh(1e-2), 2) };
-        let answer = question.compute(&Desk::quiet(), &()).unwrap();
+        let answer = question.compute(&Executor::quiet(), &()).unwrap();
         assert_eq!(answer.fact("returns"), Ok(2));
         assert!((answer.fact::<f64>("period").unwrap() - 2.0 * PI).abs() < 1e-6);
         let orbit = answer.table("orbit").unwrap();
@@ -713,7 +713,7 @@ mod tests {
         for (upward, word) in [(true, "upwards within t = 40"), (false, "downwards within t = 40")] {
             let plane = Plane { axis: 2, value: 5.0, upward };
             let missed = ClosedOrbit { plane, ..question.clone() };
-            let said = missed.compute(&Desk::quiet(), &()).unwrap_err().to_string();
+            let said = missed.compute(&Executor::quiet(), &()).unwrap_err().to_string();
             assert!(said.contains(word), "{said}");
         }
         struct Never;
@@ -731,7 +731,7 @@ mod tests {
             }
         }
         let long = ClosedOrbit { settle: 4000.0, ..question };
-        assert_eq!(long.compute(&Desk::new(None, &Never), &()), Err(JobError::Interrupted));
+        assert_eq!(long.compute(&Executor::new(None, &Never), &()), Err(JobError::Interrupted));
     }
 
     /// Two turns beside each other, of (x, y) at unit speed and of (u, v) at a third of it and a little more: at x = 4,
@@ -747,7 +747,7 @@ mod tests {
             let start = vec![4.0 * 0.5_f64.cos(), -4.0 * 0.5_f64.sin(), 1.0, 0.0];
             let settle = 1.0 + 2.0 * PI * (passages - 1.0);
             let question = ClosedOrbit { settle, start, ..question(system, SwitchSpec::tanh(1e-2), 1) };
-            match question.guess(&Desk::quiet()).unwrap() {
+            match question.guess(&Executor::quiet()).unwrap() {
                 Guess::Loop { point, returns } => (point, returns),
                 Guess::Rest(rest) => panic!("{rest:?}"),
             }
@@ -766,11 +766,11 @@ mod tests {
     fn a_return_is_computed_as_it_is_asked_for() {
         let question = question(circle(2), SwitchSpec::tanh(1e-2), 1);
         let hasty = ClosedOrbit { longest_return: PI, ..question.clone() };
-        let said = hasty.compute(&Desk::quiet(), &()).unwrap_err().to_string();
+        let said = hasty.compute(&Executor::quiet(), &()).unwrap_err().to_string();
         assert!(said.contains(&format!("within t = {PI}")), "{said}");
         let period = |tolerance: f64| -> f64 {
             let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
-            let answer = ClosedOrbit { tolerance, ..question.clone() }.compute(&Desk::quiet(), &()).unwrap();
+            let answer = ClosedOrbit { tolerance, ..question.clone() }.compute(&Executor::quiet(), &()).unwrap();
             (answer.fact::<f64>("period").unwrap() - 2.0 * PI).abs()
         };
         assert!(period(1e-4) > 1e-8 && period(1e-12) < 1e-10, "{} {}", period(1e-4), period(1e-12));
@@ -783,7 +783,7 @@ mod tests {
             let mut question = question(circle(3), switches()[1], 1);
             (question.start, question.plane.value) = (vec![x, 7.0, 8.0], 2.0);
             let guess = Guess::Loop { point: vec![x, 2.0, 8.0, phi], returns: 1 };
-            assert_eq!(question.guess(&Desk::quiet()).unwrap(), guess);
+            assert_eq!(question.guess(&Executor::quiet()).unwrap(), guess);
             assert_eq!((question.states(), question.names()), (4, ["x", "y", "a1", "phi"].map(String::from).to_vec()));
         }
         let phi = question(cases::smooth(&["x", "phi"], "x", &["phi", "-x"]), switches()[1], 1);
@@ -840,7 +840,7 @@ mod tests {
             (ClosedOrbit { along: along("mu", 0.1, 0.2, 0), ..good.clone() }, "along", "at least one step"),
             (ClosedOrbit { returns: Some(0), ..good.clone() }, "returns", "at least once"),
         ] {
-            match wrong.compute(&Desk::quiet(), &()) {
+            match wrong.compute(&Executor::quiet(), &()) {
                 Err(JobError::Spec(error)) => {
                     assert!(error.field == field && error.rule.contains(word), "{field}, {word}: {error}");
                 }
@@ -853,7 +853,7 @@ mod tests {
     #[test]
     fn a_search_that_fails_says_why() {
         let leaving = cases::smooth(&["x", "y"], "x + 9", &["x*x*x", "x"]);
-        let said = question(leaving, switches()[0], 1).compute(&Desk::quiet(), &()).unwrap_err().to_string();
+        let said = question(leaving, switches()[0], 1).compute(&Executor::quiet(), &()).unwrap_err().to_string();
         assert!(!said.is_empty());
         let failure = Failure::NotFinite { t: 1.0, state: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0] };
         assert_eq!(without_tangents(failure, 2), Failure::NotFinite { t: 1.0, state: vec![1.0, 2.0] });

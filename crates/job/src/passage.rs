@@ -5,7 +5,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::answer::{Answer, Stop};
-use super::desk::Desk;
+use super::executor::Executor;
 use super::question::{JobError, Question};
 use super::spec::{SpecError, SwitchSpec};
 use super::table::{Column, Entry, Table};
@@ -49,7 +49,7 @@ impl Question for TwoFoldPassage {
         (if self.followed.carried == 0.0 { sliding } else { 4.0 * sliding }) + 2e3 * self.followed.offsets.len() as f64
     }
 
-    fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
         let field = instances::smoothed(&self.system, self.transition, self.eps)?;
         let found = field.passage(self.eps, &self.followed)?;
         Ok(Answer {
@@ -175,7 +175,7 @@ impl Question for Leaving {
         self.runs.len() as f64 * 10.0 / self.eps().unwrap_or(1.0).max(1e-9)
     }
 
-    fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
         let eps = self.eps()?;
         match self.switch {
             SwitchSpec::Smoothed { transition, .. } => {
@@ -208,7 +208,7 @@ mod tests {
     fn leaving(system: System, switch: SwitchSpec, starts: &[[f64; 3]], by: f64) -> Table {
         let runs = starts.iter().map(|start| (*start, Schedule::default())).collect();
         let question = Leaving { system, switch, runs, tolerance: 1e-9, longest_step: 1.0, by };
-        question.compute(&Desk::quiet(), &()).unwrap().tables.remove(0)
+        question.compute(&Executor::quiet(), &()).unwrap().tables.remove(0)
     }
 
     /// On a straight line that passes the origin at time 1/2 and has x = 3 eps at 4/5; and one that passes it at no time.
@@ -280,7 +280,7 @@ mod tests {
             longest_step: 1.0,
             by: 9.0,
         };
-        let error = leaving.compute(&Desk::quiet(), &()).unwrap_err();
+        let error = leaving.compute(&Executor::quiet(), &()).unwrap_err();
         assert!(error.is_bad_question() && error.to_string().contains("exit rule's choice"), "{error}");
     }
 }

@@ -102,7 +102,7 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Answer, Desk, JobError, Question};
+    use crate::{Answer, Executor, JobError, Question};
     use serde_json::{Value, json};
     use std::sync::Arc;
     use twofold_integrate::Watch;
@@ -124,7 +124,7 @@ mod tests {
         fn rests_on(&self) -> Vec<AnyQuestion> {
             (1..self.0).filter(|n| self.0.is_multiple_of(*n)).map(|n| Arc::new(Number(n)) as _).collect()
         }
-        fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
             Ok(Answer::of_tables(Vec::new()))
         }
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use super::answer::{Answer, NoSuchFact};
-use super::desk::Desk;
+use super::executor::Executor;
 use super::spec::SpecError;
 use crate::record::Hash;
 use twofold_integrate::filippov::FilippovError;
@@ -20,7 +20,7 @@ pub const NUMERICS: &str = env!("TWOFOLD_NUMERICS");
 /// A computation as data: everything that its answer depends on, and nothing else.
 ///
 /// Two equal questions have equal answers, to the last bit, on any machine. A question computes on the thread that asks it and starts no
-/// others: parallel is only what is asked side by side ([`Desk::gather`]).
+/// others: parallel is only what is asked side by side ([`Executor::gather`]).
 pub trait Question: fmt::Debug + Send + Sync {
     /// What kind of computation it is: "run".
     fn kind(&self) -> &'static str;
@@ -49,18 +49,18 @@ pub trait Question: fmt::Debug + Send + Sync {
         1.0
     }
 
-    /// Questions that computing this one will ask, as far as they are known beforehand. [`Desk::gather`] has them answered first, so that no
+    /// Questions that computing this one will ask, as far as they are known beforehand. [`Executor::gather`] has them answered first, so that no
     /// thread waits for another; nothing else depends on it.
     fn rests_on(&self) -> Vec<AnyQuestion> {
         Vec::new()
     }
 
-    /// Computes the answer. Other questions may be asked of `desk`; each is computed once.
+    /// Computes the answer. Other questions may be asked of `executor`; each is computed once.
     ///
     /// # Errors
     ///
     /// If the question makes no sense, or the computation cannot be carried out.
-    fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError>;
+    fn compute(&self, executor: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError>;
 }
 
 /// A question that can be handed around.
@@ -280,7 +280,7 @@ mod tests {
             fn json(&self) -> Value {
                 json!(self.1)
             }
-            fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+            fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
                 Err(JobError::Interrupted)
             }
         }

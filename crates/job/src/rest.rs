@@ -8,7 +8,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::answer::{Answer, Stop};
-use super::desk::Desk;
+use super::executor::Executor;
 use super::question::JobError;
 use super::run::Run;
 use super::spec::{Method, MethodSpec, Observation, RunSpec, SwitchSpec};
@@ -270,7 +270,7 @@ const AS_FAST: f64 = 0.75;
 /// # Errors
 ///
 /// If it was interrupted.
-pub fn at_end(desk: &Desk<'_>, run: &RunSpec, answer: &Answer) -> Result<Option<Rest>, JobError> {
+pub fn at_end(executor: &Executor<'_>, run: &RunSpec, answer: &Answer) -> Result<Option<Rest>, JobError> {
     if run.schedule.kick.is_some() || answer.stop == Stop::Interrupted {
         return Ok(None);
     }
@@ -327,7 +327,7 @@ pub fn at_end(desk: &Desk<'_>, run: &RunSpec, answer: &Answer) -> Result<Option<
         observe: Observation::Times { every: window / POINTS as f64 },
         ..run.clone()
     };
-    let answer = match desk.ask(&Run(further)) {
+    let answer = match executor.ask(&Run(further)) {
         Ok(answer) if answer.stop != Stop::Interrupted => answer,
         Ok(_) | Err(JobError::Interrupted) => return Err(JobError::Interrupted),
         Err(_) => return Ok(None),

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::answer::Answer;
-use super::desk::Desk;
+use super::executor::Executor;
 use super::question::{JobError, Question};
 use super::simulate;
 use super::spec::{Method, RunSpec, SwitchSpec};
@@ -51,7 +51,7 @@ impl Question for Run {
         self.0.t_end * switch * method
     }
 
-    fn compute(&self, _: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
         simulate::answer(&self.0, watch)
     }
 }

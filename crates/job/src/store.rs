@@ -249,7 +249,7 @@ fn header_of(bytes: &[u8]) -> Result<(&[u8], &[u8]), &'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::desk::Desk;
+    use crate::executor::Executor;
     use crate::question::{JobError, key};
     use crate::table::{Column, Table};
     use serde_json::json;
@@ -268,7 +268,7 @@ mod tests {
         fn json(&self) -> Value {
             json!({ "of": self.0 })
         }
-        fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
             COMPUTED.fetch_add(1, Ordering::Relaxed);
             let mut table = Table::new("square", [Column::numbers("x")]);
             table.push([(self.0 * self.0).into()]);
@@ -283,7 +283,7 @@ mod tests {
         let question = Square(1.0 / 3.0);
         let key = key(&question);
         assert_eq!(store.get(&key, &question), Kept::Nothing);
-        let ask = || Desk::new(Some(store.clone()), &()).ask(&question).unwrap();
+        let ask = || Executor::new(Some(store.clone()), &()).ask(&question).unwrap();
         let first = ask();
         assert_eq!(ask(), first);
         assert_eq!(COMPUTED.load(Ordering::Relaxed), 1, "the second answer comes from the store");
@@ -308,7 +308,7 @@ mod tests {
         // A foreign entry under our name, whole in itself.
         let other = Square(2.0);
         let foreign = super::super::question::key(&other);
-        store.put(&foreign, &other, &other.compute(&Desk::quiet(), &()).unwrap()).unwrap();
+        store.put(&foreign, &other, &other.compute(&Executor::quiet(), &()).unwrap()).unwrap();
         fs::copy(store.path(&foreign), &path).unwrap();
         assert!(matches!(store.get(&key, &question), Kept::Damaged(why) if why.contains("another question")));
 
@@ -372,8 +372,8 @@ mod tests {
             fn json(&self) -> Value {
                 Square(self.0).json()
             }
-            fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
-                Square(self.0).compute(desk, watch)
+            fn compute(&self, executor: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+                Square(self.0).compute(executor, watch)
             }
         }
         let folder = tempfile::tempdir().unwrap();
@@ -408,13 +408,13 @@ mod tests {
             fn json(&self) -> Value {
                 Value::Null
             }
-            fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+            fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
                 Ok(Answer { stop: Stop::Interrupted, ..Answer::of_tables(Vec::new()) })
             }
         }
         let folder = tempfile::tempdir().unwrap();
         let store = Store::new(folder.path());
-        Desk::new(Some(store.clone()), &()).ask(&Cut).unwrap();
+        Executor::new(Some(store.clone()), &()).ask(&Cut).unwrap();
         assert_eq!(store.get(&key(&Cut), &Cut), Kept::Nothing);
     }
 }

@@ -1,7 +1,7 @@
 //! Figures as data.
 //!
 //! A [`Figure`] is a list of pictures, a picture a list of panels, a panel a question ([`RunSpec`]). The way of every
-//! figure is the same: questions -> [`pipeline`] (asked of a [`Desk`](twofold_job::Desk) side by side, each computed once) -> answers
+//! figure is the same: questions -> [`pipeline`] (asked of an [`Executor`](twofold_job::Executor) side by side, each computed once) -> answers
 //! -> [`drawing`] -> bytes -> files. The figures themselves stand in `figures/NAME/figure.rs`: every number of the
 //! paper's caption, and nothing else.
 //!

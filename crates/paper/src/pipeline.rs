@@ -12,7 +12,7 @@ use twofold_job::encode;
 use twofold_job::question::question_hash;
 use twofold_job::record::{FileError, Hash, PanelEntry, PictureEntry, VerdictEntry};
 use twofold_job::spec::RunSpec;
-use twofold_job::{Answer, AnyQuestion, Desk, JobError, Recording, Run, Stop, Table};
+use twofold_job::{Answer, AnyQuestion, Executor, JobError, Recording, Run, Stop, Table};
 use twofold_render::{Pixels, RenderError, Rendered, render};
 
 /// A computed picture: what is drawn and what is known about it.
@@ -149,13 +149,13 @@ pub fn questions<'a>(pictures: impl IntoIterator<Item = &'a Picture>) -> Vec<Any
     all
 }
 
-/// Makes one picture from answers, asking `desk` for those that it does not have yet. A pure view: the same answers give the same bytes.
+/// Makes one picture from answers, asking `executor` for those that it does not have yet. A pure view: the same answers give the same bytes.
 ///
 /// # Errors
 ///
 /// If a computation or the drawing failed.
-pub fn compute(picture: &Picture, desk: &Desk<'_>) -> Result<Computed, PipelineError> {
-    compute_with_tables(picture, desk, &mut |_, _| Ok(()))
+pub fn compute(picture: &Picture, executor: &Executor<'_>) -> Result<Computed, PipelineError> {
+    compute_with_tables(picture, executor, &mut |_, _| Ok(()))
 }
 
 /// What becomes of a table's file: its name and its bytes.
@@ -167,7 +167,11 @@ pub type Keep<'a> = dyn FnMut(&str, &[u8]) -> Result<(), FileError> + 'a;
 /// # Errors
 ///
 /// As [`compute`], or what `keep` says.
-pub fn compute_with_tables(picture: &Picture, desk: &Desk<'_>, keep: &mut Keep<'_>) -> Result<Computed, PipelineError> {
+pub fn compute_with_tables(
+    picture: &Picture,
+    executor: &Executor<'_>,
+    keep: &mut Keep<'_>,
+) -> Result<Computed, PipelineError> {
     let failed = |part: &str| {
         let (picture, part) = (picture.name.clone(), part.to_owned());
         move |source: JobError| PipelineError::Job { picture, part, source }
@@ -175,9 +179,9 @@ pub fn compute_with_tables(picture: &Picture, desk: &Desk<'_>, keep: &mut Keep<'
     let parts = parts(picture);
     let answers = parts
         .iter()
-        .map(|(part, question)| desk.ask(&**question).and_then(finished).map_err(failed(part)))
+        .map(|(part, question)| executor.ask(&**question).and_then(finished).map_err(failed(part)))
         .collect::<Result<Vec<Arc<Answer>>, _>>()?;
-    let verdicts = judge(picture, desk).map_err(failed("verdict"))?;
+    let verdicts = judge(picture, executor).map_err(failed("verdict"))?;
 
     let entries: Vec<PanelEntry> = parts
         .iter()

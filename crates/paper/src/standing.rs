@@ -19,7 +19,7 @@ use twofold_integrate::Watch;
 use twofold_job::question::{key, question_hash};
 use twofold_job::record::{FileError, Hash, files};
 use twofold_job::store::Kept;
-use twofold_job::{Answer, Desk, JobError, Question, Store};
+use twofold_job::{Answer, Executor, JobError, Question, Store};
 
 /// Knows which pictures stand.
 #[derive(Debug)]
@@ -66,8 +66,8 @@ impl Question for Drawn<'_> {
         })
     }
 
-    fn compute(&self, desk: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
-        let made = compute(self.0, desk).map_err(|error| JobError::Other(error.to_string()))?;
+    fn compute(&self, executor: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        let made = compute(self.0, executor).map_err(|error| JobError::Other(error.to_string()))?;
         Ok(answer(&made.record))
     }
 }
@@ -160,7 +160,7 @@ mod tests {
     fn made(standing: &Standing<'_>, folder: &Path) -> (Picture, PictureRecord) {
         let picture = figures::fig1::figure().pictures.remove(0);
         let put = |file: &str, bytes: &[u8]| twofold_job::record::write(&folder.join(file), bytes);
-        let computed = compute_with_tables(&picture, &Desk::quiet(), &mut |file, bytes| put(file, bytes)).unwrap();
+        let computed = compute_with_tables(&picture, &Executor::quiet(), &mut |file, bytes| put(file, bytes)).unwrap();
         let name = &picture.name;
         put(&format!("{name}.png"), &computed.rendered.png).unwrap();
         put(&format!("{name}.svg"), &computed.rendered.svg).unwrap();
@@ -245,9 +245,9 @@ mod tests {
     #[test]
     fn the_answer_is_that_of_the_question() {
         let picture = figures::fig1::figure().pictures.remove(0);
-        let desk = Desk::quiet();
-        let drawn = Drawn(&picture).compute(&desk, &()).unwrap();
-        let record = compute(&picture, &desk).unwrap().record;
+        let executor = Executor::quiet();
+        let drawn = Drawn(&picture).compute(&executor, &()).unwrap();
+        let record = compute(&picture, &executor).unwrap().record;
         assert_eq!(drawn.fact::<Hash>(RECORD).unwrap(), Hash::of(&record.to_json()));
     }
 }

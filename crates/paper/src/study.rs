@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use twofold_integrate::Watch;
-use twofold_job::{Answer, AnyQuestion, Desk, JobError, Question, Table};
+use twofold_job::{Answer, AnyQuestion, Executor, JobError, Question, Table};
 use twofold_render::Sheet;
 
 /// A picture that asks its own questions and draws the answers. Function pointers keep figures plain data.
@@ -48,7 +48,7 @@ impl Question for Computed {
         self.cost
     }
 
-    fn compute(&self, _: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
         Ok(Answer::of_tables((self.compute)()?))
     }
 }
@@ -80,8 +80,8 @@ mod tests {
             self.0.json()
         }
 
-        fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
-            self.0.compute(desk, watch)
+        fn compute(&self, executor: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+            self.0.compute(executor, watch)
         }
     }
 

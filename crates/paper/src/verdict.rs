@@ -11,7 +11,7 @@ pub use super::claim::Claim as SectionClaim;
 use super::{Picture, Reading};
 use twofold_analyse::attractor::Evidence;
 use twofold_analyse::divider::Shared;
-use twofold_job::{AnyQuestion, Classification, Desk, JobError, PathComparison};
+use twofold_job::{AnyQuestion, Classification, Executor, JobError, PathComparison};
 use twofold_num::elementary::sqrt;
 use twofold_num::fit::mean;
 
@@ -138,11 +138,11 @@ pub fn questions(picture: &Picture, index: usize) -> Vec<AnyQuestion> {
 /// # Errors
 ///
 /// If a computation behind a verdict failed.
-pub fn judge(picture: &Picture, desk: &Desk<'_>) -> Result<Vec<PanelVerdict>, JobError> {
+pub fn judge(picture: &Picture, executor: &Executor<'_>) -> Result<Vec<PanelVerdict>, JobError> {
     let mut verdicts = Vec::new();
     for (i, panel) in picture.panels.iter().enumerate() {
         let (Some(claim), Some(question)) = (panel.claim, question(picture, i)) else { continue };
-        let answer = desk.ask(&*question)?;
+        let answer = executor.ask(&*question)?;
         let (grounds, found, agrees, because) = match claim {
             Claim::Section(claim) => {
                 let evidence: Evidence = answer.fact("evidence")?;
@@ -152,7 +152,7 @@ pub fn judge(picture: &Picture, desk: &Desk<'_>) -> Result<Vec<PanelVerdict>, Jo
             Claim::LessOrganisedThanNext => {
                 let mut shares = [Vec::new(), Vec::new()];
                 for comparison in neighbours(picture, i) {
-                    let freshness: [f64; 2] = desk.ask(&comparison)?.fact("freshness")?;
+                    let freshness: [f64; 2] = executor.ask(&comparison)?.fact("freshness")?;
                     shares.iter_mut().zip(freshness).for_each(|(all, one)| all.push(one));
                 }
                 let [(here, here_error), (next, next_error)] = shares.map(|s| mean(&s));

@@ -9,7 +9,7 @@ use super::chosen;
 use crate::cli::progress::Progress;
 use crate::cli::speak::print_json;
 use crate::cli::{CliError, Exit, in_pool, print};
-use crate::job::Desk;
+use crate::job::Executor;
 use crate::paper::pipeline::{compute, questions};
 use crate::paper::{figures, verdict_table};
 use crate::record::manifest::VERSION;
@@ -69,8 +69,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         return Ok(Exit::CheckFailed);
     }
     let progress = Progress::new(arguments.quiet);
-    let desk = Desk::new(None, &progress);
-    in_pool(arguments.threads, || desk.gather(&questions(figures.iter().flat_map(|f| &f.pictures))))?;
+    let executor = Executor::new(None, &progress);
+    in_pool(arguments.threads, || executor.gather(&questions(figures.iter().flat_map(|f| &f.pictures))))?;
     let mut changed: Vec<(String, String)> = Vec::new();
     for figure in &figures {
         let folder = arguments.expected.join(figure.id);
@@ -85,7 +85,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             pictures: Vec::new(),
         };
         for picture in &figure.pictures {
-            let computed = compute(picture, &desk)?;
+            let computed = compute(picture, &executor)?;
             let entry = computed.record.hashes;
             let what = match before.as_ref().and_then(|m| m.picture(&entry.name)) {
                 None => Some("new".to_owned()),

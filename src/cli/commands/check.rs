@@ -8,7 +8,7 @@ use super::{chosen, published};
 use crate::cli::progress::Progress;
 use crate::cli::speak::print_json;
 use crate::cli::{CliError, Exit, in_pool, print};
-use crate::job::Desk;
+use crate::job::Executor;
 use crate::paper::figures;
 use crate::paper::pipeline::{PictureRecord, compute, questions};
 use crate::record::{self, Layer, Manifest, listed};
@@ -115,8 +115,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         .collect();
     let progress = Progress::new(arguments.quiet);
     // A check never rests on a store: everything is computed here and now.
-    let desk = Desk::new(None, &progress);
-    in_pool(arguments.threads, || desk.gather(&questions(figures.iter().flat_map(|f| &f.pictures))))?;
+    let executor = Executor::new(None, &progress);
+    in_pool(arguments.threads, || executor.gather(&questions(figures.iter().flat_map(|f| &f.pictures))))?;
     let mut findings = Vec::new();
     let mut found = |name: &str, state: State| {
         let finding = Finding { name: name.to_owned(), state };
@@ -133,7 +133,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             }
         };
         for picture in &figure.pictures {
-            let actual = compute(picture, &desk)?.record;
+            let actual = compute(picture, &executor)?.record;
             found(&actual.hashes.name, compare(&manifest, &actual))?;
         }
         for missing in manifest.pictures.iter().filter(|e| !figure.pictures.iter().any(|p| p.name == e.name)) {

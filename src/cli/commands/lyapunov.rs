@@ -9,7 +9,7 @@ use crate::cli::progress::Progress;
 use crate::cli::speak::{Delivery, deliver, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::integrate::StepCap;
-use crate::job::{Desk, JobError, LargestExponent, Question, Stop, encode};
+use crate::job::{Executor, JobError, LargestExponent, Question, Stop, encode};
 use crate::num::elementary::log10;
 
 /// The largest Lyapunov exponent of the orbit from the start, with its 95 % interval: the mean rate at which a tangent vector grows.
@@ -63,7 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let format = ending::format(out, arguments.format, Format::Text)?;
     try_delivery(out)?;
     let progress = Progress::with_grace(arguments.delivery.quiet);
-    let answer = match (Desk::new(None, &progress).ask(&question), progress.asked_to_stop()) {
+    let answer = match (Executor::new(None, &progress).ask(&question), progress.asked_to_stop()) {
         (Err(JobError::Interrupted), Some(exit)) => {
             return Err(CliError::Stopped { said: "interrupted before there was a mean with an error".into(), exit });
         }

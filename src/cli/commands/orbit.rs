@@ -15,7 +15,7 @@ use crate::cli::{CliError, Exit};
 use crate::job::orbit::Along;
 use crate::job::rest::{Rest, Stability as RestStability};
 use crate::job::spec::Observation;
-use crate::job::{Answer, ClosedOrbit, Desk, JobError, Question, Stop, encode};
+use crate::job::{Answer, ClosedOrbit, Executor, JobError, Question, Stop, encode};
 
 /// Find a closed orbit through a plane by Newton's method, with its period and Floquet multipliers; with --along, follow it as a parameter
 /// changes, through folds, and say where it loses its stability.
@@ -97,7 +97,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let format = ending::format(out, arguments.format, Format::Text)?;
     try_delivery(out)?;
     let progress = Progress::with_grace(arguments.delivery.quiet);
-    let answer = match Desk::new(None, &progress).ask(&question) {
+    let answer = match Executor::new(None, &progress).ask(&question) {
         Err(JobError::Interrupted) if progress.asked_to_stop().is_some() => {
             let exit = progress.asked_to_stop().unwrap_or(Exit::Interrupted);
             return Err(CliError::Stopped { said: "interrupted before an orbit was found".into(), exit });

@@ -11,7 +11,7 @@ use crate::cli::{CliError, Exit};
 use crate::draw::plot::{self, Look};
 use crate::job::question::question_hash;
 use crate::job::spec::RunSpec;
-use crate::job::{Answer, Desk, JobError, Run, Stop, encode};
+use crate::job::{Answer, Executor, JobError, Run, Stop, encode};
 use crate::paper::wording;
 use crate::record;
 use crate::render::{RenderError, markup, render};
@@ -179,7 +179,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let progress = Progress::new(arguments.quiet);
     let answer = match recorded {
         Some((_, answer)) => answer,
-        None => (*Desk::new(None, &progress).ask(&Run(spec.clone()))?).clone(),
+        None => (*Executor::new(None, &progress).ask(&Run(spec.clone()))?).clone(),
     };
     let mut small_print = small_print(&spec);
     if answer.stop == Stop::Interrupted {

@@ -8,7 +8,7 @@ use crate::cli::progress::Progress;
 use crate::cli::speak::print_json;
 use crate::cli::{CliError, Exit, in_pool, print};
 use crate::compare::{Comparison, Limits, Rung, SizesDiffer, compare};
-use crate::job::Desk;
+use crate::job::Executor;
 use crate::paper::Figure;
 use crate::paper::pipeline::{Computed, compute, pixel_hash, questions};
 use crate::record::{FileBytes, Hash, read_tree};
@@ -45,9 +45,9 @@ pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool, jso
         )));
     }
     let progress = Progress::new(quiet);
-    let desk = Desk::new(None, &progress);
+    let executor = Executor::new(None, &progress);
     let wanted = figures.iter().flat_map(|f| &f.pictures).filter(|p| !named(&p.name).is_empty());
-    in_pool(threads, || desk.gather(&questions(wanted)))?;
+    in_pool(threads, || executor.gather(&questions(wanted)))?;
     let limits = Limits::default();
     let mut findings = Vec::new();
     let mut say = |finding: Finding| {
@@ -68,7 +68,7 @@ pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool, jso
             say(passed_over(&picture.name, "not in the folder, not checked"))?;
             continue;
         }
-        let computed = compute(picture, &desk)?;
+        let computed = compute(picture, &executor)?;
         for file in files {
             say(held(file, &computed, &limits))?;
         }

@@ -12,7 +12,7 @@ use crate::cli::progress::Progress;
 use crate::cli::speak::{Delivery, complain, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::job::spec::{Method, SwitchSpec};
-use crate::job::{self, Desk, Horizon, JobError, Question, Run, Stop, encode, simulate};
+use crate::job::{self, Executor, Horizon, JobError, Question, Run, Stop, encode, simulate};
 use crate::record::files::Growing;
 
 /// Compute one run: its path, or with --section its passages through a plane.
@@ -80,7 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 const AGREEMENT: f64 = 1e-9;
 
 fn say_horizon(run: &Run, progress: &Progress) -> Result<(), CliError> {
-    let answer = Desk::new(None, progress).ask(&Horizon { run: run.0.clone(), within: AGREEMENT })?;
+    let answer = Executor::new(None, progress).ask(&Horizon { run: run.0.clone(), within: AGREEMENT })?;
     let fact = |name: &str| answer.fact::<f64>(name).map_err(JobError::from);
     let whole = answer.stop == Stop::Finished && fact("horizon")? >= run.0.t_end;
     complain(&format!(
@@ -101,7 +101,7 @@ fn record(run: &Run, format: Format, out: Option<&Path>, progress: &Progress) ->
     if let (Format::Csv, false) = (format, funnel) {
         return stream(run, out, progress);
     }
-    let answer = Desk::new(None, progress).ask(run)?;
+    let answer = Executor::new(None, progress).ask(run)?;
     let about = json!({ "kind": run.kind(), "question": run.json(), "stop": answer.stop });
     let bytes = match format {
         Format::Csv => encode::csv_of_run(run, &answer),

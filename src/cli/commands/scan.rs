@@ -16,7 +16,7 @@ use crate::integrate::Watch;
 use crate::job::spec::{Observation, RunSpec};
 use crate::job::sweep::{Axis, Coordinate, Ending, Sweep, Values};
 use crate::job::table::{Column, Entry, Table};
-use crate::job::{self, Answer, Desk, JobError, Run, encode};
+use crate::job::{self, Answer, Executor, JobError, Run, encode};
 use crate::render::markup;
 
 use super::plot::{Format, small_print, write};
@@ -194,12 +194,12 @@ fn cell(sweep: &Sweep, row: u64, two: bool, progress: &Progress) -> Option<Cell>
     let settings = sweep.settings(row);
     let found = sweep.question(row).map_err(JobError::Other).and_then(|fate| {
         let (silent, watch) = (Silent(progress), SilentRun(progress));
-        let desk = Desk::new(None, &silent);
+        let executor = Executor::new(None, &silent);
         if two {
-            return fate.ending(&desk, &watch).map(Found::Ending);
+            return fate.ending(&executor, &watch).map(Found::Ending);
         }
         let run = fate.0.run;
-        let answer = desk.ask(&Run(run.clone()))?;
+        let answer = executor.ask(&Run(run.clone()))?;
         if answer.stop == job::Stop::Interrupted {
             return Err(JobError::Interrupted);
         }

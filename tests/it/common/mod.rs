@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 
 use twofold::cli;
 use twofold::integrate::Schedule;
-use twofold::job::Desk;
+use twofold::job::Executor;
 use twofold::job::spec::*;
 use twofold::paper::verdict::{Claim, SectionClaim};
 use twofold::paper::{Figure, Panel, View};
@@ -46,7 +46,7 @@ pub fn figures() -> &'static Path {
     static MADE: OnceLock<tempfile::TempDir> = OnceLock::new();
     let made = MADE.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();
-        cli::make(&[small_figure(60.0)], folder.path(), &Desk::quiet()).unwrap();
+        cli::make(&[small_figure(60.0)], folder.path(), &Executor::quiet()).unwrap();
         folder
     });
     made.path()

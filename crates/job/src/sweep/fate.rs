@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use super::far;
 use crate::answer::{Answer, Stop};
 use crate::classification::{Classification, SoFar};
-use crate::desk::Desk;
+use crate::executor::Executor;
 use crate::question::{JobError, Question};
 use crate::rest::{self, Rest};
 use crate::run::Run;
@@ -166,9 +166,9 @@ impl Question for Fate {
         Run(self.0.run.clone()).cost() + self.0.cost()
     }
 
-    fn compute(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
-        let answer = self.run(desk, watch)?;
-        Ok(Answer::of_tables(Vec::new()).with_fact("outcome", &self.judged(desk, &answer)?.outcome))
+    fn compute(&self, executor: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+        let answer = self.run(executor, watch)?;
+        Ok(Answer::of_tables(Vec::new()).with_fact("outcome", &self.judged(executor, &answer)?.outcome))
     }
 }
 
@@ -183,7 +183,7 @@ impl Fate {
     /// # Errors
     ///
     /// Whatever the computation met.
-    pub(super) fn run(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+    pub(super) fn run(&self, executor: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
         let run = &self.0.run;
         match (&self.is_far(), run.switch) {
             // Filippov motion has no layer to be stiff in: it gets to its end.
@@ -191,7 +191,7 @@ impl Fate {
                 Some(is_far),
                 SwitchSpec::Smoothed { .. } | SwitchSpec::Hysteretic { .. } | SwitchSpec::Delayed { .. },
             ) => Ok(simulate_until(run, is_far, watch)?.to_answer(run)),
-            _ => Run(run.clone()).compute(desk, watch),
+            _ => Run(run.clone()).compute(executor, watch),
         }
     }
 
@@ -200,8 +200,8 @@ impl Fate {
     /// # Errors
     ///
     /// Whatever the computation met.
-    pub fn ending(&self, desk: &Desk<'_>, watch: &dyn Watch) -> Result<Ending, JobError> {
-        self.judged(desk, &self.run(desk, watch)?)
+    pub fn ending(&self, executor: &Executor<'_>, watch: &dyn Watch) -> Result<Ending, JobError> {
+        self.judged(executor, &self.run(executor, watch)?)
     }
 
     /// What the answer to the run's question comes to.
@@ -209,10 +209,10 @@ impl Fate {
     /// # Errors
     ///
     /// Whatever the computation met.
-    fn judged(&self, desk: &Desk<'_>, answer: &Answer) -> Result<Ending, JobError> {
-        match self.so_far(desk, answer)? {
+    fn judged(&self, executor: &Executor<'_>, answer: &Answer) -> Result<Ending, JobError> {
+        match self.so_far(executor, answer)? {
             SoFar::Judged(outcome) => Ok(outcome),
-            SoFar::Awaits(exponent) => self.with_exponent(answer, exponent.found(&*desk.ask(&*exponent)?)),
+            SoFar::Awaits(exponent) => self.with_exponent(answer, exponent.found(&*executor.ask(&*exponent)?)),
         }
     }
 
@@ -221,7 +221,7 @@ impl Fate {
     /// # Errors
     ///
     /// As [`Fate::judged`].
-    pub(super) fn so_far(&self, desk: &Desk<'_>, answer: &Answer) -> Result<SoFar<Ending>, JobError> {
+    pub(super) fn so_far(&self, executor: &Executor<'_>, answer: &Answer) -> Result<SoFar<Ending>, JobError> {
         if answer.stop == Stop::Interrupted {
             return Err(JobError::Interrupted);
         }
@@ -229,11 +229,11 @@ impl Fate {
         if self.is_far().is_some_and(|far| far(&state)) {
             return Ok(SoFar::Judged(Ending { outcome: Outcome::far(answer)?, place: Vec::new() }));
         }
-        if let Some(rest) = rest::at_end(desk, &self.0.run, answer)? {
+        if let Some(rest) = rest::at_end(executor, &self.0.run, answer)? {
             let outcome = Outcome::at_rest(&rest, answer)?;
             return Ok(SoFar::Judged(Ending { outcome, place: vec![rest.state] }));
         }
-        Ok(match self.0.so_far(desk, answer)? {
+        Ok(match self.0.so_far(executor, answer)? {
             SoFar::Judged(evidence) => SoFar::Judged(Ending::of(&evidence, answer)?),
             SoFar::Awaits(exponent) => SoFar::Awaits(exponent),
         })
@@ -263,7 +263,7 @@ mod tests {
         let system = cases::smooth(&["x", "v"], "x + 9", &["v", "-x"]);
         let section = Observation::Section { coordinate: 0, value: 0.0 };
         let run = cases::run(system, SwitchSpec::tanh(1e-2), 20.0, section);
-        let evidence = Classification::of(run).ask(&Desk::quiet()).unwrap();
+        let evidence = Classification::of(run).ask(&Executor::quiet()).unwrap();
         let statistics = Some(Statistics { steps: 77, ..Statistics::default() });
         let answer = Answer { statistics, ..Answer::of_tables(Vec::new()) }.with_fact("t", &20.0);
         let cycle = |per_time: Option<f64>| Cycle {

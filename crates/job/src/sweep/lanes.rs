@@ -7,7 +7,7 @@ use nalgebra::SVector;
 use super::{Ending, Fate, Row, Sweep, far};
 use crate::answer::Answer;
 use crate::classification::SoFar;
-use crate::desk::{Desk, Progress};
+use crate::executor::{Executor, Progress};
 use crate::exponent::LargestExponent;
 use crate::question::{JobError, Question, question_hash};
 use crate::record::Hash;
@@ -252,10 +252,10 @@ impl Sweep {
         let Some(cell) = self.cell(number).filter(|cell| set != InstructionSet::Portable && smoothed(cell)) else {
             return Ok(Begun::Row(self.row(number, progress)?));
         };
-        let desk = Desk::new(None, progress);
+        let executor = Executor::new(None, progress);
         let display = progress.begin(&cell.question.label(), cell.question.extent());
-        let judged = cell.question.run(&desk, &*display).and_then(|answer| {
-            let so_far = cell.question.so_far(&desk, &answer)?;
+        let judged = cell.question.run(&executor, &*display).and_then(|answer| {
+            let so_far = cell.question.so_far(&executor, &answer)?;
             Ok((so_far, answer))
         });
         display.done(if judged.is_ok() { "" } else { "failed" });
@@ -339,11 +339,11 @@ fn side_by_side<const N: usize>(
             return;
         }
         let question = &cells[i].question;
-        // What is asked of a run's end is asked at a desk of its own, as if the row were alone.
-        let desk = Desk::new(None, progress);
+        // What is asked of a run's end is asked at an executor of its own, as if the row were alone.
+        let executor = Executor::new(None, progress);
         let outcome = recorded(end).and_then(|recording| {
             let answer = recording.to_answer(&question.0.run);
-            Ok((question.so_far(&desk, &answer)?, answer))
+            Ok((question.so_far(&executor, &answer)?, answer))
         });
         let outcome = match outcome {
             Ok((SoFar::Judged(outcome), _)) => Ok(outcome),
@@ -414,7 +414,7 @@ fn exponents(
     for (i, Waiting { cell, answer, exponent }) in waiting.into_iter().enumerate() {
         let known = match &found {
             Some(found) => Ok(found[i]),
-            None => Desk::new(None, progress).ask(&*exponent).map(|answer| exponent.found(&answer)),
+            None => Executor::new(None, progress).ask(&*exponent).map(|answer| exponent.found(&answer)),
         };
         let outcome = known.and_then(|exponent| cells[cell].question.with_exponent(&answer, exponent));
         if outcome == Err(JobError::Interrupted) {
@@ -457,7 +457,7 @@ mod tests {
     use super::super::Axis;
     use super::*;
     use crate::cases;
-    use crate::desk::JobWatch;
+    use crate::executor::JobWatch;
     use twofold_system::{Caricature, System};
 
     /// Counts the groups that are computed in lanes.

@@ -7,7 +7,7 @@
 //! and resumed, merge to the same bytes. Random axes are drawn and kicks are seeded by the row's number.
 //!
 //! ```
-//! use twofold_job::{Desk, spec::*, sweep::{Rows, Shard, Sweep}};
+//! use twofold_job::{Executor, spec::*, sweep::{Rows, Shard, Sweep}};
 //! use twofold_system::Caricature;
 //! let run = RunSpec {
 //!     system: Caricature::with_reinjection(1e-1, 1e-5).into(),
@@ -46,7 +46,7 @@ pub use fate::{Ending, Fate, Outcome};
 pub use rows::{Row, Rows, RowsError};
 
 use super::classification::Classification;
-use super::desk::{Desk, Progress};
+use super::executor::{Executor, Progress};
 use super::question::{JobError, question_hash};
 use super::spec::{RunSpec, SpecError, SwitchSpec};
 use super::table::Entry;
@@ -294,8 +294,8 @@ impl Sweep {
             Err(reason) => return Ok(Row::failed(row, settings, None, reason)),
         };
         let key = question_hash(&question);
-        // A desk of its own: what it has computed is forgotten with it, however many rows there are.
-        let answer = Desk::new(None, progress).ask(&question);
+        // An executor of its own: what it has computed is forgotten with it, however many rows there are.
+        let answer = Executor::new(None, progress).ask(&question);
         match answer.and_then(|a| Ok(a.fact::<Outcome>("outcome")?)) {
             Ok(outcome) => Ok(Row::found(row, settings, &key, outcome)),
             Err(JobError::Interrupted) => Err(JobError::Interrupted),
@@ -461,8 +461,8 @@ mod tests {
     fn a_fate_that_is_not_far_is_the_classification() {
         let run = RunSpec { t_end: 400.0, ..run() };
         let outcome: Outcome =
-            Desk::quiet().ask(&Fate(Classification::of(run.clone()))).unwrap().fact("outcome").unwrap();
-        let evidence = Classification::of(run).ask(&Desk::quiet()).unwrap();
+            Executor::quiet().ask(&Fate(Classification::of(run.clone()))).unwrap().fact("outcome").unwrap();
+        let evidence = Classification::of(run).ask(&Executor::quiet()).unwrap();
         assert_eq!(outcome.crossings, evidence.crossings as u64);
         assert_eq!(outcome.exponent, evidence.lyapunov.map(|l| l.value));
         assert_eq!(outcome.captured_at, evidence.verdict.cycle().map(|c| c.captured_at));

@@ -41,21 +41,21 @@ type Cell = Arc<OnceLock<Result<Arc<Answer>, JobError>>>;
 ///
 /// Several threads may ask at a time; who asks for what another thread is computing waits for it. That cannot lock up: a job rests only on
 /// jobs that do not rest on it, and a job that computes never turns to other work in between (see [`Question`]).
-pub struct Desk<'a> {
+pub struct Executor<'a> {
     store: Option<Store>,
     progress: &'a dyn Progress,
     answers: Mutex<HashMap<Hash, Cell>>,
 }
 
-impl Desk<'static> {
-    /// A desk without store and without display.
+impl Executor<'static> {
+    /// An executor without store and without display.
     pub fn quiet() -> Self {
-        Desk::new(None, &())
+        Executor::new(None, &())
     }
 }
 
-impl<'a> Desk<'a> {
-    /// A desk that keeps answers in `store`, if there is one, and reports to `progress`.
+impl<'a> Executor<'a> {
+    /// An executor that keeps answers in `store`, if there is one, and reports to `progress`.
     pub fn new(store: Option<Store>, progress: &'a dyn Progress) -> Self {
         Self { store, progress, answers: Mutex::default() }
     }
@@ -89,7 +89,7 @@ impl<'a> Desk<'a> {
     ///
     /// # Errors
     ///
-    /// As [`Desk::ask`].
+    /// As [`Executor::ask`].
     pub fn ask_in_passing(&self, question: &dyn Question) -> Result<Arc<Answer>, JobError> {
         let key = key(question);
         let cell = self.answers.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
@@ -125,7 +125,7 @@ impl<'a> Desk<'a> {
     }
 
     /// Sees to it that all these questions have answers, side by side on the current thread pool: first what others rest on, and of that the longest. With a
-    /// store, answers are there and not in memory. Errors wait in the desk until they are asked for, or are met again.
+    /// store, answers are there and not in memory. Errors wait in the executor until they are asked for, or are met again.
     pub fn gather(&self, questions: &[AnyQuestion]) {
         Plan::of(questions).carry_out(|question| match &self.store {
             Some(store) if store.has(&key(&**question)) => {}
@@ -177,14 +177,14 @@ mod tests {
         fn cost(&self) -> f64 {
             self.0 as f64
         }
-        fn compute(&self, desk: &Desk<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        fn compute(&self, executor: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
             self.1.fetch_add(1, Ordering::Relaxed);
             let value: u64 = match self.0 {
                 13 => return Err(JobError::Other("unlucky".into())),
                 n @ 0..2 => n,
                 n => {
                     let before =
-                        |k| -> Result<u64, JobError> { Ok(desk.ask(&Fibonacci(n - k, self.1))?.fact("value")?) };
+                        |k| -> Result<u64, JobError> { Ok(executor.ask(&Fibonacci(n - k, self.1))?.fact("value")?) };
                     before(1)? + before(2)?
                 }
             };
@@ -195,12 +195,12 @@ mod tests {
     #[test]
     fn each_question_is_computed_once_whatever_the_threads() {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
-        let desk = Desk::quiet();
+        let executor = Executor::quiet();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(4).build().unwrap();
         let questions: Vec<AnyQuestion> = (0..13).chain(0..13).map(|n| Arc::new(Fibonacci(n, &COUNT)) as _).collect();
-        pool.install(|| desk.gather(&questions));
+        pool.install(|| executor.gather(&questions));
         assert_eq!(COUNT.load(Ordering::Relaxed), 13);
-        assert_eq!(desk.ask(&Fibonacci(12, &COUNT)).unwrap().fact::<u64>("value"), Ok(144));
+        assert_eq!(executor.ask(&Fibonacci(12, &COUNT)).unwrap().fact::<u64>("value"), Ok(144));
         assert_eq!(COUNT.load(Ordering::Relaxed), 13);
     }
 
@@ -209,20 +209,20 @@ mod tests {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let folder = tempfile::tempdir().unwrap();
         let questions: Vec<AnyQuestion> = (0..8).map(|n| Arc::new(Fibonacci(n, &COUNT)) as _).collect();
-        let held = |desk: &Desk<'_>| desk.answers.lock().unwrap().len();
+        let held = |executor: &Executor<'_>| executor.answers.lock().unwrap().len();
 
-        let desk = Desk::new(Some(Store::new(folder.path())), &());
-        desk.gather(&questions);
-        assert_eq!((COUNT.load(Ordering::Relaxed), held(&desk)), (8, 0));
+        let executor = Executor::new(Some(Store::new(folder.path())), &());
+        executor.gather(&questions);
+        assert_eq!((COUNT.load(Ordering::Relaxed), held(&executor)), (8, 0));
         // Asked for, they come from the store; what somebody holds stays.
-        let held_by_us = desk.ask(&Fibonacci(7, &COUNT)).unwrap();
-        desk.ask(&Fibonacci(6, &COUNT)).unwrap();
-        desk.forget();
-        assert_eq!((COUNT.load(Ordering::Relaxed), held(&desk)), (8, 1));
+        let held_by_us = executor.ask(&Fibonacci(7, &COUNT)).unwrap();
+        executor.ask(&Fibonacci(6, &COUNT)).unwrap();
+        executor.forget();
+        assert_eq!((COUNT.load(Ordering::Relaxed), held(&executor)), (8, 1));
         drop(held_by_us);
 
-        // A desk that begins with them reads none of them (one is damaged and not missed), and computes only what is missing.
-        let next = Desk::new(Some(Store::new(folder.path())), &());
+        // An executor that begins with them reads none of them (one is damaged and not missed), and computes only what is missing.
+        let next = Executor::new(Some(Store::new(folder.path())), &());
         let path = Store::new(folder.path()).path(&key(&*questions[3]));
         let whole = std::fs::read(&path).unwrap();
         std::fs::write(&path, &whole[1..]).unwrap();
@@ -233,7 +233,7 @@ mod tests {
         assert_eq!(COUNT.load(Ordering::Relaxed), 9);
 
         // Without a store, memory is the only place.
-        let without = Desk::quiet();
+        let without = Executor::quiet();
         without.gather(&questions);
         without.forget();
         assert_eq!(held(&without), 8);
@@ -242,24 +242,24 @@ mod tests {
     #[test]
     fn what_is_asked_in_passing_is_not_kept() {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
-        let (desk, question) = (Desk::quiet(), Fibonacci(1, &COUNT));
+        let (executor, question) = (Executor::quiet(), Fibonacci(1, &COUNT));
         for times in 1..=2 {
-            assert_eq!(desk.ask_in_passing(&question).unwrap().fact::<u64>("value"), Ok(1));
+            assert_eq!(executor.ask_in_passing(&question).unwrap().fact::<u64>("value"), Ok(1));
             assert_eq!(COUNT.load(Ordering::Relaxed), times);
         }
         // What is there already is taken.
-        desk.ask(&question).unwrap();
-        desk.ask_in_passing(&question).unwrap();
+        executor.ask(&question).unwrap();
+        executor.ask_in_passing(&question).unwrap();
         assert_eq!(COUNT.load(Ordering::Relaxed), 3);
     }
 
     #[test]
     fn an_error_reaches_whoever_asks() {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
-        let desk = Desk::quiet();
+        let executor = Executor::quiet();
         for _ in 0..2 {
-            assert_eq!(desk.ask(&Fibonacci(14, &COUNT)).unwrap_err(), JobError::Other("unlucky".into()));
+            assert_eq!(executor.ask(&Fibonacci(14, &COUNT)).unwrap_err(), JobError::Other("unlucky".into()));
         }
-        assert_eq!(desk.ask(&Fibonacci(3, &COUNT)).unwrap().fact::<u64>("value"), Ok(2));
+        assert_eq!(executor.ask(&Fibonacci(3, &COUNT)).unwrap().fact::<u64>("value"), Ok(2));
     }
 }
