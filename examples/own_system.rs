@@ -4,7 +4,7 @@
 //! `cargo run --example own_system`
 
 use nalgebra::{SVector, vector};
-use twofold::integrate::filippov::{ExitRule, FilippovError, ModeEvent, Settings, Side, Trajectory, run};
+use twofold::integrate::filippov::{ExitRule, FilippovError, FilippovOptions, ModeEvent, Side, Trajectory, run};
 use twofold::num::Elementary;
 use twofold::system::PiecewiseSmooth;
 
@@ -32,7 +32,7 @@ impl PiecewiseSmooth<2> for Refuge {
 pub fn follow() -> Result<Vec<ModeEvent<2>>, FilippovError> {
     let rule = ExitRule::AtOnce { side: Side::Plus }; // What to do where the future is not unique: must be chosen.
     let mut record = Trajectory::new(4);
-    let _ = run(&Refuge { prey_needed: 1.0 }, vector![2.0, 0.8], 40.0, &Settings::default(), rule, &mut record)?;
+    let _ = run(&Refuge { prey_needed: 1.0 }, vector![2.0, 0.8], 40.0, &FilippovOptions::default(), rule, &mut record)?;
     Ok(record.events)
 }
 

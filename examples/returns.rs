@@ -6,7 +6,7 @@
 use nalgebra::{SVector, vector};
 use twofold::analyse::counts::wilson;
 use twofold::integrate::filippov::{
-    EventKind, ExitRule, FilippovError, FilippovObserver, Mode, ModeEvent, Settings, Side, run,
+    EventKind, ExitRule, FilippovError, FilippovObserver, FilippovOptions, Mode, ModeEvent, Side, run,
 };
 use twofold::integrate::{Flow, Step, Tolerance};
 use twofold::num::random::RandomStream;
@@ -36,7 +36,7 @@ impl FilippovObserver<3> for Back {
 ///
 /// If an orbit cannot be followed.
 pub fn back(system: &Caricature, box_size: f64, starts: u64) -> Result<u64, FilippovError> {
-    let settings = Settings { tolerance: Tolerance { rtol: 1e-12, atol: 1e-12 }, ..Settings::default() };
+    let settings = FilippovOptions { tolerance: Tolerance { rtol: 1e-12, atol: 1e-12 }, ..FilippovOptions::default() };
     let mut count = 0;
     for k in 0..starts {
         let mut random = RandomStream::new(2013, k);

@@ -4,7 +4,7 @@
 //! `cargo run --example system_from_text`
 
 use nalgebra::vector;
-use twofold::integrate::filippov::{ExitRule, Settings, Side, Trajectory, run};
+use twofold::integrate::filippov::{ExitRule, FilippovOptions, Side, Trajectory, run};
 use twofold::system::{Definition, System};
 
 const REFUGE: &str = r#"
@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let system = System::new(Definition::from_toml(REFUGE, "refuge.toml")?).with("refuge", 1.0)?;
     let rule = ExitRule::AtOnce { side: Side::Plus }; // What to do where the future is not unique: must be chosen.
     let mut record = Trajectory::new(4);
-    let end = run(&system.bind::<2>()?, vector![2.0, 0.8], 40.0, &Settings::default(), rule, &mut record)?;
+    let end = run(&system.bind::<2>()?, vector![2.0, 0.8], 40.0, &FilippovOptions::default(), rule, &mut record)?;
     for event in &record.events {
         println!("t = {:8.4}  prey {:.4}  predator {:.4}  {:?}", event.t, event.state[0], event.state[1], event.kind);
     }

@@ -6,7 +6,7 @@
 
 use serde_json::json;
 use twofold::rigor::cycle::Search;
-use twofold::rigor::{Settings, prove_cycle};
+use twofold::rigor::{FlowOptions, prove_cycle};
 use twofold_proofs::{SECTION, cycle, equation, print_cycle, refuse, write};
 
 const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed caricature has two different closed \
@@ -19,7 +19,7 @@ fn main() {
     let mut found = Vec::new();
     for (name, near, crossings) in [("period one", [0.8063, 0.0], 2), ("period three", [1.2073, 0.0003], 6)] {
         println!("{name}:");
-        let c = prove_cycle(&equation(alpha), Settings::PLAIN, &search(near, crossings))
+        let c = prove_cycle(&equation(alpha), FlowOptions::PLAIN, &search(near, crossings))
             .unwrap_or_else(|e| refuse(&e.to_string()));
         print_cycle(&c);
         if !c.attracts() {

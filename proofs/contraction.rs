@@ -8,7 +8,7 @@
 use nalgebra::SVector;
 use serde_json::{Value, json};
 use twofold::num::{Arithmetic, Ball, Elementary, Enclosure, FromDecimal, Interval};
-use twofold::rigor::{Flow, Set, Settings};
+use twofold::rigor::{Flow, FlowOptions, Set};
 use twofold_proofs::{SECTION, ball, bounds, digits, equation, parameters, refuse, write};
 
 const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the orbits of the smoothed caricature from (0.2, 0, -1), (0.21, 0, -1) and (0.2, 0, -0.99) \
@@ -24,7 +24,7 @@ fn main() {
     let mut ends: Vec<[Ball; 2]> = Vec::new();
     let mut rows: Vec<Value> = Vec::new();
     for [x, z] in STARTS {
-        let mut flow = Flow::<Ball, 3>::new(&equation(alpha), Settings::EXTENDED);
+        let mut flow = Flow::<Ball, 3>::new(&equation(alpha), FlowOptions::EXTENDED);
         let start = SVector::from([decimal(x), Ball::zero(), decimal(z)]);
         let mut set = Set::on_plane(start, SECTION.axis, SECTION.value, false);
         let mut points = Vec::new();

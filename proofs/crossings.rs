@@ -9,7 +9,7 @@
 use nalgebra::SVector;
 use serde_json::{Value, json};
 use twofold::num::{Arithmetic, Ball, Enclosure, FromDecimal, Interval};
-use twofold::rigor::{Flow, Set, Settings};
+use twofold::rigor::{Flow, FlowOptions, Set};
 use twofold_proofs::{SECTION, ball, equation, parameters, refuse, write};
 
 const STATEMENT: &str = "For beta = 1e-5, eps = 1e-3, the tanh transition and alpha = 1e-3 or 0.1, the first crossings of y = 0 by the orbit \
@@ -20,7 +20,7 @@ const RECONSTRUCTED: &str = include_str!("../crates/verify/data/crossings-recons
 
 /// Proves a table: (what was printed, the certificate's rows).
 fn table(alpha: f64, text: &str) -> Result<(String, Vec<Value>), String> {
-    let mut flow = Flow::<Ball, 3>::new(&equation(alpha), Settings::EXTENDED);
+    let mut flow = Flow::<Ball, 3>::new(&equation(alpha), FlowOptions::EXTENDED);
     let start = SVector::from([Ball::from_decimal(&0.2.into()), Ball::zero(), -Ball::one()]);
     let mut set = Set::on_plane(start, SECTION.axis, SECTION.value, false);
     let (mut report, mut rows) = (String::new(), Vec::new());

@@ -17,7 +17,7 @@ use nalgebra::SVector;
 use serde_json::{Value, json};
 use twofold::num::{Arithmetic, Ball, Enclosure, Interval, elementary};
 use twofold::rigor::covering::Image;
-use twofold::rigor::{Covering, Flow, HSet, Return, Set, Settings, prove_covering};
+use twofold::rigor::{Covering, Flow, FlowOptions, HSet, Return, Set, prove_covering};
 use twofold_proofs::{SECTION, bounds, equation, parameters, refuse, write};
 
 const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the return map of the smoothed caricature from a downward crossing of \
@@ -98,7 +98,7 @@ fn main() {
     let alpha = 0.1;
     println!("{STATEMENT}");
     let tape = equation(alpha);
-    let mut flow = Flow::<Ball, 3>::new(&tape, Settings::EXTENDED);
+    let mut flow = Flow::<Ball, 3>::new(&tape, FlowOptions::EXTENDED);
     let hub = HUB.map(|[high, low]| Ball::from_f64(high) + Ball::from_f64(low));
     let beside = [0, 1].map(|i| hub[i] + Ball::from_f64(UNSTABLE[i]) * Ball::from_f64(OFFSET));
     let saddle = places(&mut flow, hub, 2);
@@ -129,7 +129,7 @@ fn main() {
     for (i, set) in sets.iter().enumerate() {
         let next = follows(i);
         let targets: Vec<HSet> = next.iter().map(|t| sets[*t]).collect();
-        let Covering { pieces, edges } = prove_covering::<Ball>(&tape, Settings::EXTENDED, &MAP, set, &targets)
+        let Covering { pieces, edges } = prove_covering::<Ball>(&tape, FlowOptions::EXTENDED, &MAP, set, &targets)
             .unwrap_or_else(|e| refuse(&format!("set {i} to {next:?}: {e}")));
         let ends: Vec<String> = (0..next.len())
             .map(|k| {

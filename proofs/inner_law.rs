@@ -50,7 +50,7 @@ use nalgebra::SVector;
 use serde_json::json;
 use twofold::num::tape::Recorded;
 use twofold::num::{Arithmetic, Elementary, FromDecimal, Interval, Tape};
-use twofold::rigor::{Flow, Plane, Set, Settings};
+use twofold::rigor::{Flow, FlowOptions, Plane, Set};
 use twofold_proofs::{bounds, digits, refuse, write};
 
 const STATEMENT: &str = "In the inner problem of the two-fold with v+ = -1.2, v- = -1.4 and the tanh transition, let p = phi - phi* and q = (1 - phi*) Z - phi* Y, phi* being \
@@ -75,7 +75,7 @@ const UNIT: f64 = 1.0 / 1024.0;
 /// Largest e, of the same kind (crossings are enclosed by norms).
 const E: f64 = 1.0 / 1_048_576.0;
 /// States are as small as 1e-9 at s = 0.
-const SETTINGS: Settings = Settings { tolerance: 1e-29, ..Settings::PLAIN };
+const SETTINGS: FlowOptions = FlowOptions { tolerance: 1e-29, ..FlowOptions::PLAIN };
 /// The least S.
 const LEAST: f64 = 110.0;
 

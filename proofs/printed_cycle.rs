@@ -5,7 +5,7 @@
 //! the unit disc because 1 - det > 0 and 1 + det +- trace > 0.
 
 use twofold::rigor::cycle::Search;
-use twofold::rigor::{Settings, prove_cycle};
+use twofold::rigor::{FlowOptions, prove_cycle};
 use twofold_proofs::{SECTION, cycle, equation, print_cycle, refuse, write};
 
 const STATEMENT: &str = "For alpha = 1e-3, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed caricature has exactly one \
@@ -21,7 +21,7 @@ fn main() {
         longest: 40.0,
     };
     println!("{STATEMENT}");
-    let found = prove_cycle(&equation(alpha), Settings::PLAIN, &search).unwrap_or_else(|e| refuse(&e.to_string()));
+    let found = prove_cycle(&equation(alpha), FlowOptions::PLAIN, &search).unwrap_or_else(|e| refuse(&e.to_string()));
     print_cycle(&found);
     if !found.attracts() {
         refuse("the enclosures of trace and determinant do not show that the orbit attracts");

@@ -9,7 +9,7 @@
 use serde_json::{Map, Value};
 use twofold::num::{Arithmetic, Elementary, Interval};
 use twofold::rigor::cycle::Search;
-use twofold::rigor::{Cycle, Settings, prove_cycle};
+use twofold::rigor::{Cycle, FlowOptions, prove_cycle};
 use twofold_proofs::{SECTION, cycle, digits, equation, print_cycle, refuse, write};
 
 const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed caricature has four different closed orbits of saddle type, one \
@@ -35,7 +35,7 @@ fn main() {
     for (name, near, crossings) in ORBITS {
         println!("{name}:");
         let search = Search { plane: SECTION, near, radius: 1e-10, crossings, longest: 40.0 };
-        let c = prove_cycle(&equation(alpha), Settings::PLAIN, &search).unwrap_or_else(|e| refuse(&e.to_string()));
+        let c = prove_cycle(&equation(alpha), FlowOptions::PLAIN, &search).unwrap_or_else(|e| refuse(&e.to_string()));
         print_cycle(&c);
         if !c.is_saddle() {
             refuse("the enclosures of trace and determinant do not show a saddle");

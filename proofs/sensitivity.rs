@@ -10,7 +10,7 @@
 use nalgebra::SVector;
 use serde_json::{Value, json};
 use twofold::num::{Arithmetic, Ball, Elementary, Enclosure, FromDecimal};
-use twofold::rigor::{Flow, Set, Settings};
+use twofold::rigor::{Flow, FlowOptions, Set};
 use twofold_proofs::{SECTION, ball, bounds, digits, equation, parameters, refuse, write};
 
 const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the orbits of the smoothed caricature from the two \
@@ -31,7 +31,7 @@ fn main() {
     }
     let mut orbits = Vec::new();
     for (i, x) in STATES.into_iter().enumerate() {
-        let mut flow = Flow::<Ball, 3>::new(&equation(alpha), Settings::EXTENDED);
+        let mut flow = Flow::<Ball, 3>::new(&equation(alpha), FlowOptions::EXTENDED);
         let start = SVector::from([decimal(x), Ball::zero(), decimal(Z)]);
         let mut set = Set::on_plane(start, SECTION.axis, SECTION.value, i == 0);
         let mut points = Vec::new();

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use twofold::analyse::limit::{AfterVisitQuestion, ConvergenceQuestion, observed_rate};
-use twofold::integrate::filippov::{FunnelGrid, Settings};
+use twofold::integrate::filippov::{FilippovOptions, FunnelGrid};
 use twofold::job::table::{Entry, Table};
 use twofold::job::{AfterVisit, AnyQuestion, SmoothingLimit};
 use twofold::num::elementary::exp10;
@@ -54,7 +54,7 @@ fn before_question(reading: Reading) -> ConvergenceQuestion {
         start: START.into(),
         times: times(reading).into(),
         eps: BEFORE.into(),
-        settings: Settings::default(),
+        settings: FilippovOptions::default(),
     }
 }
 
@@ -67,7 +67,7 @@ fn after_question() -> AfterVisitQuestion {
         grid: GRID,
         refinements: REFINEMENTS,
         finer: FINER,
-        settings: Settings::default(),
+        settings: FilippovOptions::default(),
     }
 }
 

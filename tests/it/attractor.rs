@@ -134,7 +134,7 @@ fn logistic(mu: f64, n: usize) -> Vec<SectionPoint> {
 
 #[test]
 fn lorenz() {
-    let settings = lyapunov::Settings { transient: 20.0, duration: 2000.0, ..Default::default() };
+    let settings = lyapunov::LyapunovOptions { transient: 20.0, duration: 2000.0, ..Default::default() };
     let e = largest::<3, 6, _>(&Lorenz, vector![1.0, 1.0, 20.0], &settings).unwrap();
     // 0.9056 (Sprott 2003, "Chaos and Time-Series Analysis", appendix A).
     assert!(e.standard_error < 0.02, "{e:?}");
@@ -148,7 +148,7 @@ fn lorenz() {
 
 #[test]
 fn rossler() {
-    let settings = lyapunov::Settings { transient: 200.0, duration: 6000.0, ..Default::default() };
+    let settings = lyapunov::LyapunovOptions { transient: 200.0, duration: 6000.0, ..Default::default() };
     let e = largest::<3, 6, _>(&Rossler(5.7), vector![1.0, 1.0, 1.0], &settings).unwrap();
     // 0.0714 (Sprott 2003).
     assert!(e.standard_error < 0.004, "{e:?}");
@@ -185,7 +185,8 @@ fn van_der_pol() {
     assert!(cycle.settled_at.unwrap() < 50.0);
 
     let plane = Plane { axis: 1, value: 0.0, upward: true };
-    let o = closed_orbit::<2, 6, _>(&VanDerPol, plane, 1, vector![-2.2, 0.0], &floquet::Settings::default()).unwrap();
+    let o =
+        closed_orbit::<2, 6, _>(&VanDerPol, plane, 1, vector![-2.2, 0.0], &floquet::FloquetOptions::default()).unwrap();
     assert!((o.period - 6.663_286_86).abs() < 1e-8, "{o:?}");
     // Liouville: the only non-trivial multiplier is exp(integral of the divergence 1 - x^2 over a turn), here by a third
     // equation beside the orbit.
@@ -248,7 +249,8 @@ fn damped_spiral_has_its_rate() {
 fn closed_orbit_of_the_torus_has_its_multipliers() {
     let torus = Torus { omega: 0.3, gamma: 2e-3 };
     let plane = Plane { axis: 1, value: 0.0, upward: true };
-    let o = closed_orbit::<3, 12, _>(&torus, plane, 1, vector![2.1, 0.0, 0.05], &floquet::Settings::default()).unwrap();
+    let o = closed_orbit::<3, 12, _>(&torus, plane, 1, vector![2.1, 0.0, 0.05], &floquet::FloquetOptions::default())
+        .unwrap();
     let tau = std::f64::consts::TAU;
     assert!((o.period - tau).abs() < 1e-8 && (o.rate - 2e-3).abs() < 1e-8, "{o:?}");
     let size = (-2e-3 * tau).exp();
@@ -475,7 +477,7 @@ fn caricature(alpha: f64, beta: f64) -> Smoothed<Caricature> {
 #[test]
 fn closed_orbits_of_the_paper() {
     let plane = Plane { axis: 1, value: 0.0, upward: true };
-    let settings = floquet::Settings::default();
+    let settings = floquet::FloquetOptions::default();
     let find = |alpha: f64, beta: f64, returns: usize, x: f64, z: f64| {
         closed_orbit::<3, 12, _>(&caricature(alpha, beta), plane, returns, vector![x, 0.0, z], &settings).unwrap()
     };
@@ -528,7 +530,7 @@ fn hysteretic_cycle_contracts_by_its_multiplier() {
     let plane = Plane { axis: 1, value: 0.0, upward: true };
     // Away from the layer phi is 1 for x > 0 up to relaxation.
     let guess = vector![u[0], 0.0, u[1], 1.0];
-    let orbit = closed_orbit::<4, 20, _>(&field, plane, 2, guess, &floquet::Settings::default()).unwrap();
+    let orbit = closed_orbit::<4, 20, _>(&field, plane, 2, guess, &floquet::FloquetOptions::default()).unwrap();
     assert!((orbit.period - cycle.duration).abs() < 1e-5, "{orbit:?} {cycle:?}");
     let p = &orbit.points[0];
     assert!((p[0] - u[0]).abs() < 1e-5 && (p[2] - u[1]).abs() < 1e-5, "{orbit:?} {cycle:?}");
@@ -550,7 +552,7 @@ fn spiral_of_the_reconstructed_reading_has_the_orbits_rate() {
     let Verdict::Spiralling(cycle) = &e.verdict else { panic!("{e:?}") };
     assert_eq!(cycle.period, 1);
     let plane = Plane { axis: 1, value: 0.0, upward: true };
-    let settings = floquet::Settings::default();
+    let settings = floquet::FloquetOptions::default();
     let u = cycle.points[0].u;
     let orbit = closed_orbit::<3, 12, _>(&field, plane, 1, vector![u[0], 0.0, u[1]], &settings).unwrap();
     assert!((cycle.approach.unwrap().per_time / orbit.rate - 1.0).abs() < 0.05, "{cycle:?} {orbit:?}");
@@ -564,7 +566,7 @@ fn exponent_of_the_reconstructed_chaos_converges_in_tolerance() {
     let field = caricature(1e-1, 1e-5);
     let [loose, tight] = [1e-9, 1e-11].map(|tol| {
         let tolerance = Tolerance { rtol: tol, atol: tol };
-        let settings = lyapunov::Settings { tolerance, max_step: 1.0, duration: 3000.0, ..Default::default() };
+        let settings = lyapunov::LyapunovOptions { tolerance, max_step: 1.0, duration: 3000.0, ..Default::default() };
         largest::<3, 6, _>(&field, vector![0.2, 0.0, -1.0], &settings).unwrap()
     });
     let error = (loose.standard_error * loose.standard_error + tight.standard_error * tight.standard_error).sqrt();
@@ -575,7 +577,7 @@ fn exponent_of_the_reconstructed_chaos_converges_in_tolerance() {
 #[test]
 fn exponent_on_a_closed_orbit_is_zero() {
     // Along the orbit nothing grows or shrinks on average; across it everything shrinks.
-    let settings = lyapunov::Settings { transient: 500.0, duration: 1000.0, ..Default::default() };
+    let settings = lyapunov::LyapunovOptions { transient: 500.0, duration: 1000.0, ..Default::default() };
     let e = largest::<2, 4, _>(&VanDerPol, vector![2.0, 0.0], &settings).unwrap();
     assert!(e.value.abs() < 2e-3, "{e:?}");
 }

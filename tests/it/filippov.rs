@@ -4,8 +4,8 @@
 use nalgebra::{SVector, vector};
 use twofold::integrate::filippov::two_fold::SlidingAtTwoFold;
 use twofold::integrate::filippov::{
-    EventKind, ExitRule, FilippovError, FunnelGrid, Mode, Settings, Side, SlidingLaw, Trajectory, connect, funnel,
-    history, run, run_watched,
+    EventKind, ExitRule, FilippovError, FilippovOptions, FunnelGrid, Mode, Side, SlidingLaw, Trajectory, connect,
+    funnel, history, run, run_watched,
 };
 use twofold::integrate::{StopReason, Tolerance, Watch};
 use twofold::system::{Bound, Caricature, PiecewiseSmooth, System, Wheel};
@@ -57,7 +57,7 @@ fn sliding_time_to_the_two_fold_of_the_normal_form() {
         let det = 1.2 * 1.4 - 1.0;
         let exact = -((-1.2 * y - z) + (-y - 1.4 * z)) / det;
         let mut out = Trajectory::new(4);
-        let end = run(&n, vector![0.0, y, z], 100.0, &Settings::default(), ExitRule::All, &mut out).unwrap();
+        let end = run(&n, vector![0.0, y, z], 100.0, &FilippovOptions::default(), ExitRule::All, &mut out).unwrap();
         assert_eq!(end.stop, StopReason::SetValued);
         assert!((end.t - exact).abs() < 1e-11 * exact, "{y} {z}: {} {exact} {:e}", end.t, end.t - exact);
         assert!(end.x.amax() < 1e-14);
@@ -71,7 +71,7 @@ fn crossing_return_map_of_the_normal_form() {
     let (v, w) = (-1.2, -1.4);
     let n = invisible(v, w);
     let mut out = Trajectory::new(1);
-    let end = run(&n, vector![0.0, -1.0, 0.4], 20.0, &Settings::default(), STAY, &mut out).unwrap();
+    let end = run(&n, vector![0.0, -1.0, 0.4], 20.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
     assert!(end.events > 3);
     let (mut t, mut y, mut z) = (0.0, -1.0_f64, 0.4_f64);
     for event in &out.events[1..] {
@@ -99,7 +99,8 @@ fn caricature_passes_the_two_fold_several_times() {
     for (alpha, t_end) in [(1e-3, 300.0), (1e-1, 100.0)] {
         let c = Caricature::with_reinjection(alpha, 1e-5);
         let mut out = Trajectory::new(4);
-        let end = run(&c, vector![0.2, 0.0, -1.0], t_end, &Settings::default(), random(2013, 0.5), &mut out).unwrap();
+        let end =
+            run(&c, vector![0.2, 0.0, -1.0], t_end, &FilippovOptions::default(), random(2013, 0.5), &mut out).unwrap();
         let passages = out.events.iter().filter(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).count();
         assert!(passages >= 3, "{passages}");
         assert!(drift(&c, &out) <= 1e-12, "{:e}", drift(&c, &out));
@@ -125,7 +126,7 @@ fn the_misprinted_sign_never_returns() {
         ..Caricature::with_reinjection(1e-3, 1e-5)
     };
     let mut out = Trajectory::new(1);
-    let end = run(&c, vector![0.2, 0.0, -1.0], 4000.0, &Settings::default(), STAY, &mut out).unwrap();
+    let end = run(&c, vector![0.2, 0.0, -1.0], 4000.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
     assert_eq!(end.mode, Some(Mode::SlidingAttracting));
     // It ends on the point where f+ and f- are opposed, lambda f+ + (1 - lambda) f- = 0 with lambda = z/(z - y): that is
     // (0, 8.084, -9.014); SCIENCE.md says "near (0, 8.9, -9.4)", which does not satisfy this equation.
@@ -140,7 +141,8 @@ fn the_misprinted_sign_never_returns() {
 fn the_wheel_returns_to_its_singularity() {
     let w = Wheel::default();
     let mut out = Trajectory::new(4);
-    let end = run(&w, vector![0.69267, 0.0, 0.0], 60.0, &Settings::default(), random(1, 0.05), &mut out).unwrap();
+    let end =
+        run(&w, vector![0.69267, 0.0, 0.0], 60.0, &FilippovOptions::default(), random(1, 0.05), &mut out).unwrap();
     let at = vector![0.6926698897, -0.5736729677, -0.8666344383];
     let visits: Vec<_> = out.events.iter().filter(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).collect();
     assert!(visits.len() >= 3, "{}", visits.len());
@@ -175,14 +177,14 @@ fn time_along_the_invariant_curve_is_the_integrators() {
         let start = curve.at(part * curve.radius);
         let exact = -curve.time(part * curve.radius);
         let mut out = Trajectory::new(1);
-        let end = run(&c, start, 100.0, &Settings::default(), ExitRule::All, &mut out).unwrap();
+        let end = run(&c, start, 100.0, &FilippovOptions::default(), ExitRule::All, &mut out).unwrap();
         assert!((end.t - exact).abs() < 1e-10 * exact, "{} {exact}", end.t);
     }
     // Into the repelling region: the exit after a given time is the point of the curve at that time.
     let time = 0.5 * curve.time(-curve.radius);
     let mut out = Trajectory::new(1);
     let rule = ExitRule::AfterTime { time, side: Side::Minus };
-    let _ = run(&c, vector![0.0, 0.0, 0.0], 3.0, &Settings::default(), rule, &mut out).unwrap();
+    let _ = run(&c, vector![0.0, 0.0, 0.0], 3.0, &FilippovOptions::default(), rule, &mut out).unwrap();
     let exit = out.events.iter().find(|e| matches!(e.kind, EventKind::Exit { .. })).unwrap();
     assert!((exit.t - time).abs() < 1e-14);
     close(exit.state, curve.at(-0.5 * curve.radius.min(curve.sigma(time, curve.radius).abs() * 2.0)), 1e-12);
@@ -193,7 +195,7 @@ fn last_leg_error_is_within_its_estimate() {
     // The same arrival with the leg begun 10^4 times farther out: the difference is of the size stated.
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     let arrival = |leg: f64| {
-        let settings = Settings { leg, ..Settings::default() };
+        let settings = FilippovOptions { leg, ..FilippovOptions::default() };
         let mut out = Trajectory::new(1);
         let _ = run(&c, vector![0.0, 1.0, 0.2], 100.0, &settings, ExitRule::All, &mut out).unwrap();
         let error = |e: &EventKind| if let EventKind::TwoFoldReached { error, .. } = *e { Some(error) } else { None };
@@ -216,7 +218,7 @@ fn visible_visible_sliding_leaves_along_the_fold() {
     let root3 = 3.0_f64.sqrt();
     let exact = 3.0 * (1.0 - 1.0 / root3);
     let mut out = Trajectory::new(4);
-    let end = run(&n, vector![0.0, -1.0, -2.0], exact + 1.0, &Settings::default(), STAY, &mut out).unwrap();
+    let end = run(&n, vector![0.0, -1.0, -2.0], exact + 1.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
     let left = out.events.iter().find(|e| e.kind == EventKind::LeftByTangency { to: Side::Plus }).unwrap();
     assert!((left.t - exact).abs() < 1e-11, "{} {exact}", left.t);
     close(left.state, vector![0.0, 0.0, -root3], 1e-10);
@@ -231,7 +233,8 @@ fn visible_visible_two_fold_flies_off_at_once() {
     for side in [Side::Plus, Side::Minus] {
         let mut out = Trajectory::new(1);
         let end =
-            run(&n, vector![0.0, -1.0, -1.0], 3.0, &Settings::default(), ExitRule::AtOnce { side }, &mut out).unwrap();
+            run(&n, vector![0.0, -1.0, -1.0], 3.0, &FilippovOptions::default(), ExitRule::AtOnce { side }, &mut out)
+                .unwrap();
         let reached = out.events.iter().find(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).unwrap();
         assert!((reached.t - 2.0).abs() < 1e-12, "{}", reached.t);
         let expected = match side {
@@ -247,17 +250,29 @@ fn visible_invisible_sliding_turns_towards_the_visible_fold() {
     // v = w = 0, plus visible: p = y, q = z, p' = q, q' = -p (a rotation). From (-1, 1): p = 0 at t = 2^1/2, q = 2^1/2.
     let root2 = 2.0_f64.sqrt();
     let mut out = Trajectory::new(1);
-    let end =
-        run(&visible_pair(true, false), vector![0.0, -1.0, 1.0], root2 + 1.0, &Settings::default(), STAY, &mut out)
-            .unwrap();
+    let end = run(
+        &visible_pair(true, false),
+        vector![0.0, -1.0, 1.0],
+        root2 + 1.0,
+        &FilippovOptions::default(),
+        STAY,
+        &mut out,
+    )
+    .unwrap();
     let left = out.events.iter().find(|e| e.kind == EventKind::LeftByTangency { to: Side::Plus }).unwrap();
     assert!((left.t - root2).abs() < 1e-11);
     close(end.x, vector![0.5, 1.0, root2], 1e-10);
     // Minus visible: p = -y, q = -z, p' = -q, q' = p. From (p, q) = (-1, 1) it is q that comes to zero.
     let mut out = Trajectory::new(1);
-    let end =
-        run(&visible_pair(false, true), vector![0.0, 1.0, -1.0], root2 + 1.0, &Settings::default(), STAY, &mut out)
-            .unwrap();
+    let end = run(
+        &visible_pair(false, true),
+        vector![0.0, 1.0, -1.0],
+        root2 + 1.0,
+        &FilippovOptions::default(),
+        STAY,
+        &mut out,
+    )
+    .unwrap();
     let left = out.events.iter().find(|e| e.kind == EventKind::LeftByTangency { to: Side::Minus }).unwrap();
     assert!((left.t - root2).abs() < 1e-11);
     close(end.x, vector![-0.5, root2, 1.0], 1e-10);
@@ -269,7 +284,7 @@ fn repelling_sliding_through_an_invisible_two_fold_backwards() {
     // field on y = z is (1/2, 1/2): from (-1, -1) the two-fold is reached at t = 2, and (1.5, 1.5) at t = 5.
     let n = visible_pair(false, false);
     let mut out = Trajectory::new(1);
-    let end = run(&n, vector![0.0, -1.0, -1.0], 5.0, &Settings::default(), STAY, &mut out).unwrap();
+    let end = run(&n, vector![0.0, -1.0, -1.0], 5.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
     let reached = out.events.iter().find(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).unwrap();
     assert!((reached.t - 2.0).abs() < 1e-12, "{}", reached.t);
     assert_eq!(end.mode, Some(Mode::SlidingAttracting));
@@ -282,7 +297,8 @@ fn repelling_sliding_ends_at_an_invisible_fold() {
     // p = (3/4)^1/2; there only h > 0 is left.
     let mut out = Trajectory::new(1);
     let _ =
-        run(&visible_pair(false, false), vector![0.0, -1.0, -0.5], 1.0, &Settings::default(), STAY, &mut out).unwrap();
+        run(&visible_pair(false, false), vector![0.0, -1.0, -0.5], 1.0, &FilippovOptions::default(), STAY, &mut out)
+            .unwrap();
     let left = out
         .events
         .iter()
@@ -298,7 +314,7 @@ fn grazing_and_its_neighbours() {
     let n = visible_pair(true, true);
     let fly = |x0: f64| {
         let mut out = Trajectory::new(1);
-        let end = run(&n, vector![x0, -1.0, -1.0], 3.0, &Settings::default(), STAY, &mut out).unwrap();
+        let end = run(&n, vector![x0, -1.0, -1.0], 3.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
         (end, out.events)
     };
     let (end, events) = fly(0.5);
@@ -328,7 +344,7 @@ fn rules_do_what_they_say() {
     let speed = -mu * (y * y + z * z).sqrt() / (y + z);
     let exit = |rule: ExitRule| {
         let mut out = Trajectory::new(1);
-        let _ = run(&n, vector![0.0, 0.3, 0.5], 20.0, &Settings::default(), rule, &mut out).unwrap();
+        let _ = run(&n, vector![0.0, 0.3, 0.5], 20.0, &FilippovOptions::default(), rule, &mut out).unwrap();
         let departed = out.events.iter().find(|e| e.kind == EventKind::EnteredRepelling).unwrap().t;
         let e = *out.events.iter().find(|e| matches!(e.kind, EventKind::Exit { .. })).unwrap();
         let EventKind::Exit { to, time, arc, rule: recorded } = e.kind else { unreachable!() };
@@ -365,7 +381,7 @@ fn bad_rules_are_named() {
     let n = invisible(-1.2, -1.4);
     let mut out = Trajectory::new(1);
     let rule = ExitRule::AfterTime { time: -1.0, side: Side::Plus };
-    let error = run(&n, vector![0.0, 0.3, 0.5], 1.0, &Settings::default(), rule, &mut out).unwrap_err();
+    let error = run(&n, vector![0.0, 0.3, 0.5], 1.0, &FilippovOptions::default(), rule, &mut out).unwrap_err();
     assert!(matches!(error, FilippovError::Invalid(ref m) if m.contains("time")), "{error}");
     let json = r#"{"random":{"law":{"exponential":{"mean":0.5}},"plus_probability":0.5,"seed":1,"stream":0}}"#;
     assert_eq!(serde_json::from_str::<ExitRule>(json).unwrap(), random(1, 0.5));
@@ -395,7 +411,7 @@ fn stick_slip_limit_cycle() {
     let period = low + (friction - x_land) / b;
 
     let mut out = Trajectory::new(4);
-    let _ = run(&s, vector![0.0, 0.0], 60.0, &Settings::default(), STAY, &mut out).unwrap();
+    let _ = run(&s, vector![0.0, 0.0], 60.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
     let slips: Vec<_> = out.events.iter().filter(|e| e.kind == EventKind::LeftByTangency { to: Side::Minus }).collect();
     let lands: Vec<_> = out.events.iter().filter(|e| e.kind == EventKind::Landing { from: Side::Minus }).collect();
     assert!(slips.len() >= 4);
@@ -411,7 +427,7 @@ fn stick_slip_limit_cycle() {
 fn relay_with_linear_feedback_slides_exponentially() {
     let r = builtin::<2>("relay-linear", &[("gain", 1.0)]);
     let mut out = Trajectory::new(4);
-    let end = run(&r, vector![0.5, 0.0], 8.0, &Settings::default(), STAY, &mut out).unwrap();
+    let end = run(&r, vector![0.5, 0.0], 8.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
     // x = 1/2 - t²/2, v = -t: lands at t² + 2 t = 1; |v| < 1, so it slides with x' = -x.
     let t1 = 2.0_f64.sqrt() - 1.0;
     assert_eq!(out.events.len(), 1);
@@ -428,14 +444,15 @@ fn relay_with_parabolic_feedback() {
     let slow = builtin::<2>("relay-parabolic", &[("gain", 2.0)]);
     let t1 = (4.0_f64 / 3.0).sqrt();
     let mut out = Trajectory::new(4);
-    let end = run(&slow, vector![2.0, 0.0], t1 + 1.5, &Settings::default(), STAY, &mut out).unwrap();
+    let end = run(&slow, vector![2.0, 0.0], t1 + 1.5, &FilippovOptions::default(), STAY, &mut out).unwrap();
     let v = -t1 + 0.75;
     close(end.x, vector![v * v, v], 1e-11);
     assert!(drift(&slow, &out) <= 1e-12);
     // The origin, at t1 + 2 t1, is a rest: zero lies between the fields (0, -1) and (0, 1).
-    let end = run(&slow, vector![2.0, 0.0], 10.0, &Settings::default(), STAY, &mut Trajectory::new(1)).unwrap();
+    let end = run(&slow, vector![2.0, 0.0], 10.0, &FilippovOptions::default(), STAY, &mut Trajectory::new(1)).unwrap();
     assert!(end.x.amax() < 1e-6 && end.mode == Some(Mode::SlidingAttracting), "{end:?}");
-    let end = run(&slow, vector![2.0, 0.0], 2.9 * t1, &Settings::default(), STAY, &mut Trajectory::new(1)).unwrap();
+    let end =
+        run(&slow, vector![2.0, 0.0], 2.9 * t1, &FilippovOptions::default(), STAY, &mut Trajectory::new(1)).unwrap();
     assert!((end.x[1] + 0.05 * t1).abs() < 1e-9, "{end:?}");
 
     // Gain 1/2: flights accumulate at t1 + t1 (1 + r)/(1 - r), r² = (1 - k)/(1 + k), t1² = 4/(1 + k).
@@ -443,14 +460,15 @@ fn relay_with_parabolic_feedback() {
     let (t1, r) = ((4.0_f64 / 1.5).sqrt(), (0.5_f64 / 1.5).sqrt());
     let exact = t1 * (1.0 + (1.0 + r) / (1.0 - r));
     let mut out = Trajectory::new(1);
-    let end = run(&fast, vector![2.0, 0.0], 100.0, &Settings::default(), STAY, &mut out).unwrap();
+    let end = run(&fast, vector![2.0, 0.0], 100.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
     assert!(end.x.amax() < 1e-9 && end.t == 100.0, "{end:?}");
     let last = out.events.last().unwrap();
     assert!(matches!(last.kind, EventKind::Accumulation { .. }) && (last.t - exact).abs() < 1e-8, "{last:?} {exact}");
 
     // Gain 1, time-optimal: the switching curve is an orbit of f-, a fold at every point.
     let optimal = builtin::<2>("relay-parabolic", &[("gain", 1.0)]);
-    let error = run(&optimal, vector![2.0, 0.0], 9.0, &Settings::default(), STAY, &mut Trajectory::new(1)).unwrap_err();
+    let error =
+        run(&optimal, vector![2.0, 0.0], 9.0, &FilippovOptions::default(), STAY, &mut Trajectory::new(1)).unwrap_err();
     assert!(matches!(error, FilippovError::NonTransversal { t, .. } if (t - 2.0_f64.sqrt()).abs() < 1e-9), "{error}");
 }
 
@@ -458,7 +476,7 @@ fn relay_with_parabolic_feedback() {
 fn the_funnel_holds_every_exit() {
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     let grid = FunnelGrid { shortest: 0.05, longest: 1.5, times: 5, horizon: 60.0, until_two_fold: true, per_step: 2 };
-    let f = funnel(&c, vector![0.2, 0.0, -1.0], 50.0, &Settings::default(), &grid).unwrap();
+    let f = funnel(&c, vector![0.2, 0.0, -1.0], 50.0, &FilippovOptions::default(), &grid).unwrap();
     assert!(f.point.amax() < 1e-14 && (f.t - 13.196).abs() < 1e-2, "{} {:?}", f.t, f.point);
     assert_eq!(f.members.len(), 10);
     for m in &f.members {
@@ -483,7 +501,7 @@ fn the_funnel_holds_every_exit() {
 fn a_step_cap_changes_no_event() {
     // Uncapped steps straddle whole excursions; steps of 1e-3 do not. The sequence of events must be the same.
     fn kinds<P: PiecewiseSmooth<3>>(system: &P, max_step: f64, t_end: f64) -> Vec<(String, f64)> {
-        let settings = Settings { max_step, ..Settings::default() };
+        let settings = FilippovOptions { max_step, ..FilippovOptions::default() };
         let mut out = Trajectory::new(1);
         let start = vector![0.69267, 0.0, 0.0];
         let _ = run(system, start, t_end, &settings, ExitRule::All, &mut out).unwrap();
@@ -525,7 +543,7 @@ fn a_step_that_straddles_two_crossings_misses_none() {
             let a = 0.05 + 0.37 * f64::from(k);
             let p = Parabola { a, b: a + gap };
             let mut out = Trajectory::new(1);
-            let _ = run(&p, vector![p.a * p.b, 0.0], 20.0, &Settings::default(), STAY, &mut out).unwrap();
+            let _ = run(&p, vector![p.a * p.b, 0.0], 20.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
             assert_eq!(out.events.len(), 2, "gap {gap:e} a {a}: {:?}", out.events);
             let error = (out.events[0].t - p.a).abs().max((out.events[1].t - p.b).abs());
             assert!(error < 1e-13 * 20.0 / gap, "gap {gap:e} a {a}: {error:e}");
@@ -540,10 +558,10 @@ fn reversed_time_leads_back() {
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     let mut forward = Trajectory::new(1);
     let rule = ExitRule::AfterTime { time: 0.9, side: Side::Plus };
-    let _ = run(&c, vector![0.0, 0.0, 0.0], 2.0, &Settings::default(), rule, &mut forward).unwrap();
+    let _ = run(&c, vector![0.0, 0.0, 0.0], 2.0, &FilippovOptions::default(), rule, &mut forward).unwrap();
     let exit = forward.events.iter().find(|e| matches!(e.kind, EventKind::Exit { .. })).unwrap();
     let mut back = Trajectory::new(1);
-    let end = run(&Reversed(c), exit.state, 5.0, &Settings::default(), ExitRule::All, &mut back).unwrap();
+    let end = run(&Reversed(c), exit.state, 5.0, &FilippovOptions::default(), ExitRule::All, &mut back).unwrap();
     assert!(end.x.amax() < 1e-12 && (end.t - 0.9).abs() < 1e-10, "{end:?}");
 }
 
@@ -562,7 +580,8 @@ fn observers_of_ordinary_runs_work() {
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     let mut seen = Joined::default();
     let _ =
-        run(&c, vector![0.2, 0.0, -1.0], 40.0, &Settings::default(), random(3, 0.5), &mut AllModes(&mut seen)).unwrap();
+        run(&c, vector![0.2, 0.0, -1.0], 40.0, &FilippovOptions::default(), random(3, 0.5), &mut AllModes(&mut seen))
+            .unwrap();
     assert_eq!((seen.0[0].0, seen.0.last().unwrap().1), (0.0, 40.0));
     assert!(seen.0.windows(2).all(|w| w[0].1 == w[1].0 && w[0].0 < w[0].1));
 }
@@ -572,14 +591,21 @@ fn interpolants_are_in_physical_time_and_on_the_surface() {
     // Between the ends of a sliding step too: |h| <= 1e-12 and the state at a time is the state of a run that ends there.
     let w = Wheel::default();
     let mut out = Trajectory::new(16);
-    let _ = run(&w, vector![0.69267, 0.0, 0.0], 3.0, &Settings::default(), ExitRule::All, &mut out).unwrap();
+    let _ = run(&w, vector![0.69267, 0.0, 0.0], 3.0, &FilippovOptions::default(), ExitRule::All, &mut out).unwrap();
     assert!(drift(&w, &out) <= 1e-12, "{:e}", drift(&w, &out));
     let sliding: Vec<_> =
         out.pieces.iter().filter(|p| p.mode == Mode::SlidingAttracting).flat_map(|p| &p.points).collect();
     assert!(sliding.len() > 100);
     for (t, x) in sliding.iter().step_by(sliding.len() / 7) {
-        let end = run(&w, vector![0.69267, 0.0, 0.0], *t, &Settings::default(), ExitRule::All, &mut Trajectory::new(1))
-            .unwrap();
+        let end = run(
+            &w,
+            vector![0.69267, 0.0, 0.0],
+            *t,
+            &FilippovOptions::default(),
+            ExitRule::All,
+            &mut Trajectory::new(1),
+        )
+        .unwrap();
         assert!((end.x - x).amax() < 1e-8, "t = {t}: {:e}", (end.x - x).amax());
     }
 }
@@ -589,8 +615,11 @@ fn tolerance_buys_accuracy() {
     // The first arrival at the two-fold after three crossings and a landing, against a run with tiny steps.
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     let arrival = |tolerance: f64, max_step: f64| {
-        let settings =
-            Settings { tolerance: Tolerance { rtol: tolerance, atol: tolerance }, max_step, ..Settings::default() };
+        let settings = FilippovOptions {
+            tolerance: Tolerance { rtol: tolerance, atol: tolerance },
+            max_step,
+            ..FilippovOptions::default()
+        };
         run(&c, vector![0.2, 0.0, -1.0], 50.0, &settings, ExitRule::All, &mut Trajectory::new(1)).unwrap().t
     };
     let exact = arrival(1e-13, 5e-3);
@@ -607,7 +636,7 @@ fn every_point_of_the_repelling_region_has_a_past_at_the_two_fold() {
     let n = invisible(-1.2, -1.4);
     for (y, z) in [(-0.3, -0.8), (-1.0, -0.05), (-0.4, -0.4)] {
         let exact = -((1.2 * y + z) + (y + 1.4 * z)) / (1.2 * 1.4 - 1.0);
-        let past = history(&n, vector![0.0, y, z], 100.0, &Settings::default(), 4).unwrap();
+        let past = history(&n, vector![0.0, y, z], 100.0, &FilippovOptions::default(), 4).unwrap();
         let points: Vec<_> = past.points().collect();
         let (first, last) = (points[0], points[points.len() - 1]);
         assert!(first.1.amax() < 1e-12 && first.0 == 0.0);
@@ -615,7 +644,7 @@ fn every_point_of_the_repelling_region_has_a_past_at_the_two_fold() {
         assert!((last.0 - exact).abs() < 1e-10 * exact, "{} {exact}", last.0);
         assert!(past.pieces.iter().all(|p| p.mode == Mode::SlidingRepelling));
     }
-    assert!(history(&n, vector![0.0, 1.0, 1.0], 100.0, &Settings::default(), 4).is_err());
+    assert!(history(&n, vector![0.0, 1.0, 1.0], 100.0, &FilippovOptions::default(), 4).is_err());
 }
 
 #[test]
@@ -623,7 +652,7 @@ fn points_of_the_chaotic_set_are_connected_through_the_singularity() {
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     // Points of one orbit, taken from its free flight after the first visit.
     let mut orbit = Trajectory::new(2);
-    let _ = run(&c, vector![0.2, 0.0, -1.0], 90.0, &Settings::default(), random(3, 0.8), &mut orbit).unwrap();
+    let _ = run(&c, vector![0.2, 0.0, -1.0], 90.0, &FilippovOptions::default(), random(3, 0.8), &mut orbit).unwrap();
     let visit = orbit.events.iter().find(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).unwrap().t;
     let flights: Vec<_> = orbit.pieces.iter().filter(|p| !p.mode.slides() && p.points[0].0 > visit).collect();
     let mut connected = 0;
@@ -631,7 +660,7 @@ fn points_of_the_chaotic_set_are_connected_through_the_singularity() {
     for flight in flights.iter().take(12) {
         let b = flight.points[flight.points.len() / 2].1;
         tried += 1;
-        let Ok(path) = connect(&c, vector![0.2, 0.0, -1.0], b, 200.0, &Settings::default(), 2) else {
+        let Ok(path) = connect(&c, vector![0.2, 0.0, -1.0], b, 200.0, &FilippovOptions::default(), 2) else {
             continue;
         };
         connected += 1;
@@ -646,7 +675,8 @@ fn points_of_the_chaotic_set_are_connected_through_the_singularity() {
         let (t0, from) = *path.pieces[left].points.last().unwrap();
         let side = if path.pieces[left + 1].mode == Mode::Plus { Side::Plus } else { Side::Minus };
         let t = points[points.len() - 1].0 - t0;
-        let end = run(&c, from, t, &Settings::default(), ExitRule::AtOnce { side }, &mut Trajectory::new(1)).unwrap();
+        let end =
+            run(&c, from, t, &FilippovOptions::default(), ExitRule::AtOnce { side }, &mut Trajectory::new(1)).unwrap();
         assert!((end.x - b).amax() < 1e-7, "{:e}", (end.x - b).amax());
     }
     assert_eq!(connected, tried, "any two points of the set are connected");
@@ -682,9 +712,15 @@ fn the_smoothed_reference_lies_within_eps() {
     for (name, alpha, rows) in [("crossings-printed.csv", 1e-3, 4), ("crossings-reconstructed.csv", 1e-1, 2)] {
         let c = Caricature::with_reinjection(alpha, 1e-5);
         let mut section = Section::default();
-        let _ =
-            run(&c, vector![0.2, 0.0, -1.0], 50.0, &Settings::default(), ExitRule::All, &mut AllModes(&mut section))
-                .unwrap();
+        let _ = run(
+            &c,
+            vector![0.2, 0.0, -1.0],
+            50.0,
+            &FilippovOptions::default(),
+            ExitRule::All,
+            &mut AllModes(&mut section),
+        )
+        .unwrap();
         for (found, wanted) in section.0.iter().zip(reference(name, rows)) {
             for (f, w) in found.iter().zip(wanted) {
                 assert!((f - w).abs() < 2e-3 * (1.0 + w.abs()), "{name}: {found:?} {wanted:?}");
@@ -699,7 +735,7 @@ fn the_discontinuous_wheel_fills_a_box_like_the_smoothed_wheels() {
     // SCIENCE.md section 7, smoothed with eps = 1e-3, 30 < t < 230: r in [0.22, 0.79], v in [-6.2, 5.5], omega in [-8.0, 4.6].
     let w = Wheel::default();
     let mut out = Trajectory::new(2);
-    let _ = run(&w, vector![0.69267, 0.0, 0.0], 230.0, &Settings::default(), random(5, 0.05), &mut out).unwrap();
+    let _ = run(&w, vector![0.69267, 0.0, 0.0], 230.0, &FilippovOptions::default(), random(5, 0.05), &mut out).unwrap();
     let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
     for (_, x) in out.points().filter(|(t, _)| *t > 30.0) {
         for (b, v) in bounds.iter_mut().zip(x.iter()) {
@@ -726,18 +762,18 @@ fn a_run_that_is_cut_short_says_why() {
     let n = invisible(-1.2, -1.4);
     let start = vector![0.0, 0.3, 0.8];
     let mut out = Trajectory::new(1);
-    let few = Settings { max_steps: 3, ..Settings::default() };
+    let few = FilippovOptions { max_steps: 3, ..FilippovOptions::default() };
     let poor = run(&n, start, 100.0, &few, ExitRule::All, &mut out).unwrap();
     assert_eq!(poor.stop, StopReason::StepBudget);
     assert!(poor.t < 100.0 && !out.pieces.is_empty(), "what was computed until then stands");
     assert!(matches!(poor.within_budget(), Err(FilippovError::Stepping(_))));
 
     let mut out = Trajectory::new(1);
-    let cut = run_watched(&n, start, 100.0, &Settings::default(), ExitRule::All, &mut out, &Refuses).unwrap();
+    let cut = run_watched(&n, start, 100.0, &FilippovOptions::default(), ExitRule::All, &mut out, &Refuses).unwrap();
     assert_eq!(cut.stop, StopReason::Watch);
 
     let mut out = Trajectory::new(1).until_events(1);
-    let seen = run(&n, start, 100.0, &Settings::default(), ExitRule::All, &mut out).unwrap();
+    let seen = run(&n, start, 100.0, &FilippovOptions::default(), ExitRule::All, &mut out).unwrap();
     assert_eq!(seen.stop, StopReason::Observer);
     // A family is not made from runs that were cut short.
     let grid = FunnelGrid { shortest: 0.1, longest: 1.0, times: 2, horizon: 5.0, until_two_fold: true, per_step: 1 };
@@ -749,7 +785,7 @@ fn a_funnel_counts_the_work_of_its_approach() {
     use twofold::job::simulate::simulate;
     use twofold::job::spec::{FunnelSpec, Method, MethodSpec, Observation, RunSpec, SwitchSpec};
     let c = Caricature::with_reinjection(1e-1, 1e-5);
-    let (start, settings) = (vector![0.2, 0.0, -1.0], Settings { max_step: 5.0, ..Settings::default() });
+    let (start, settings) = (vector![0.2, 0.0, -1.0], FilippovOptions { max_step: 5.0, ..FilippovOptions::default() });
     let grid = FunnelGrid { shortest: 0.1, longest: 1.0, times: 2, horizon: 5.0, until_two_fold: true, per_step: 1 };
     let alone = run(&c, start, 50.0, &settings, ExitRule::All, &mut Trajectory::new(1)).unwrap();
     let family = funnel(&c, start, 50.0, &settings, &grid).unwrap();

@@ -4,7 +4,7 @@
 use nalgebra::{SVector, vector};
 use twofold::integrate::Tolerance;
 use twofold::integrate::filippov::{
-    EventKind, ExitRule, FilippovError, FilippovSummary, Mode, Settings, Side, SlidingFlow, Trajectory, run,
+    EventKind, ExitRule, FilippovError, FilippovOptions, FilippovSummary, Mode, Side, SlidingFlow, Trajectory, run,
 };
 use twofold::num::Elementary;
 use twofold::system::{Bound, Definition, PiecewiseSmooth, System, VectorField};
@@ -17,15 +17,15 @@ fn planar(h: &str, plus: [&str; 2], minus: [&str; 2]) -> Bound<2> {
     System::new(Definition::from_toml(&text, "test.toml").unwrap()).bind().unwrap()
 }
 
-fn settings(tolerance: f64) -> Settings {
-    Settings { tolerance: Tolerance { rtol: tolerance, atol: tolerance }, ..Settings::default() }
+fn settings(tolerance: f64) -> FilippovOptions {
+    FilippovOptions { tolerance: Tolerance { rtol: tolerance, atol: tolerance }, ..FilippovOptions::default() }
 }
 
 fn go<P, const N: usize, const M: usize>(
     system: &P,
     start: SVector<f64, N>,
     t_end: f64,
-    settings: &Settings,
+    settings: &FilippovOptions,
 ) -> (Result<FilippovSummary<N>, FilippovError>, Trajectory<N>)
 where
     P: PiecewiseSmooth<N>,
@@ -177,7 +177,8 @@ where
     let system: Bound<N> = System::builtin(name).unwrap().bind().unwrap();
     let start = SVector::<f64, N>::from_column_slice(start);
     let of = |unit: f64, factor: f64| {
-        let settings = Settings { tolerance: Tolerance { rtol: 1e-11, atol: 1e-11 * unit }, ..Settings::default() };
+        let settings =
+            FilippovOptions { tolerance: Tolerance { rtol: 1e-11, atol: 1e-11 * unit }, ..FilippovOptions::default() };
         // Up to where there are many futures, if the motion comes there: from there on it depends on rounding.
         let mut seen = Trajectory::new(1);
         let end =

@@ -2,7 +2,7 @@
 
 use twofold::analyse::limit::{AfterVisitQuestion, ConvergenceQuestion, after_visit, convergence, observed_rate};
 use twofold::analyse::passage::{PassageQuestion, passage};
-use twofold::integrate::filippov::{FilippovError, FunnelGrid, Mode, Settings};
+use twofold::integrate::filippov::{FilippovError, FilippovOptions, FunnelGrid, Mode};
 use twofold::system::{Caricature, Smoothed, Transition};
 
 fn before(times: &[f64], eps: &[f64]) -> ConvergenceQuestion {
@@ -10,7 +10,7 @@ fn before(times: &[f64], eps: &[f64]) -> ConvergenceQuestion {
         start: vec![0.2, 0.0, -1.0],
         times: times.into(),
         eps: eps.into(),
-        settings: Settings::default(),
+        settings: FilippovOptions::default(),
     }
 }
 
@@ -57,7 +57,7 @@ fn smoothed_orbits_leave_inside_the_funnel() {
         grid: FunnelGrid { shortest: 1e-3, longest: 2.5, times: 80, horizon: 12.0, until_two_fold: true, per_step: 1 },
         refinements: 3,
         finer: 21,
-        settings: Settings::default(),
+        settings: FilippovOptions::default(),
     };
     for alpha in [1e-1, 1e-3] {
         let c = Caricature::with_reinjection(alpha, 1e-5);

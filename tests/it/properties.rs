@@ -164,7 +164,7 @@ proptest! {
     #[test]
     fn sliding_stays_on_the_surface(x in -0.3..0.3_f64, y in -1.5..1.5_f64, z in -1.5..1.5_f64, time in 0.1..2.0_f64) {
         let system = Caricature::with_reinjection(1e-1, 1e-5);
-        let settings = filippov::Settings { max_steps: 20_000, ..filippov::Settings::default() };
+        let settings = filippov::FilippovOptions { max_steps: 20_000, ..filippov::FilippovOptions::default() };
         let mut seen = OnSurface::default();
         let rule = ExitRule::AfterTime { time, side: filippov::Side::Plus };
         let end = filippov::run(&system, vector![x, y, z], 12.0, &settings, rule, &mut seen);

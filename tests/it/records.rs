@@ -261,7 +261,7 @@ fn filippov_motions_are_the_same() {
         (bits(end), record.events.iter().map(|e| (e.t.to_bits(), bits(e.state))).collect::<Vec<_>>())
     };
     let rule = ExitRule::AfterTime { time: 0.4, side: Side::Plus };
-    let (settings, start) = (filippov::Settings::default(), SVector::from([0.2, 0.0, -1.0]));
+    let (settings, start) = (filippov::FilippovOptions::default(), SVector::from([0.2, 0.0, -1.0]));
     let compiled = motion(&|r| filippov::run(&caricature(), start, 60.0, &settings, rule, r).unwrap().x);
     let bound = System::from(caricature()).bind::<3>().unwrap();
     let record = motion(&|r| filippov::run(&bound, start, 60.0, &settings, rule, r).unwrap().x);

@@ -5,7 +5,7 @@ use nalgebra::SVector;
 use twofold::num::tape::Recorded;
 use twofold::num::{Arithmetic, Ball, Enclosure, Interval, Tape};
 use twofold::rigor::cycle::{Search, krawczyk};
-use twofold::rigor::{Cycle, Error, Flow, Plane, Set, Settings, prove_cycle};
+use twofold::rigor::{Cycle, Error, Flow, FlowOptions, Plane, Set, prove_cycle};
 use twofold::system::{Caricature, Smoothed, Transition, VectorField};
 
 const SECTION: Plane = Plane { axis: 1, value: 0.0 };
@@ -25,7 +25,7 @@ fn hopf() -> Tape {
 }
 
 fn search_hopf(near: [f64; 2], radius: f64, crossings: usize) -> Result<Cycle, Error> {
-    prove_cycle(&hopf(), Settings::PLAIN, &Search { plane: SECTION, near, radius, crossings, longest: 40.0 })
+    prove_cycle(&hopf(), FlowOptions::PLAIN, &Search { plane: SECTION, near, radius, crossings, longest: 40.0 })
 }
 
 #[test]
@@ -53,7 +53,7 @@ fn what_is_not_so_is_not_proved() {
     // A box that holds more than the orbit's neighbourhood.
     assert!(search_hopf([1.0, 0.0], 0.9, 2).is_err());
     // Nothing crosses in so short a time.
-    let mut flow = Flow::<Interval, 3>::new(&hopf(), Settings::PLAIN);
+    let mut flow = Flow::<Interval, 3>::new(&hopf(), FlowOptions::PLAIN);
     let start =
         Set::on_plane(SVector::from([1.0, 0.0, 0.0].map(Interval::from_f64)), SECTION.axis, SECTION.value, false);
     assert!(matches!(flow.next_crossing(&start, SECTION, 3.0), Err(Error::NoCrossing(_))));
@@ -64,7 +64,7 @@ fn what_is_not_so_is_not_proved() {
 #[ignore = "a minute in the debug profile; `make proofs` proves it too"]
 fn the_period_one_orbit_is_proved_and_attracts() {
     let search = Search { plane: SECTION, near: [0.8063, 0.0], radius: 1e-10, crossings: 2, longest: 40.0 };
-    let c = prove_cycle(&equation(0.1).tape(), Settings::PLAIN, &search).unwrap();
+    let c = prove_cycle(&equation(0.1).tape(), FlowOptions::PLAIN, &search).unwrap();
     assert!(c.attracts());
     // 2.5766e-5 per unit of time (an independent program): det = exp(-2 rate period).
     let rate = -c.determinant.midpoint().ln() / (2.0 * c.period.midpoint());
@@ -90,7 +90,7 @@ fn krawczyk_tells_a_zero_from_none() {
 }
 
 /// The first rows of a reference table, in one arithmetic: (the widest enclosure, whether every row is in its own).
-fn follow<S: Enclosure>(alpha: f64, text: &str, rows: usize, settings: Settings) -> f64 {
+fn follow<S: Enclosure>(alpha: f64, text: &str, rows: usize, settings: FlowOptions) -> f64 {
     let tape = equation(alpha).tape();
     let mut flow = Flow::<S, 3>::new(&tape, settings);
     let start = SVector::from([S::from_decimal(&0.2.into()), S::zero(), -S::one()]);
@@ -117,8 +117,8 @@ fn both_arithmetics_enclose_the_orbit_before_the_singularity() {
     let printed = include_str!("../../crates/verify/data/crossings-printed.csv");
     let reconstructed = include_str!("../../crates/verify/data/crossings-reconstructed.csv");
     for (alpha, text) in [(1e-3, printed), (0.1, reconstructed)] {
-        let plain = follow::<Interval>(alpha, text, 2, Settings::PLAIN);
-        let extended = follow::<Ball>(alpha, text, 2, Settings::EXTENDED);
+        let plain = follow::<Interval>(alpha, text, 2, FlowOptions::PLAIN);
+        let extended = follow::<Ball>(alpha, text, 2, FlowOptions::EXTENDED);
         assert!(plain < 1e-10 && extended < 1e-25, "{plain:e} {extended:e}");
     }
 }
@@ -127,13 +127,13 @@ fn both_arithmetics_enclose_the_orbit_before_the_singularity() {
 #[ignore = "a minute; `make proofs` goes through all rows"]
 fn the_orbit_is_enclosed_through_the_singularity() {
     let reconstructed = include_str!("../../crates/verify/data/crossings-reconstructed.csv");
-    assert!(follow::<Ball>(0.1, reconstructed, 6, Settings::EXTENDED) < 1e-13);
+    assert!(follow::<Ball>(0.1, reconstructed, 6, FlowOptions::EXTENDED) < 1e-13);
 }
 
 #[test]
 fn a_set_too_wide_is_refused() {
     let tape = equation(0.1).tape();
-    let mut flow = Flow::<Interval, 3>::new(&tape, Settings::PLAIN);
+    let mut flow = Flow::<Interval, 3>::new(&tape, FlowOptions::PLAIN);
     let wide = Interval::between(-0.5, 0.5);
     let set = Set::on_plane(SVector::from([wide, Interval::zero(), wide]), SECTION.axis, SECTION.value, false);
     let error = flow.next_crossing(&set, SECTION, 10.0).unwrap_err();

@@ -117,7 +117,8 @@ fn fast_paths_give_the_bits_of_the_record() {
         assert_eq!(a, b, "{switch:?}");
     }
     let exponent = |system: &System| {
-        let settings = twofold::analyse::lyapunov::Settings { transient: 5.0, duration: 40.0, ..Default::default() };
+        let settings =
+            twofold::analyse::lyapunov::LyapunovOptions { transient: 5.0, duration: 40.0, ..Default::default() };
         let start = vec![0.2, 0.0, -1.0];
         let question = LargestExponent { system: system.clone(), switch: SwitchSpec::tanh(1e-2), start, settings };
         Executor::quiet().ask(&question).unwrap().facts.clone()
@@ -130,7 +131,7 @@ fn exponents_of_data() {
     // Two rotors and a decay: the largest exponent of x' = -x/2 beside rotations is 0; of the decay alone -1/2.
     let text = "states = [\"x\"]\nh = \"x - 100\"\nplus = [\"-x/2\"]\nminus = [\"-x/2\"]";
     let system = System::new(Definition::from_toml(text, "f").unwrap());
-    let settings = twofold::analyse::lyapunov::Settings { transient: 1.0, duration: 50.0, ..Default::default() };
+    let settings = twofold::analyse::lyapunov::LyapunovOptions { transient: 1.0, duration: 50.0, ..Default::default() };
     let question = LargestExponent { system, switch: SwitchSpec::tanh(1e-3), start: vec![1.0], settings };
     let exponent: twofold::analyse::lyapunov::Exponent =
         Executor::quiet().ask(&question).unwrap().fact("exponent").unwrap();

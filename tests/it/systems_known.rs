@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use nalgebra::SVector;
 use twofold::analyse::floquet::Plane;
-use twofold::analyse::lyapunov::{Exponent, Settings};
+use twofold::analyse::lyapunov::{Exponent, LyapunovOptions};
 use twofold::integrate::filippov::{ExitRule, Side};
 use twofold::integrate::{Schedule, StepCap, Tolerance};
 use twofold::job::orbit::Along;
@@ -260,7 +260,7 @@ fn chua_eigenvalues_and_exponent() {
     assert!(close(&outside, &[[-3.94, 0.0], [0.19, -3.05], [0.19, 3.05]]), "{outside:?}");
     let inside = at(&Field::minus(&s), [0.0; 3]);
     assert!(close(&inside, &[[-0.97, -2.71], [-0.97, 2.71], [2.22, 0.0]]), "{inside:?}");
-    let settings = Settings { transient: 100.0, duration: 6000.0, ..Settings::default() };
+    let settings = LyapunovOptions { transient: 100.0, duration: 6000.0, ..LyapunovOptions::default() };
     let start = s.definition().start().unwrap().to_vec();
     let question = LargestExponent { system: s, switch: SwitchSpec::tanh(1e-3), start, settings };
     let exponent: Exponent = Executor::quiet().ask(&question).unwrap().fact("exponent").unwrap();

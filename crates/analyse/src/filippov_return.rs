@@ -7,7 +7,7 @@
 
 use nalgebra::SVector;
 
-use super::floquet::{Extent, Plane, Returned, Settings};
+use super::floquet::{Extent, FloquetOptions, Plane, Returned};
 use twofold_integrate::filippov::{
     self, EventKind, ExitRule, FilippovError, FilippovObserver, Mode, ModeEvent, Side, SlidingFlow,
 };
@@ -132,7 +132,7 @@ pub fn return_map<P, const N: usize, const M: usize>(
     plane: Plane,
     returns: usize,
     u: &SVector<f64, N>,
-    settings: &Settings,
+    settings: &FloquetOptions,
     derivative: bool,
 ) -> Result<Returned, Error>
 where
@@ -178,7 +178,7 @@ fn columns<P, const N: usize, const M: usize>(
     plane: Plane,
     returns: usize,
     u: &SVector<f64, N>,
-    settings: &Settings,
+    settings: &FloquetOptions,
     base: &Plain<N>,
     delta: f64,
 ) -> Result<Option<Vec<f64>>, Error>
@@ -210,7 +210,7 @@ fn plain<P, const N: usize, const M: usize>(
     plane: Plane,
     returns: usize,
     u: &SVector<f64, N>,
-    settings: &Settings,
+    settings: &FloquetOptions,
 ) -> Result<Plain<N>, Error>
 where
     P: PiecewiseSmooth<N>,
@@ -219,7 +219,7 @@ where
     // The rule is never used: a run stops where it would be.
     let rule = ExitRule::AtOnce { side: Side::Plus };
     let engine =
-        filippov::Settings { tolerance: settings.tolerance, max_step: settings.max_step, ..Default::default() };
+        filippov::FilippovOptions { tolerance: settings.tolerance, max_step: settings.max_step, ..Default::default() };
     let watch = || Watch {
         plane,
         returns,
@@ -293,9 +293,9 @@ mod tests {
         }
     }
 
-    fn settings(tolerance: f64) -> Settings {
+    fn settings(tolerance: f64) -> FloquetOptions {
         let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
-        Settings { tolerance, longest_return: 6.0, ..Settings::default() }
+        FloquetOptions { tolerance, longest_return: 6.0, ..FloquetOptions::default() }
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub struct Plane {
 
 /// How a closed orbit is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
+pub struct FloquetOptions {
     /// Local error of the orbit and its tangent vectors.
     pub tolerance: Tolerance,
     /// Longest step.
@@ -41,7 +41,7 @@ pub struct Settings {
     pub longest_return: f64,
 }
 
-impl Default for Settings {
+impl Default for FloquetOptions {
     fn default() -> Self {
         Self {
             tolerance: Tolerance { rtol: 1e-11, atol: 1e-11 },
@@ -158,7 +158,7 @@ pub fn closed_orbit<const N: usize, const M: usize, F>(
     plane: Plane,
     returns: usize,
     guess: SVector<f64, N>,
-    settings: &Settings,
+    settings: &FloquetOptions,
 ) -> Result<ClosedOrbit, Error>
 where
     F: VectorField<N>,
@@ -236,7 +236,7 @@ pub fn return_map<const N: usize, const M: usize, T: VectorField<M>>(
     plane: Plane,
     returns: usize,
     u: &SVector<f64, N>,
-    settings: &Settings,
+    settings: &FloquetOptions,
 ) -> Result<Returned, Error> {
     const { assert!(M == N * (N + 1)) };
     if returns == 0 {
@@ -254,7 +254,7 @@ fn returned<const N: usize, const M: usize, T: VectorField<M>>(
     plane: Plane,
     returns: usize,
     u: SVector<f64, N>,
-    settings: &Settings,
+    settings: &FloquetOptions,
 ) -> Result<Return<N>, Error> {
     let mut stepper = Dopri5::<M>::new(settings.tolerance);
     // x, then the columns of the identity.
@@ -389,8 +389,8 @@ mod tests {
     fn hopf_normal_form_is_exact() {
         let plane = Plane { axis: 1, value: 0.0, upward: true };
         for a in [0.05, 0.5, -0.03] {
-            let o =
-                closed_orbit::<2, 6, _>(&Hopf(a), plane, 1, SVector::from([1.2, 0.0]), &Settings::default()).unwrap();
+            let o = closed_orbit::<2, 6, _>(&Hopf(a), plane, 1, SVector::from([1.2, 0.0]), &FloquetOptions::default())
+                .unwrap();
             assert!((o.period - std::f64::consts::TAU).abs() < 1e-9, "{o:?}");
             assert!((o.rate - 2.0 * a).abs() < 1e-8, "{o:?}");
             assert!((o.points[0][0] - 1.0).abs() < 1e-8 && (o.opposite[0][0] + 1.0).abs() < 1e-8);
@@ -400,7 +400,8 @@ mod tests {
     #[test]
     fn no_returns_are_refused() {
         let plane = Plane { axis: 1, value: 0.0, upward: true };
-        let found = closed_orbit::<2, 6, _>(&Hopf(0.5), plane, 0, SVector::from([1.2, 0.0]), &Settings::default());
+        let found =
+            closed_orbit::<2, 6, _>(&Hopf(0.5), plane, 0, SVector::from([1.2, 0.0]), &FloquetOptions::default());
         assert_eq!(found, Err(Error::NoReturns));
     }
 
@@ -430,7 +431,7 @@ mod tests {
     #[test]
     fn returns_of_a_polynomial_are_its_roots() {
         // The method is exact for it and its dense output is not: the passage is landed on, and what is left is mended.
-        let settings = Settings { tolerance: Tolerance { rtol: 1e-5, atol: 1e-5 }, ..Settings::default() };
+        let settings = FloquetOptions { tolerance: Tolerance { rtol: 1e-5, atol: 1e-5 }, ..FloquetOptions::default() };
         for value in [0.0, 0.7, -3.0] {
             let plane = Plane { axis: 1, value, upward: true };
             let of = |returns| {
@@ -451,7 +452,7 @@ mod tests {
 
     #[test]
     fn a_plane_beside_the_centre_sees_the_same_orbit() {
-        let settings = Settings::default();
+        let settings = FloquetOptions::default();
         let root = sqrt(0.75);
         for (upward, z) in [(true, -root), (false, root)] {
             let plane = Plane { axis: 0, value: 0.5, upward };
@@ -473,11 +474,11 @@ mod tests {
     fn what_does_not_return_or_converge_is_told() {
         let plane = Plane { axis: 1, value: 0.0, upward: true };
         let of = |settings| closed_orbit::<2, 6, _>(&Hopf(0.05), plane, 1, SVector::from([1.2, 0.0]), &settings);
-        let short = of(Settings { longest_return: 6.0, ..Settings::default() });
+        let short = of(FloquetOptions { longest_return: 6.0, ..FloquetOptions::default() });
         assert_eq!(short, Err(Error::NoReturn { from: vec![1.2, 0.0], within: 6.0 }));
         // After one iteration it still misses itself, by what Newton's method makes of a start 0.2 off.
         let Err(Error::NotConverged { residual, iterations: 1 }) =
-            of(Settings { iterations: 1, ..Settings::default() })
+            of(FloquetOptions { iterations: 1, ..FloquetOptions::default() })
         else {
             panic!("one iteration is not enough")
         };
@@ -549,7 +550,7 @@ mod tests {
         }
         let plane = Plane { axis: 1, value: 0.0, upward: true };
         let guess = SVector::from([1.1, 0.0, 0.05]);
-        let o = closed_orbit::<3, 12, _>(&Ring, plane, 1, guess, &Settings::default()).unwrap();
+        let o = closed_orbit::<3, 12, _>(&Ring, plane, 1, guess, &FloquetOptions::default()).unwrap();
         assert!((o.rate - 0.02).abs() < 1e-8 && o.multipliers[0][1] != 0.0, "{o:?}");
     }
 }

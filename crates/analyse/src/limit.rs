@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 
 use twofold_integrate::dopri5::Dopri5;
 use twofold_integrate::filippov::{
-    EventKind, ExitRule, FilippovError, FilippovObserver, Funnel, FunnelGrid, FunnelMember, Mode, Settings, Side,
-    SlidingFlow, funnel, run,
+    EventKind, ExitRule, FilippovError, FilippovObserver, FilippovOptions, Funnel, FunnelGrid, FunnelMember, Mode,
+    Side, SlidingFlow, funnel, run,
 };
 use twofold_integrate::{Failure, Flow, Statistics, Step, Stepper};
 use twofold_num::elementary::{ln, pow};
@@ -34,7 +34,7 @@ pub struct ConvergenceQuestion {
     /// The smoothing parameters (tanh).
     pub eps: Vec<f64>,
     /// How the Filippov orbit is computed; its tolerance is that of the smoothed orbits too.
-    pub settings: Settings,
+    pub settings: FilippovOptions,
 }
 
 /// One comparison of a smoothed orbit with the Filippov orbit.
@@ -162,7 +162,7 @@ pub struct AfterVisitQuestion {
     /// ... with so many exit times, at least 3.
     pub finer: usize,
     /// How Filippov orbits are computed.
-    pub settings: Settings,
+    pub settings: FilippovOptions,
 }
 
 /// Where a member of the funnel crosses.
@@ -378,7 +378,7 @@ mod tests {
             grid,
             refinements: 3,
             finer: 5,
-            settings: Settings::default(),
+            settings: FilippovOptions::default(),
         };
         let (near, far) = (question(0.6), question(1.2));
         let family = funnel(&system, state::<3>(&near.start).unwrap(), 80.0, &near.settings, &grid).unwrap();

@@ -75,7 +75,7 @@ const QUANTILE: f64 = 2.365;
 /// How an exponent is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Settings {
+pub struct LyapunovOptions {
     /// Local error of orbit and vector.
     pub tolerance: Tolerance,
     /// Longest step.
@@ -90,7 +90,7 @@ pub struct Settings {
     pub kick: Option<Kick>,
 }
 
-impl Default for Settings {
+impl Default for LyapunovOptions {
     fn default() -> Self {
         Self {
             tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
@@ -118,7 +118,7 @@ const RANGE: f64 = 100.0;
 pub fn largest<const N: usize, const M: usize, F>(
     field: &F,
     x0: SVector<f64, N>,
-    settings: &Settings,
+    settings: &LyapunovOptions,
 ) -> Result<Exponent, Failure>
 where
     F: VectorField<N>,
@@ -136,7 +136,7 @@ pub fn largest_along<const N: usize, const M: usize, T: VectorField<M>>(
     tangent: &T,
     x0: SVector<f64, N>,
     kicked_states: usize,
-    settings: &Settings,
+    settings: &LyapunovOptions,
 ) -> Result<Exponent, Failure> {
     largest_watched(tangent, x0, kicked_states, settings, &())
 }
@@ -149,7 +149,7 @@ pub fn largest_watched<const N: usize, const M: usize, T: VectorField<M>>(
     tangent: &T,
     x0: SVector<f64, N>,
     kicked_states: usize,
-    settings: &Settings,
+    settings: &LyapunovOptions,
     watch: &dyn Watch,
 ) -> Result<Exponent, Failure> {
     Ok(estimate_along(tangent, x0, kicked_states, settings, watch)?.exponent)
@@ -164,7 +164,7 @@ pub fn estimate_along<const N: usize, const M: usize, T: VectorField<M>>(
     tangent: &T,
     x0: SVector<f64, N>,
     kicked_states: usize,
-    settings: &Settings,
+    settings: &LyapunovOptions,
     watch: &dyn Watch,
 ) -> Result<Estimate, Failure> {
     const { assert!(M == 2 * N) };
@@ -230,12 +230,12 @@ pub fn largest_side_by_side<const N: usize, const M: usize, E: Equations<M>>(
     set: InstructionSet,
     tangents: &E,
     starts: &[SVector<f64, N>],
-    settings: &Settings,
+    settings: &LyapunovOptions,
     watch: &dyn Watch,
 ) -> Option<Vec<Result<Exponent, Failure>>> {
     const { assert!(M == 2 * N) };
     assert!(settings.kick.is_none(), "orbits without kicks");
-    let Settings { tolerance, max_step, transient, duration, max_steps, .. } = *settings;
+    let LyapunovOptions { tolerance, max_step, transient, duration, max_steps, .. } = *settings;
     let stops: Vec<f64> = (0..=BLOCKS).map(|block| block_end(settings, block)).skip_while(|end| *end <= 0.0).collect();
     let course = Course { step_cap: StepCap::Absolute(max_step), max_steps, ..Course::to(transient + duration) };
     let runs: Vec<Run<M>> = starts.iter().map(|x0| Run { start: begin(x0), course }).collect();
@@ -297,12 +297,12 @@ fn begin<const N: usize, const M: usize>(x0: &SVector<f64, N>) -> SVector<f64, M
 }
 
 /// When a block ends; the transient is block 0.
-fn block_end(settings: &Settings, block: usize) -> f64 {
+fn block_end(settings: &LyapunovOptions, block: usize) -> f64 {
     settings.transient + settings.duration * block as f64 / BLOCKS as f64
 }
 
 /// The mean of the finished blocks.
-fn mean_of(rates: &[f64], settings: &Settings) -> Exponent {
+fn mean_of(rates: &[f64], settings: &LyapunovOptions) -> Exponent {
     // Of fewer there is no error, and of a mean without error no use.
     let value = if rates.len() < FEWEST_BLOCKS { f64::NAN } else { mean(rates).0 };
     let duration =
@@ -315,7 +315,7 @@ fn mean_of(rates: &[f64], settings: &Settings) -> Exponent {
 /// Where vectors grow like a power of time, as at a shear or in regular motion, the mean falls like ln(t)/t and its scatter says nothing of it
 /// (Skokos 2010, Lect. Notes Phys. 790, 63-135, sec. 5): ln |v| = exponent t + power ln t is fitted to the blocks, and the interval reaches as
 /// far as the power matters. The method's local errors, at most its tolerance in each step, would make a vector grow or shrink by themselves.
-pub(super) fn estimate_of(rates: &[f64], settings: &Settings, t: f64, steps: u64) -> Estimate {
+pub(super) fn estimate_of(rates: &[f64], settings: &LyapunovOptions, t: f64, steps: u64) -> Estimate {
     let exponent = mean_of(rates, settings);
     // The mean of 1/t over a block; the first one has none if it begins at 0.
     let points = rates.iter().enumerate().filter_map(|(k, rate)| {
@@ -361,7 +361,7 @@ mod tests {
 
     #[test]
     fn linear_system_has_its_eigenvalue() {
-        let settings = Settings { transient: 30.0, duration: 100.0, ..Settings::default() };
+        let settings = LyapunovOptions { transient: 30.0, duration: 100.0, ..LyapunovOptions::default() };
         let e = largest::<2, 4, _>(&Linear, SVector::from([0.0, 0.0]), &settings).unwrap();
         assert!((e.value - 0.3).abs() < 1e-8 && e.standard_error < 1e-8, "{e:?}");
     }
@@ -370,7 +370,8 @@ mod tests {
     fn kicks_do_not_change_a_linear_system() {
         // Its orbit is thrown about, its tangent flow is the same everywhere.
         let kick = Kick { every: 0.3, size: 0.1, law: twofold_integrate::KickLaw::Normal, seed: 1, stream: 0 };
-        let settings = Settings { transient: 10.0, duration: 20.0, kick: Some(kick), ..Settings::default() };
+        let settings =
+            LyapunovOptions { transient: 10.0, duration: 20.0, kick: Some(kick), ..LyapunovOptions::default() };
         struct Kicked;
         impl VectorField<3> for Kicked {
             fn eval<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
@@ -398,7 +399,8 @@ mod tests {
             }
         }
         let kick = Kick { every: 0.7, size: 0.05, law: twofold_integrate::KickLaw::Normal, seed: 5, stream: 0 };
-        let settings = Settings { transient: 50.0, duration: 20.0, kick: Some(kick), ..Settings::default() };
+        let settings =
+            LyapunovOptions { transient: 50.0, duration: 20.0, kick: Some(kick), ..LyapunovOptions::default() };
         let e = largest_along::<2, 4, _>(&Tangent::<Rate, 1>(&Rate), SVector::from([0.8, 0.0]), 1, &settings).unwrap();
         // The mean of the rate over (50, 70), the n-th kick coming at 0.7 n.
         let mut kicker = Kicker::new(kick, 1);
@@ -414,7 +416,7 @@ mod tests {
 
     #[test]
     fn fewer_than_eight_blocks_have_no_mean() {
-        let settings = Settings { duration: 640.0, ..Settings::default() };
+        let settings = LyapunovOptions { duration: 640.0, ..LyapunovOptions::default() };
         let of = |n: u32| mean_of(&(1..=n).map(f64::from).collect::<Vec<_>>(), &settings);
         assert!(of(0).value.is_nan() && of(7).value.is_nan());
         assert_eq!((of(7).duration, of(8).value, of(8).duration), (70.0, 4.5, 80.0));
@@ -423,7 +425,7 @@ mod tests {
 
     #[test]
     fn a_budget_of_steps_is_kept() {
-        let settings = Settings { max_steps: 10, ..Settings::default() };
+        let settings = LyapunovOptions { max_steps: 10, ..LyapunovOptions::default() };
         let error = largest::<2, 4, _>(&Linear, SVector::from([0.0, 0.0]), &settings).unwrap_err();
         assert!(matches!(error, Failure::TooManySteps { limit: 10, ref state, .. } if state.len() == 2), "{error:?}");
     }

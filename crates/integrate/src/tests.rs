@@ -9,7 +9,7 @@ use nalgebra::{SVector, vector};
 
 use super::ensemble::{Common, InstructionSet, Plane, Run, Tolerances, ensemble_watched};
 use super::filippov::{
-    AllModes, ExitRule, FilippovObserver, FunnelGrid, Mode, ModeEvent, Settings, Side, SlidingFlow, SlidingLaw,
+    AllModes, ExitRule, FilippovObserver, FilippovOptions, FunnelGrid, Mode, ModeEvent, Side, SlidingFlow, SlidingLaw,
     connect, funnel, history, run, run_two_surfaces,
 };
 use super::roots::Passages;
@@ -380,21 +380,22 @@ fn filippov_in_space() {
         seed,
         stream: 3,
     };
-    let usual = Settings { max_events: 60, max_steps: 2000, ..Settings::default() };
-    let mut go = |name: &str, system: &Bound<3>, x0: [f64; 3], t_end: f64, rule: ExitRule, settings: &Settings| {
-        let mut seen = Seen::new();
-        let end = run(system, x0.into(), t_end, settings, rule, &mut seen);
-        found.push(seen.line(name, &end));
-    };
+    let usual = FilippovOptions { max_events: 60, max_steps: 2000, ..FilippovOptions::default() };
+    let mut go =
+        |name: &str, system: &Bound<3>, x0: [f64; 3], t_end: f64, rule: ExitRule, settings: &FilippovOptions| {
+            let mut seen = Seen::new();
+            let end = run(system, x0.into(), t_end, settings, rule, &mut seen);
+            found.push(seen.line(name, &end));
+        };
     let caricature = builtin("caricature", &[("alpha", 0.1), ("beta", 1e-5)]);
     go("all", &caricature, START, 50.0, ExitRule::All, &usual);
     go("random", &caricature, START, 60.0, random(1), &usual);
-    go("uniform", &caricature, START, 40.0, random(2), &Settings { max_step: 0.2, ..usual });
-    let coarse = Settings { tolerance: tolerance(1e-7), leg: 1e-3, departure: 1e-2, ..usual };
+    go("uniform", &caricature, START, 40.0, random(2), &FilippovOptions { max_step: 0.2, ..usual });
+    let coarse = FilippovOptions { tolerance: tolerance(1e-7), leg: 1e-3, departure: 1e-2, ..usual };
     go("coarse", &caricature, START, 60.0, ExitRule::AfterArc { arc: 0.4, side }, &coarse);
     go("at once", &caricature, START, 60.0, ExitRule::AtOnce { side }, &coarse);
-    go("few events", &caricature, START, 60.0, random(1), &Settings { max_events: 4, ..usual });
-    go("few steps", &caricature, START, 60.0, random(1), &Settings { max_steps: 40, ..usual });
+    go("few events", &caricature, START, 60.0, random(1), &FilippovOptions { max_events: 4, ..usual });
+    go("few steps", &caricature, START, 60.0, random(1), &FilippovOptions { max_steps: 40, ..usual });
     go("on the surface", &caricature, [0.0, 0.3, 0.5], 3.0, random(1), &usual);
     go("in the repelling region", &caricature, [1e-14, -0.3, -0.5], 3.0, random(1), &usual);
     go("no number", &caricature, [f64::NAN, 0.3, 0.5], 3.0, random(1), &usual);
@@ -430,7 +431,7 @@ fn filippov_in_space() {
 #[test]
 fn filippov_families() {
     let caricature: Bound<3> = builtin("caricature", &[("alpha", 0.1), ("beta", 1e-5)]);
-    let settings = Settings { tolerance: tolerance(1e-9), ..Settings::default() };
+    let settings = FilippovOptions { tolerance: tolerance(1e-9), ..FilippovOptions::default() };
     let line = |name: &str, what: &dyn std::fmt::Debug| {
         let mut digest = Digest::new();
         write!(digest, "{what:?}").unwrap();
@@ -472,8 +473,12 @@ fn filippov_in_the_plane() {
         ("fused-focus", &[], [0.3, 0.2], 6.0),
     ] {
         for size in [1e-12, 1e-6] {
-            let settings =
-                Settings { tolerance: tolerance(size), max_events: 60, max_steps: 2000, ..Settings::default() };
+            let settings = FilippovOptions {
+                tolerance: tolerance(size),
+                max_events: 60,
+                max_steps: 2000,
+                ..FilippovOptions::default()
+            };
             let system: Bound<2> = builtin(name, parameters);
             let mut seen = Seen::new();
             let end = run(&system, x0.into(), t_end, &settings, stay, &mut seen);
@@ -494,7 +499,7 @@ fn two_surfaces<const N: usize, const M: usize>(
 {
     let faces = System::builtin(name).unwrap().faces().unwrap();
     let faces = faces.map(|pair| pair.map(|face| face.bind::<N>().unwrap()));
-    let settings = Settings { max_events: 60, max_steps: 2000, ..Settings::default() };
+    let settings = FilippovOptions { max_events: 60, max_steps: 2000, ..FilippovOptions::default() };
     for x0 in starts {
         for side in [Side::Plus, Side::Minus] {
             let mut seen = Seen::new();

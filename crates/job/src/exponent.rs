@@ -28,7 +28,7 @@ pub struct LargestExponent {
     /// Where the orbit starts.
     pub start: Vec<f64>,
     /// How the exponent is computed.
-    pub settings: lyapunov::Settings,
+    pub settings: lyapunov::LyapunovOptions,
 }
 
 impl LargestExponent {
@@ -208,7 +208,8 @@ mod tests {
     fn question(system: System, switch: SwitchSpec, duration: f64) -> LargestExponent {
         let tolerance = Tolerance { rtol: 1e-9, atol: 1e-9 };
         let start = vec![1.0; system.dimension()];
-        let settings = lyapunov::Settings { tolerance, transient: 20.0, duration, ..lyapunov::Settings::default() };
+        let settings =
+            lyapunov::LyapunovOptions { tolerance, transient: 20.0, duration, ..lyapunov::LyapunovOptions::default() };
         LargestExponent { system, switch, start, settings }
     }
 
@@ -252,7 +253,7 @@ mod tests {
         let compiled = |alpha: f64| System::from(Caricature::with_reinjection(alpha, 1e-5));
         let caricature = |alpha: f64, switch: SwitchSpec| {
             let question = question(compiled(alpha), switch, 4.0);
-            let settings = lyapunov::Settings { transient: 1.0, ..question.settings };
+            let settings = lyapunov::LyapunovOptions { transient: 1.0, ..question.settings };
             LargestExponent { start: vec![0.2, alpha, -1.0], settings, ..question }
         };
         let smoothed = |eps: f64, transition: Transition| SwitchSpec::Smoothed { eps, transition };
@@ -283,7 +284,7 @@ mod tests {
         // No exponent before its time: a budget of steps.
         let poor = |k: u32| {
             let question = caricature(0.1 + 0.01 * f64::from(k), SwitchSpec::tanh(1e-2));
-            let settings = lyapunov::Settings { max_steps: 500, ..question.settings };
+            let settings = lyapunov::LyapunovOptions { max_steps: 500, ..question.settings };
             LargestExponent { settings, ..question }
         };
         all.push(((0..3).map(poor).collect(), true));

@@ -153,7 +153,7 @@ mod tests {
     use super::*;
     use crate::question::key;
     use crate::{Store, cases};
-    use twofold_integrate::filippov::{FunnelGrid, Settings};
+    use twofold_integrate::filippov::{FilippovOptions, FunnelGrid};
     use twofold_system::Caricature;
 
     fn caricature() -> System {
@@ -164,7 +164,8 @@ mod tests {
     #[test]
     fn distances_before_the_visit_halve_with_eps() {
         let (eps, times) = (vec![4e-3, 2e-3], vec![2.0, 9.0]);
-        let compared = ConvergenceQuestion { start: vec![0.2, 0.0, -1.0], times, eps, settings: Settings::default() };
+        let compared =
+            ConvergenceQuestion { start: vec![0.2, 0.0, -1.0], times, eps, settings: FilippovOptions::default() };
         let recorded = cases::of(&caricature().definition().to_toml().replace("\"-y\"", "\"0 - y\""));
         let tables = [caricature(), recorded].map(|system| {
             let question = SmoothingLimit { system, compared: compared.clone() };
@@ -198,7 +199,7 @@ mod tests {
                 grid,
                 refinements: 1,
                 finer: 3,
-                settings: Settings::default(),
+                settings: FilippovOptions::default(),
             },
         };
         let folder = tempfile::tempdir().unwrap();

@@ -406,7 +406,7 @@ impl Map<'_> {
         &self,
         field: &Field,
         u: &[f64],
-        settings: &floquet::Settings,
+        settings: &floquet::FloquetOptions,
     ) -> Result<Returned, Failed>
     where
         BoundField<M>: Returns<N>,
@@ -430,7 +430,7 @@ impl Map<'_> {
         &self,
         system: &System,
         u: &[f64],
-        settings: &floquet::Settings,
+        settings: &floquet::FloquetOptions,
         derivative: bool,
     ) -> Result<Returned, Failed>
     where
@@ -450,8 +450,12 @@ impl Map<'_> {
         })
     }
 
-    fn settings(&self, tolerance: Tolerance) -> floquet::Settings {
-        floquet::Settings { tolerance, longest_return: self.question.longest_return, ..floquet::Settings::default() }
+    fn settings(&self, tolerance: Tolerance) -> floquet::FloquetOptions {
+        floquet::FloquetOptions {
+            tolerance,
+            longest_return: self.question.longest_return,
+            ..floquet::FloquetOptions::default()
+        }
     }
 
     fn find(&self, u: &[f64], p: f64, tolerance: Tolerance, derivative: bool) -> Result<Returned, Failed> {

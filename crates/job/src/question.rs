@@ -137,7 +137,7 @@ mod tests {
     use twofold_analyse::lyapunov;
     use twofold_analyse::passage::PassageQuestion;
     use twofold_analyse::reference;
-    use twofold_integrate::filippov::{FunnelGrid, Settings};
+    use twofold_integrate::filippov::{FilippovOptions, FunnelGrid};
     use twofold_integrate::{StepCap, Tolerance};
     use twofold_system::{Caricature, System, Transition};
 
@@ -176,7 +176,7 @@ mod tests {
                     system: system.clone(),
                     switch: run.switch,
                     start: start.clone(),
-                    settings: lyapunov::Settings::default(),
+                    settings: lyapunov::LyapunovOptions::default(),
                 }),
                 "largest-exponent",
             ),
@@ -217,7 +217,7 @@ mod tests {
                         start: start.clone(),
                         times: vec![1.0],
                         eps: eps.clone(),
-                        settings: Settings::default(),
+                        settings: FilippovOptions::default(),
                     },
                 }),
                 "smoothing-limit",
@@ -233,7 +233,7 @@ mod tests {
                         grid,
                         refinements: 1,
                         finer: 3,
-                        settings: Settings::default(),
+                        settings: FilippovOptions::default(),
                     },
                 }),
                 "after-visit",

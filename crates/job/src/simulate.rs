@@ -393,17 +393,20 @@ fn discontinuous<P: Motions<D> + ?Sized, const D: usize>(
 }
 
 /// How a Filippov run is made.
-fn settings(spec: &RunSpec) -> filippov::Settings {
-    filippov::Settings {
+fn settings(spec: &RunSpec) -> filippov::FilippovOptions {
+    filippov::FilippovOptions {
         tolerance: spec.method.tolerance,
         max_step: spec.method.step_cap.for_segment(spec.t_end),
         max_steps: spec.method.max_steps,
-        ..filippov::Settings::default()
+        ..filippov::FilippovOptions::default()
     }
 }
 
 /// A Filippov run, given what looks on.
-type FilippovRun<'a, const D: usize> = dyn FnMut(&filippov::Settings, &mut dyn FilippovObserver<D>) -> Result<FilippovSummary<D>, filippov::FilippovError>
+type FilippovRun<'a, const D: usize> = dyn FnMut(
+        &filippov::FilippovOptions,
+        &mut dyn FilippovObserver<D>,
+    ) -> Result<FilippovSummary<D>, filippov::FilippovError>
     + 'a;
 
 /// A Filippov run, and what is to be recorded of it.
@@ -450,7 +453,7 @@ fn futures<P: Motions<D> + ?Sized, const D: usize>(
     spec: &RunSpec,
     system: &P,
     x0: SVector<f64, D>,
-    settings: &filippov::Settings,
+    settings: &filippov::FilippovOptions,
     funnel: &FunnelSpec,
 ) -> Result<Recording<D>, JobError> {
     let grid = FunnelGrid {

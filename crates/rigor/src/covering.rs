@@ -12,7 +12,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::Error;
-use super::flow::{Flow, Settings};
+use super::flow::{Flow, FlowOptions};
 use super::linear::{IMatrix, IVector};
 use super::section::Plane;
 use super::set::Set;
@@ -131,7 +131,7 @@ fn beyond([u, _]: [Interval; 2]) -> Option<bool> {
 /// See [`Error`]; [`Error::NotCovered`] if an edge's image is not beyond a set's edge, or a piece's image meets where it should not, however narrow.
 pub fn prove_covering<S: Enclosure>(
     tape: &Tape,
-    settings: Settings,
+    settings: FlowOptions,
     map: &Return,
     from: &HSet,
     to: &[HSet],
@@ -206,7 +206,7 @@ mod tests {
     #[test]
     fn an_unstable_circle_covers_itself() {
         let set = HSet { centre: [2.0, 0.0], unstable: [0.1, 0.02], stable: [0.0, 0.1] };
-        let found = prove_covering::<Interval>(&circle(0.02), Settings::PLAIN, &MAP, &set, &[set]).unwrap();
+        let found = prove_covering::<Interval>(&circle(0.02), FlowOptions::PLAIN, &MAP, &set, &[set]).unwrap();
         assert_eq!((found.pieces[0].part[0], found.pieces.last().unwrap().part[1]), (-1.0, 1.0));
         assert!(found.pieces.windows(2).all(|w| w[0].part[1] == w[1].part[0]));
         // The edge u = 1 has r = 2.1 exactly; 1/r^2 - 1/4 is multiplied by exp(16 pi c).
@@ -221,8 +221,9 @@ mod tests {
     #[test]
     fn what_does_not_stretch_or_squeeze_covers_nothing() {
         let set = HSet { centre: [2.0, 0.0], unstable: [0.1, 0.0], stable: [0.0, 0.1] };
-        let fails =
-            |c: f64, to: HSet| prove_covering::<Interval>(&circle(c), Settings::PLAIN, &MAP, &set, &[to]).unwrap_err();
+        let fails = |c: f64, to: HSet| {
+            prove_covering::<Interval>(&circle(c), FlowOptions::PLAIN, &MAP, &set, &[to]).unwrap_err()
+        };
         assert!(matches!(fails(-0.02, set), Error::NotCovered { part: [-1.0, -1.0], set: 0, .. }));
         // Too high to be reached, too low to hold the image, beside it.
         assert!(matches!(fails(0.02, HSet { centre: [2.0, 0.1], ..set }), Error::NotCovered { .. }));
@@ -232,7 +233,7 @@ mod tests {
         assert_eq!(fails(0.02, HSet { stable: [0.2, 0.0], ..set }), Error::Singular);
         // An odd number of crossings is no return.
         let half = Return { crossings: 1, ..MAP };
-        let odd = prove_covering::<Interval>(&circle(0.02), Settings::PLAIN, &half, &set, &[set]);
+        let odd = prove_covering::<Interval>(&circle(0.02), FlowOptions::PLAIN, &half, &set, &[set]);
         assert!(matches!(odd, Err(Error::WrongDirection(_))));
     }
 }

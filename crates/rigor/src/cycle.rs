@@ -15,7 +15,7 @@
 use nalgebra::SVector;
 
 use super::Error;
-use super::flow::{Flow, Settings};
+use super::flow::{Flow, FlowOptions};
 use super::section::Plane;
 use super::set::Set;
 use twofold_num::{Arithmetic, Interval, Tape};
@@ -150,7 +150,7 @@ pub fn krawczyk(
 ///
 /// # Errors
 /// See [`Error`]; [`Error::NotIncluded`] if the inclusion does not hold.
-pub fn prove_cycle(tape: &Tape, settings: Settings, search: &Search) -> Result<Cycle, Error> {
+pub fn prove_cycle(tape: &Tape, settings: FlowOptions, search: &Search) -> Result<Cycle, Error> {
     let mut flow = Flow::<Interval, 3>::new(tape, settings);
     let preconditioner = |slope: [[Interval; 2]; 2]| {
         let m = slope.map(|row| row.map(Interval::midpoint));

@@ -22,7 +22,7 @@ use twofold_num::{Arithmetic, Dual, Elementary, Enclosure, Interval, Tape, eleme
 
 /// What a [`Flow`] is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
+pub struct FlowOptions {
     /// Degree of the series.
     pub order: usize,
     /// Largest remainder of a step, in each component.
@@ -31,7 +31,7 @@ pub struct Settings {
     pub longest_step: f64,
 }
 
-impl Settings {
+impl FlowOptions {
     /// For [`Interval`]s.
     pub const PLAIN: Self = Self { order: 22, tolerance: 1e-17, longest_step: 1.0 };
     /// For [`Ball`](twofold_num::Ball)s.
@@ -44,7 +44,7 @@ const SHORTEST_STEP: f64 = 1e-12;
 /// The flow of an autonomous equation x' = f(x), on sets. `S` is the arithmetic of the sets' centres.
 #[derive(Clone, Debug)]
 pub struct Flow<S, const N: usize> {
-    settings: Settings,
+    settings: FlowOptions,
     centre: Solution<S>,
     states: Solution<Dual<Interval, N>>,
     stay: Solution<Interval>,
@@ -71,7 +71,7 @@ pub(super) struct Proved<S, const N: usize> {
 
 impl<S: Enclosure, const N: usize> Flow<S, N> {
     /// The flow of the equation on `tape`, its constants being the decimal numbers that were given.
-    pub fn new(tape: &Tape, settings: Settings) -> Self {
+    pub fn new(tape: &Tape, settings: FlowOptions) -> Self {
         let k = settings.order;
         Self {
             settings,
@@ -263,7 +263,7 @@ mod tests {
     fn a_rotation_does_not_wrap() {
         // x'' = -x: the set only turns. After 100 units of time (16 turns) the box has its size, up to rounding.
         let tape = Tape::record(2, |x: &[Recorded]| vec![x[1], -x[0]]);
-        let mut flow = Flow::<Interval, 2>::new(&tape, Settings::PLAIN);
+        let mut flow = Flow::<Interval, 2>::new(&tape, FlowOptions::PLAIN);
         let start = SVector::from([Interval::between(1.0 - 1e-3, 1.0 + 1e-3), Interval::symmetric(1e-3)]);
         let set = to(&mut flow, Set::new(start, true), 100.0);
         let hull = set.hull();
@@ -280,8 +280,8 @@ mod tests {
     #[test]
     fn both_precisions_agree_and_the_derivative_contains_differences() {
         let start = [1.0, 0.5];
-        let mut plain = Flow::<Interval, 2>::new(&pendulum(), Settings::PLAIN);
-        let mut extended = Flow::<Ball, 2>::new(&pendulum(), Settings::EXTENDED);
+        let mut plain = Flow::<Interval, 2>::new(&pendulum(), FlowOptions::PLAIN);
+        let mut extended = Flow::<Ball, 2>::new(&pendulum(), FlowOptions::EXTENDED);
         let a = to(&mut plain, Set::new(SVector::from(start.map(Interval::from_f64)), true), 10.0);
         let b = to(&mut extended, Set::new(SVector::from(start.map(Ball::from_f64)), false), 10.0);
         let (wide, narrow) = (a.hull(), b.states());
@@ -307,7 +307,7 @@ mod tests {
     fn a_solution_that_ends_is_not_enclosed_beyond_its_end() {
         // x' = x^2 from 1 is infinite at t = 1.
         let tape = Tape::record(2, |x: &[Recorded]| vec![x[0] * x[0], x[1]]);
-        let mut flow = Flow::<Interval, 2>::new(&tape, Settings::PLAIN);
+        let mut flow = Flow::<Interval, 2>::new(&tape, FlowOptions::PLAIN);
         let mut set = Set::new(SVector::from([Interval::one(), Interval::one()]), false);
         let error = loop {
             match flow.prove(&set, 2.0) {

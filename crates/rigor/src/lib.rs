@@ -24,7 +24,7 @@ pub mod set;
 
 pub use covering::{Covering, HSet, Return, prove_covering};
 pub use cycle::{Cycle, prove_cycle};
-pub use flow::{Flow, Settings};
+pub use flow::{Flow, FlowOptions};
 pub use section::{Crossing, Plane};
 pub use set::Set;
 

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::analyse::lyapunov::{Exponent, Settings, Sign};
+use crate::analyse::lyapunov::{Exponent, LyapunovOptions, Sign};
 use crate::cli::ending;
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::progress::Progress;
@@ -50,7 +50,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         let text = format!("--transient is {transient}: give a time from 0 to below --t-end, {}", spec.t_end);
         return Err(CliError::Usage(text));
     }
-    let settings = Settings {
+    let settings = LyapunovOptions {
         tolerance: spec.method.tolerance,
         max_step: if let StepCap::Absolute(h) = spec.method.step_cap { h } else { f64::INFINITY },
         transient,

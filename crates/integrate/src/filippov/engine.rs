@@ -7,8 +7,8 @@ use super::exit::{Chooser, Plan};
 use super::flow::{FreeFlow, InPhysicalTime, Sided, SlidingFlow, Straight, Truncated, project};
 use super::two_fold::{AlongCurve, FusedFolds, SlidingAtTwoFold};
 use super::{
-    CHOOSE, Choice, EventKind, ExitRule, FilippovError, FilippovObserver, FilippovSummary, Mode, ModeEvent, Settings,
-    Side,
+    CHOOSE, Choice, EventKind, ExitRule, FilippovError, FilippovObserver, FilippovOptions, FilippovSummary, Mode,
+    ModeEvent, Side,
 };
 use crate::driver::Watch;
 use crate::roots::{Enclosed, Start, Zero, brent, first_zero, first_zero_along};
@@ -25,7 +25,7 @@ pub fn run<P, const N: usize, const M: usize>(
     system: &P,
     x0: SVector<f64, N>,
     t_end: f64,
-    settings: &Settings,
+    settings: &FilippovOptions,
     rule: ExitRule,
     observer: &mut dyn FilippovObserver<N>,
 ) -> Result<FilippovSummary<N>, FilippovError>
@@ -44,7 +44,7 @@ pub fn run_watched<P, const N: usize, const M: usize>(
     system: &P,
     x0: SVector<f64, N>,
     t_end: f64,
-    settings: &Settings,
+    settings: &FilippovOptions,
     rule: ExitRule,
     observer: &mut dyn FilippovObserver<N>,
     watch: &dyn Watch,
@@ -85,7 +85,7 @@ pub(super) fn run_from<P, const N: usize, const M: usize>(
     system: &P,
     origin: Origin<N>,
     t_end: f64,
-    settings: &Settings,
+    settings: &FilippovOptions,
     chooser: &mut Chooser,
     observer: &mut dyn FilippovObserver<N>,
     watch: &dyn Watch,
@@ -377,7 +377,7 @@ const STEPS_BETWEEN_WATCHES: u32 = 4096;
 /// Chords of a step by which its length is measured.
 const CHORDS: usize = 16;
 
-/// The numbers by which the engine decides what rounding blurs. None is a tolerance of the motion; those are in [`Settings`].
+/// The numbers by which the engine decides what rounding blurs. None is a tolerance of the motion; those are in [`FilippovOptions`].
 struct Limits {
     /// A first Lie derivative below this share of its terms, and of its change over the size of the run, is zero: some fifty roundings.
     lie: f64,
@@ -482,7 +482,7 @@ struct Lie {
 
 struct Engine<'a, P, const N: usize> {
     system: &'a P,
-    settings: &'a Settings,
+    settings: &'a FilippovOptions,
     /// The exit rule at work. It goes on from run to run where one run is made of several.
     chooser: &'a mut Chooser,
     /// Any, so that the engine is compiled once for all of them.

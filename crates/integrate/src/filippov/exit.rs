@@ -72,7 +72,7 @@ impl SlidingLaw {
 pub enum ExitRule {
     /// At once. From a point of the repelling region: without sliding. At a two-fold where the fold of that side is visible:
     /// along the tangent orbit. Where it is invisible no orbit of that side starts at the two-fold itself; the orbit
-    /// then leaves sliding at [`Settings::departure`](super::Settings::departure) of the two-fold's radius, the
+    /// then leaves sliding at [`FilippovOptions::departure`](super::FilippovOptions::departure) of the two-fold's radius, the
     /// shortest sliding that is resolved.
     AtOnce {
         /// The side to leave to.

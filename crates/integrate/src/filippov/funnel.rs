@@ -6,7 +6,9 @@ use serde::{Deserialize, Serialize};
 use super::engine::{Departure, Origin};
 use super::exit::Chooser;
 use super::two_fold::SlidingAtTwoFold;
-use super::{ExitRule, FilippovError, FilippovSummary, Settings, Side, SlidingFlow, Trajectory, engine, flow::project};
+use super::{
+    ExitRule, FilippovError, FilippovOptions, FilippovSummary, Side, SlidingFlow, Trajectory, engine, flow::project,
+};
 use crate::{Statistics, StopReason};
 use twofold_num::elementary::pow;
 use twofold_system::filippov::{Region, region};
@@ -71,7 +73,7 @@ pub fn funnel<P, const N: usize, const M: usize>(
     system: &P,
     x0: SVector<f64, N>,
     t_end: f64,
-    settings: &Settings,
+    settings: &FilippovOptions,
     grid: &FunnelGrid,
 ) -> Result<Funnel<N>, FilippovError>
 where
@@ -113,7 +115,7 @@ pub fn history<P, const N: usize, const M: usize>(
     system: &P,
     x: SVector<f64, N>,
     longest: f64,
-    settings: &Settings,
+    settings: &FilippovOptions,
     per_step: usize,
 ) -> Result<Trajectory<N>, FilippovError>
 where
@@ -147,7 +149,7 @@ pub fn connect<P, const N: usize, const M: usize>(
     a: SVector<f64, N>,
     b: SVector<f64, N>,
     longest: f64,
-    settings: &Settings,
+    settings: &FilippovOptions,
     per_step: usize,
 ) -> Result<Trajectory<N>, FilippovError>
 where
@@ -183,7 +185,7 @@ impl<const N: usize> Funnel<N> {
     pub fn members_on<P, const M: usize>(
         &self,
         system: &P,
-        settings: &Settings,
+        settings: &FilippovOptions,
         grid: &FunnelGrid,
         only: Option<Side>,
     ) -> Result<Vec<FunnelMember<N>>, FilippovError>

@@ -15,7 +15,7 @@
 
 use nalgebra::SVector;
 
-use super::{Faces, Settings, Side};
+use super::{Faces, FilippovOptions, Side};
 use crate::step::Interpolant;
 use twofold_num::elementary::sqrt;
 use twofold_num::{Dual, Elementary};
@@ -202,7 +202,7 @@ pub(super) fn project<P: PiecewiseSmooth<N>, const N: usize>(
 }
 
 /// How far from the intersection a state may be and count as on it, by coordinates: what the tolerances resolve.
-pub(super) fn resolution<const N: usize>(settings: &Settings, x: &SVector<f64, N>) -> SVector<f64, N> {
+pub(super) fn resolution<const N: usize>(settings: &FilippovOptions, x: &SVector<f64, N>) -> SVector<f64, N> {
     x.map(|v| 10.0 * (settings.tolerance.atol + settings.tolerance.rtol * v.abs()))
 }
 

@@ -200,7 +200,7 @@ impl<const N: usize, O: Observer<N>> FilippovObserver<N> for AllModes<'_, O> {
 /// How a run is made.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Settings {
+pub struct FilippovOptions {
     /// Tolerances in every mode: of the Dormand-Prince method, and of Radau IIA where a piece is stiff.
     pub tolerance: Tolerance,
     /// The longest step in free flight. Sliding steps are measured in rescaled time and have no cap.
@@ -216,7 +216,7 @@ pub struct Settings {
     pub max_steps: u64,
 }
 
-impl Default for Settings {
+impl Default for FilippovOptions {
     fn default() -> Self {
         Self {
             tolerance: Tolerance { rtol: 1e-12, atol: 1e-12 },

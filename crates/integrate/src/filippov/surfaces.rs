@@ -18,7 +18,9 @@ use super::intersection::{
     turns,
 };
 use super::{Choice, WITHOUT_CHOICE, intersection};
-use super::{EventKind, ExitRule, FilippovError, FilippovObserver, FilippovSummary, Mode, ModeEvent, Settings, Side};
+use super::{
+    EventKind, ExitRule, FilippovError, FilippovObserver, FilippovOptions, FilippovSummary, Mode, ModeEvent, Side,
+};
 use crate::dopri5::Dopri5;
 use crate::driver::Watch;
 use crate::roots::{Enclosed, Start, first_zero, first_zero_along};
@@ -68,7 +70,7 @@ pub fn run_two_surfaces<P, const N: usize, const M: usize>(
     faces: &Faces<P>,
     x0: SVector<f64, N>,
     t_end: f64,
-    settings: &Settings,
+    settings: &FilippovOptions,
     rule: ExitRule,
     observer: &mut dyn FilippovObserver<N>,
     watch: &dyn Watch,
@@ -125,7 +127,7 @@ where
             hit: None,
             t_end,
         };
-        let remaining = Settings {
+        let remaining = FilippovOptions {
             max_events: settings.max_events.saturating_sub(events),
             max_steps: settings.max_steps.saturating_sub(run.statistics.steps),
             ..*settings
@@ -197,7 +199,7 @@ struct Arrival {
 /// A run on its way.
 struct Run<'a, P, const N: usize> {
     faces: &'a Faces<P>,
-    settings: &'a Settings,
+    settings: &'a FilippovOptions,
     t_end: f64,
     observer: &'a mut dyn FilippovObserver<N>,
     watch: &'a dyn Watch,
@@ -489,7 +491,7 @@ mod tests {
         let mut seen = Trajectory::new(1);
         let rule = ExitRule::AtOnce { side: Side::Plus };
         let faces = Quadrants::faces(fields);
-        let end = run_two_surfaces(&faces, x0.into(), t_end, &Settings::default(), rule, &mut seen, &());
+        let end = run_two_surfaces(&faces, x0.into(), t_end, &FilippovOptions::default(), rule, &mut seen, &());
         (end, seen)
     }
 

@@ -79,7 +79,11 @@ fn fold(plus: f64, minus: f64, v: f64, w: f64) -> Bound<3> {
 
 #[test]
 fn the_two_sides_mirror_each_other() {
-    let settings = Settings { tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 }, max_events: 40, ..Settings::default() };
+    let settings = FilippovOptions {
+        tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
+        max_events: 40,
+        ..FilippovOptions::default()
+    };
     let mut kinds = std::collections::BTreeSet::new();
     for (plus, minus) in [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] {
         for (v, w) in [(0.0, 0.0), (-1.2, -1.4), (0.5, -0.7)] {
@@ -376,7 +380,7 @@ fn futures_and_pasts_meet_at_a_two_fold_anywhere() {
     let time = |y: f64, z: f64| ((v * y - z) + (w * z - y)) / (1.0 - v * w);
     let system = Moved { fold: fold(1.0, 1.0, v, w), centre: [2.0, -3.0, 5.0] };
     let place = |y: f64, z: f64| SVector::from(system.centre) + vector![0.0, y, z];
-    let settings = Settings::default();
+    let settings = FilippovOptions::default();
     let path = connect(&system, place(0.3, 0.8), place(-0.4, -0.5), 100.0, &settings, 2).unwrap();
     let points: Vec<_> = path.points().collect();
     let (first, last) = (points[0], points[points.len() - 1]);
@@ -410,7 +414,7 @@ fn a_start_on_a_visible_fold_flies_off_along_it() {
     {
         let mut seen = Trajectory::new(1);
         let rule = ExitRule::AtOnce { side: Side::Plus };
-        let summary = run(&system, start.into(), 1.0, &Settings::default(), rule, &mut seen).unwrap();
+        let summary = run(&system, start.into(), 1.0, &FilippovOptions::default(), rule, &mut seen).unwrap();
         assert_eq!(seen.events.len(), 1, "{:?}", seen.events);
         assert_eq!((seen.events[0].kind, seen.events[0].to), (EventKind::StartedOnSurface, Some(side.into())));
         assert!((summary.x - SVector::from(end)).amax() < 1e-11, "{}", summary.x);
@@ -444,7 +448,7 @@ fn a_watch_ends_a_run() {
         }
     }
     let system = fold(1.0, -1.0, 0.5, -0.7);
-    let settings = Settings { max_step: 1e-4, ..Settings::default() };
+    let settings = FilippovOptions { max_step: 1e-4, ..FilippovOptions::default() };
     let rule = ExitRule::AtOnce { side: Side::Plus };
     let ends = |until: f64| {
         let mut seen = Trajectory::new(1);

@@ -5,7 +5,7 @@ use nalgebra::vector;
 
 use super::super::surface;
 use super::{lines_of, lines_table};
-use twofold_integrate::filippov::{ExitRule, Mode, Settings, Side, Trajectory, run};
+use twofold_integrate::filippov::{ExitRule, FilippovOptions, Mode, Side, Trajectory, run};
 use twofold_job::JobError;
 use twofold_job::table::Table;
 use twofold_render::Sheet;
@@ -31,7 +31,7 @@ pub fn system(v: f64, w: f64) -> Caricature {
 /// If an orbit of the sketch cannot be followed.
 pub fn tables(v: f64, w: f64) -> Result<Vec<Table>, JobError> {
     let system = system(v, w);
-    let settings = Settings::default();
+    let settings = FilippovOptions::default();
     let mut lines: Vec<(String, Vec<[f64; 3]>)> = Vec::new();
     let follow = |lines: &mut Vec<(String, Vec<[f64; 3]>)>,
                   name: &str,
