@@ -50,7 +50,7 @@ use nalgebra::SVector;
 use serde_json::json;
 use twofold::num::tape::Recorded;
 use twofold::num::{Arithmetic, Elementary, FromDecimal, Interval, Tape};
-use twofold::rigor::{Flow, FlowOptions, Plane, Set};
+use twofold::rigor::{AxisPlane, Flow, FlowOptions, Set};
 use twofold_proofs::{bounds, digits, refuse, write};
 
 const STATEMENT: &str = "In the inner problem of the two-fold with v+ = -1.2, v- = -1.4 and the tanh transition, let p = phi - phi* and q = (1 - phi*) Z - phi* Y, phi* being \
@@ -155,7 +155,7 @@ fn main() {
     let (e, unit) = (Interval::symmetric(E), Interval::from_f64(UNIT));
     let a = (unit / s0).hull(unit / (s0 * (one - lean_1)));
     let run = |flow: &mut Flow<Interval, 4>, set: Set<Interval, 4>, value: f64| {
-        flow.next_crossing(&set, Plane { axis, value }, 1e3).unwrap_or_else(|e| refuse(&e.to_string())).set
+        flow.next_crossing(&set, AxisPlane { axis, value }, 1e3).unwrap_or_else(|e| refuse(&e.to_string())).set
     };
     let start = Set::on_plane(SVector::from([a, unit, s0, e]), axis, S0, false);
     let middle = run(&mut flow, start, 0.0).hull();

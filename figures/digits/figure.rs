@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use twofold::analyse::digits::{Contender, DigitsQuestion};
 use twofold::analyse::passage::{PassageQuestion, Predicted};
-use twofold::analyse::reference::Plane;
+use twofold::analyse::reference::SectionPlane;
 use twofold::integrate::StepCap;
 use twofold::job::spec::Method;
 use twofold::job::table::{Entry, Table};
@@ -23,7 +23,7 @@ use twofold::system::{System, Transition};
 /// The start of the paper's runs.
 const START: [f64; 3] = [0.2, 0.0, -1.0];
 /// Passages through y = 0 are compared.
-const SECTION: Plane = Plane { coordinate: 1, value: 0.0 };
+const SECTION: SectionPlane = SectionPlane { coordinate: 1, value: 0.0 };
 /// The stiffness parameter of the left panel.
 const EPS: f64 = 1e-3;
 /// Passages are compared up to this time.

@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 use twofold::num::{Ball, Interval, Tape};
-use twofold::rigor::{Cycle, Plane};
+use twofold::rigor::{AxisPlane, Cycle};
 use twofold::system::{Caricature, Smoothed, Transition, VectorField};
 
 /// y = 0, on which all statements are made.
-pub const SECTION: Plane = Plane { axis: 1, value: 0.0 };
+pub const SECTION: AxisPlane = AxisPlane { axis: 1, value: 0.0 };
 
 /// beta of both readings.
 pub const BETA: f64 = 1e-5;

@@ -3,7 +3,7 @@
 
 use nalgebra::{SVector, vector};
 use twofold::analyse::attractor::{Evidence, Question, SectionPoint, Thresholds, Verdict, classify};
-use twofold::analyse::floquet::{self, Plane, closed_orbit};
+use twofold::analyse::floquet::{self, ReturnPlane, closed_orbit};
 use twofold::analyse::lyapunov::{self, largest};
 use twofold::integrate::{Course, Dopri5, Flow, Ignore, Observer, Step, StepCap, Tolerance, drive, roots};
 use twofold::num::Elementary;
@@ -184,7 +184,7 @@ fn van_der_pol() {
     }
     assert!(cycle.settled_at.unwrap() < 50.0);
 
-    let plane = Plane { axis: 1, value: 0.0, upward: true };
+    let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
     let o =
         closed_orbit::<2, 6, _>(&VanDerPol, plane, 1, vector![-2.2, 0.0], &floquet::FloquetOptions::default()).unwrap();
     assert!((o.period - 6.663_286_86).abs() < 1e-8, "{o:?}");
@@ -248,7 +248,7 @@ fn damped_spiral_has_its_rate() {
 #[test]
 fn closed_orbit_of_the_torus_has_its_multipliers() {
     let torus = Torus { omega: 0.3, gamma: 2e-3 };
-    let plane = Plane { axis: 1, value: 0.0, upward: true };
+    let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
     let o = closed_orbit::<3, 12, _>(&torus, plane, 1, vector![2.1, 0.0, 0.05], &floquet::FloquetOptions::default())
         .unwrap();
     let tau = std::f64::consts::TAU;
@@ -476,7 +476,7 @@ fn caricature(alpha: f64, beta: f64) -> Smoothed<Caricature> {
 
 #[test]
 fn closed_orbits_of_the_paper() {
-    let plane = Plane { axis: 1, value: 0.0, upward: true };
+    let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
     let settings = floquet::FloquetOptions::default();
     let find = |alpha: f64, beta: f64, returns: usize, x: f64, z: f64| {
         closed_orbit::<3, 12, _>(&caricature(alpha, beta), plane, returns, vector![x, 0.0, z], &settings).unwrap()
@@ -527,7 +527,7 @@ fn hysteretic_cycle_contracts_by_its_multiplier() {
     assert!(matches!(&e.verdict, Verdict::Periodic(c) if c.period == 2), "{e:?}");
     let cycle = e.verdict.cycle().unwrap();
     let u = cycle.points.iter().find(|p| p.upward).unwrap().u;
-    let plane = Plane { axis: 1, value: 0.0, upward: true };
+    let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
     // Away from the layer phi is 1 for x > 0 up to relaxation.
     let guess = vector![u[0], 0.0, u[1], 1.0];
     let orbit = closed_orbit::<4, 20, _>(&field, plane, 2, guess, &floquet::FloquetOptions::default()).unwrap();
@@ -551,7 +551,7 @@ fn spiral_of_the_reconstructed_reading_has_the_orbits_rate() {
     let e = judge(&points);
     let Verdict::Spiralling(cycle) = &e.verdict else { panic!("{e:?}") };
     assert_eq!(cycle.period, 1);
-    let plane = Plane { axis: 1, value: 0.0, upward: true };
+    let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
     let settings = floquet::FloquetOptions::default();
     let u = cycle.points[0].u;
     let orbit = closed_orbit::<3, 12, _>(&field, plane, 1, vector![u[0], 0.0, u[1]], &settings).unwrap();

@@ -2,14 +2,14 @@
 
 use nalgebra::{SVector, vector};
 use twofold::analyse::SectionRecorder;
-use twofold::integrate::ensemble::{End, InstructionSet, Plane, Run, ensemble, ensemble_with};
+use twofold::integrate::ensemble::{End, InstructionSet, Run, SectionPlane, ensemble, ensemble_with};
 use twofold::integrate::{
     Course, Dopri5, Flow, Ignore, Kick, KickLaw, Observer, Schedule, Step, StepCap, StopReason, Tolerance, drive,
 };
 use twofold::system::{Caricature, Smoothed, Transition};
 
 const TOLERANCE: Tolerance = Tolerance { rtol: 1.0536712e-8, atol: 1.0536712e-8 };
-const PLANE: Plane = Plane { coordinate: 1, value: 0.0 };
+const PLANE: SectionPlane = SectionPlane { coordinate: 1, value: 0.0 };
 
 /// Runs that are computed with two registers at a time, and with four, whatever the instruction set.
 const FEW: usize = 19;

@@ -2,7 +2,7 @@
 #![allow(clippy::disallowed_methods)] // std functions give expected values, compared with tolerances
 
 use twofold::analyse::passage::{Passage, PassageQuestion, Predicted, passage};
-use twofold::analyse::reference::{ExtendedCrossing, Plane, reference};
+use twofold::analyse::reference::{ExtendedCrossing, SectionPlane, reference};
 use twofold::num::{Arithmetic, DoubleDouble, Scalar};
 use twofold::system::{Caricature, Smoothed, Transition, VectorField};
 
@@ -104,7 +104,7 @@ fn an_incoming_orbit_in_f64_is_as_good_as_one_in_extended_precision() {
     let eps = 1e-3;
     let system = field(1e-1, eps, Transition::Tanh);
     let start = nalgebra::SVector::from(START).map(DoubleDouble::from_f64);
-    let exact = reference(&system, start, Plane { coordinate: 1, value: 0.0 }, 4, 40.0, false).unwrap();
+    let exact = reference(&system, start, SectionPlane { coordinate: 1, value: 0.0 }, 4, 40.0, false).unwrap();
     let exit: &ExtendedCrossing = exact.crossings.last().unwrap();
     let ours = growing(eps, 0.0).exit.unwrap();
     for (i, got) in ours.into_iter().enumerate() {

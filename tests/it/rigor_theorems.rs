@@ -5,10 +5,10 @@ use nalgebra::SVector;
 use twofold::num::tape::Recorded;
 use twofold::num::{Arithmetic, Ball, Enclosure, Interval, Tape};
 use twofold::rigor::cycle::{Search, krawczyk};
-use twofold::rigor::{Cycle, Error, Flow, FlowOptions, Plane, Set, prove_cycle};
+use twofold::rigor::{AxisPlane, Cycle, Error, Flow, FlowOptions, Set, prove_cycle};
 use twofold::system::{Caricature, Smoothed, Transition, VectorField};
 
-const SECTION: Plane = Plane { axis: 1, value: 0.0 };
+const SECTION: AxisPlane = AxisPlane { axis: 1, value: 0.0 };
 
 fn equation(alpha: f64) -> Smoothed<Caricature> {
     Smoothed { system: Caricature::with_reinjection(alpha, 1e-5), transition: Transition::Tanh, eps: 1e-3 }

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use nalgebra::SVector;
-use twofold::analyse::floquet::Plane;
+use twofold::analyse::floquet::ReturnPlane;
 use twofold::analyse::lyapunov::{Exponent, LyapunovOptions};
 use twofold::integrate::filippov::{ExitRule, Side};
 use twofold::integrate::{Schedule, StepCap, Tolerance};
@@ -53,7 +53,7 @@ fn orbit(system: &System, switch: SwitchSpec, axis: usize, settle: f64) -> Close
         switch,
         start: system.definition().start().unwrap().to_vec(),
         settle,
-        plane: Plane { axis, value: 0.0, upward: true },
+        plane: ReturnPlane { axis, value: 0.0, upward: true },
         returns: None,
         tolerance: Tolerance { rtol: 1e-11, atol: 1e-11 },
         longest_return: 1000.0,

@@ -4,7 +4,7 @@
 use nalgebra::{SVector, vector};
 use twofold::analyse::Direction;
 use twofold::analyse::digits::{Agreement, agreement};
-use twofold::analyse::reference::{ExtendedCrossing, Plane, reference};
+use twofold::analyse::reference::{ExtendedCrossing, SectionPlane, reference};
 use twofold::integrate::*;
 use twofold::num::{Arithmetic, DoubleDouble, Scalar};
 use twofold::system::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField, Wheel};
@@ -31,7 +31,7 @@ fn rows(text: &str) -> Vec<Row> {
 const PRINTED: (f64, &str) = (1e-3, include_str!("../../crates/verify/data/crossings-printed.csv"));
 const RECONSTRUCTED: (f64, &str) = (1e-1, include_str!("../../crates/verify/data/crossings-reconstructed.csv"));
 const START: [f64; 3] = [0.2, 0.0, -1.0];
-const SECTION: Plane = Plane { coordinate: 1, value: 0.0 };
+const SECTION: SectionPlane = SectionPlane { coordinate: 1, value: 0.0 };
 
 fn smoothed(alpha: f64, eps: f64) -> Smoothed<Caricature> {
     Smoothed { system: Caricature::with_reinjection(alpha, 1e-5), transition: Transition::Tanh, eps }

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use nalgebra::vector;
 use twofold::analyse::SectionRecorder;
-use twofold::integrate::ensemble::{Plane, Run, ensemble};
+use twofold::integrate::ensemble::{Run, SectionPlane, ensemble};
 use twofold::integrate::{
     Course, Dopri5, Layered, Lsoda, Radau5, Schedule, StepCap, Stepper, StopReason, Taylor, Tolerance, drive,
 };
@@ -91,7 +91,7 @@ fn main() {
     let runs: Vec<_> = (0..512)
         .map(|k| Run { start: vector![0.1 + 0.2 * f64::from(k) / 512.0, 0.0, -1.0], course: course(2e3) })
         .collect();
-    let plane = Some(Plane { coordinate: 1, value: 0.0 });
+    let plane = Some(SectionPlane { coordinate: 1, value: 0.0 });
     let tolerance = Tolerance { rtol: TOLERANCE, atol: TOLERANCE };
     for threads in [1, 2] {
         let start = Instant::now();

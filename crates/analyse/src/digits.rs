@@ -7,7 +7,7 @@
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
-use super::reference::{ExtendedCrossing, Plane, reference};
+use super::reference::{ExtendedCrossing, SectionPlane, reference};
 use super::section::SectionRecorder;
 use twofold_integrate::{
     Course, Failure, Flow, Method, Observer, Statistics, Step, StepCap, Stepper, Tolerance, WithStepper, drive,
@@ -33,7 +33,7 @@ pub struct DigitsQuestion {
     /// The start, at t = 0.
     pub start: [f64; 3],
     /// Crossings of this plane are compared.
-    pub section: Plane,
+    pub section: SectionPlane,
     /// They are compared up to this time of the reference orbit.
     pub t_end: f64,
     /// A crossing whose state has no component larger than this is a visit to the origin.
@@ -106,7 +106,7 @@ pub fn digits<F: VectorField<3>>(field: &F, question: &DigitsQuestion) -> Result
 struct Follow<'a, F> {
     field: &'a F,
     x0: SVector<f64, 3>,
-    section: Plane,
+    section: SectionPlane,
     exact: &'a [ExtendedCrossing],
     step_cap: StepCap,
     max_steps: u64,
@@ -162,7 +162,7 @@ impl Observer<3> for Until {
 pub fn agreement<F: VectorField<3>, M: Stepper<3>>(
     field: &F,
     x0: SVector<f64, 3>,
-    plane: Plane,
+    plane: SectionPlane,
     reference: &[ExtendedCrossing],
     stepper: &mut M,
     cap: StepCap,
@@ -204,7 +204,7 @@ mod tests {
         let methods = [(Method::Dopri5, 1e-4), (Method::Dopri5, 1e-10), (Method::Taylor, 1e-17)];
         let question = DigitsQuestion {
             start: [0.0, 0.05, 0.0],
-            section: Plane { coordinate: 1, value: 0.0 },
+            section: SectionPlane { coordinate: 1, value: 0.0 },
             t_end: 12.0,
             near: 0.2,
             methods: methods.map(|(name, tolerance)| Contender { name, tolerance }).into(),
@@ -242,7 +242,7 @@ mod tests {
         };
         let reference: Vec<_> = (0..5).map(claimed).collect();
         let mut method = twofold_integrate::Dopri5::<3>::new(Tolerance { rtol: 1e-10, atol: 1e-10 });
-        let (start, plane) = (SVector::from([0.0, 0.05, 0.0]), Plane { coordinate: 1, value: 0.0 });
+        let (start, plane) = (SVector::from([0.0, 0.05, 0.0]), SectionPlane { coordinate: 1, value: 0.0 });
         let rows = agreement(&Spiral, start, plane, &reference, &mut method, StepCap::None, 10_000).unwrap();
         assert_eq!(rows.iter().map(|r| r.t).collect::<Vec<_>>(), [2.0, 3.0, 4.0, 5.0]);
     }

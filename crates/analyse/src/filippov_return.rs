@@ -7,7 +7,7 @@
 
 use nalgebra::SVector;
 
-use super::floquet::{Extent, FloquetOptions, Plane, Returned};
+use super::floquet::{Extent, FloquetOptions, ReturnPlane, Returned};
 use twofold_integrate::filippov::{
     self, EventKind, ExitRule, FilippovError, FilippovObserver, Mode, ModeEvent, Side, SlidingFlow,
 };
@@ -62,7 +62,7 @@ type Itinerary = Vec<(std::mem::Discriminant<EventKind>, Option<Mode>, Option<Mo
 
 /// Watches for passages and set-valued moments.
 struct Watch<const N: usize> {
-    plane: Plane,
+    plane: ReturnPlane,
     returns: usize,
     passages: Passages,
     same: Vec<(f64, SVector<f64, N>, Mode)>,
@@ -129,7 +129,7 @@ const SHARES: [f64; 3] = [1.0, 0.1, 0.01];
 /// [`enum@Error`].
 pub fn return_map<P, const N: usize, const M: usize>(
     system: &P,
-    plane: Plane,
+    plane: ReturnPlane,
     returns: usize,
     u: &SVector<f64, N>,
     settings: &FloquetOptions,
@@ -175,7 +175,7 @@ where
 /// The derivative by differences over `delta`, row by row; nothing if neighbours have other events.
 fn columns<P, const N: usize, const M: usize>(
     system: &P,
-    plane: Plane,
+    plane: ReturnPlane,
     returns: usize,
     u: &SVector<f64, N>,
     settings: &FloquetOptions,
@@ -207,7 +207,7 @@ where
 
 fn plain<P, const N: usize, const M: usize>(
     system: &P,
-    plane: Plane,
+    plane: ReturnPlane,
     returns: usize,
     u: &SVector<f64, N>,
     settings: &FloquetOptions,
@@ -303,7 +303,7 @@ mod tests {
         // Before the edge and after it the method is exact and its dense output, by which passages are found, is not: the passage is landed on. Where the edge
         // is crossed, the dense output says.
         for (edge, value, tolerance) in [(9.0, 0.0, 1e-5), (9.0, 0.7, 1e-5), (-9.0, -3.0, 1e-5), (-0.3, 0.7, 1e-12)] {
-            let plane = Plane { axis: 1, value, upward: true };
+            let plane = ReturnPlane { axis: 1, value, upward: true };
             let start = SVector::from([-2.0, value]);
             // Upwards at -2, 0, 2 with the slopes 24, 4, 24; the derivative is the slope at the start over that at the end.
             for (returns, s, derivative) in [(1, 0.0, 6.0), (2, 2.0, 1.0)] {
@@ -329,7 +329,7 @@ mod tests {
         let s2 = 0.1 * (15.0 - twofold_num::elementary::sqrt(145.0));
         let lowest = -twofold_num::elementary::sqrt(s2) * (s2 - 1.0) * (s2 - 4.0);
         let of = |below: f64, derivative| {
-            let plane = Plane { axis: 1, value: 0.0, upward: true };
+            let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
             let system = Quintic { edge: lowest - below, of: 1 };
             return_map(&system, plane, 1, &SVector::from([-2.0, 0.0]), &settings(1e-12), derivative)
         };
@@ -362,7 +362,7 @@ mod tests {
             }
         }
         let of = |towards, y, value| {
-            let plane = Plane { axis: 0, value, upward: true };
+            let plane = ReturnPlane { axis: 0, value, upward: true };
             return_map(&Channel(towards), plane, 1, &SVector::from([0.0, y]), &settings(1e-9), false)
         };
         // It lands at 1, and flies before.

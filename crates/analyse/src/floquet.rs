@@ -17,7 +17,7 @@ use twofold_system::VectorField;
 
 /// The plane `x[axis] = value`, crossed in one direction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Plane {
+pub struct ReturnPlane {
     /// Index of the coordinate.
     pub axis: usize,
     /// Its value on the plane.
@@ -155,7 +155,7 @@ impl<const N: usize> Extent<N> {
 /// See [`enum@Error`].
 pub fn closed_orbit<const N: usize, const M: usize, F>(
     field: &F,
-    plane: Plane,
+    plane: ReturnPlane,
     returns: usize,
     guess: SVector<f64, N>,
     settings: &FloquetOptions,
@@ -233,7 +233,7 @@ pub struct Returned {
 /// If the orbit cannot be followed, or does not return.
 pub fn return_map<const N: usize, const M: usize, T: VectorField<M>>(
     tangent: &T,
-    plane: Plane,
+    plane: ReturnPlane,
     returns: usize,
     u: &SVector<f64, N>,
     settings: &FloquetOptions,
@@ -251,7 +251,7 @@ pub fn return_map<const N: usize, const M: usize, T: VectorField<M>>(
 
 fn returned<const N: usize, const M: usize, T: VectorField<M>>(
     tangent: &T,
-    plane: Plane,
+    plane: ReturnPlane,
     returns: usize,
     u: SVector<f64, N>,
     settings: &FloquetOptions,
@@ -387,7 +387,7 @@ mod tests {
 
     #[test]
     fn hopf_normal_form_is_exact() {
-        let plane = Plane { axis: 1, value: 0.0, upward: true };
+        let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
         for a in [0.05, 0.5, -0.03] {
             let o = closed_orbit::<2, 6, _>(&Hopf(a), plane, 1, SVector::from([1.2, 0.0]), &FloquetOptions::default())
                 .unwrap();
@@ -399,7 +399,7 @@ mod tests {
 
     #[test]
     fn no_returns_are_refused() {
-        let plane = Plane { axis: 1, value: 0.0, upward: true };
+        let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
         let found =
             closed_orbit::<2, 6, _>(&Hopf(0.5), plane, 0, SVector::from([1.2, 0.0]), &FloquetOptions::default());
         assert_eq!(found, Err(Error::NoReturns));
@@ -433,7 +433,7 @@ mod tests {
         // The method is exact for it and its dense output is not: the passage is landed on, and what is left is mended.
         let settings = FloquetOptions { tolerance: Tolerance { rtol: 1e-5, atol: 1e-5 }, ..FloquetOptions::default() };
         for value in [0.0, 0.7, -3.0] {
-            let plane = Plane { axis: 1, value, upward: true };
+            let plane = ReturnPlane { axis: 1, value, upward: true };
             let of = |returns| {
                 let start = SVector::from([-2.0, value]);
                 return_map::<2, 6, _>(&Tangent::<Quintic, 2>(&Quintic), plane, returns, &start, &settings).unwrap()
@@ -455,7 +455,7 @@ mod tests {
         let settings = FloquetOptions::default();
         let root = sqrt(0.75);
         for (upward, z) in [(true, -root), (false, root)] {
-            let plane = Plane { axis: 0, value: 0.5, upward };
+            let plane = ReturnPlane { axis: 0, value: 0.5, upward };
             for returns in [1, 2] {
                 let guess = SVector::from([0.3, 1.1 * z]);
                 let o = closed_orbit::<2, 6, _>(&Hopf(0.05), plane, returns, guess, &settings).unwrap();
@@ -472,7 +472,7 @@ mod tests {
 
     #[test]
     fn what_does_not_return_or_converge_is_told() {
-        let plane = Plane { axis: 1, value: 0.0, upward: true };
+        let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
         let of = |settings| closed_orbit::<2, 6, _>(&Hopf(0.05), plane, 1, SVector::from([1.2, 0.0]), &settings);
         let short = of(FloquetOptions { longest_return: 6.0, ..FloquetOptions::default() });
         assert_eq!(short, Err(Error::NoReturn { from: vec![1.2, 0.0], within: 6.0 }));
@@ -548,7 +548,7 @@ mod tests {
                 SVector::from([g * x[0] - x[1], g * x[1] + x[0], d.scale(0.3) - x[2].scale(0.02)])
             }
         }
-        let plane = Plane { axis: 1, value: 0.0, upward: true };
+        let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
         let guess = SVector::from([1.1, 0.0, 0.05]);
         let o = closed_orbit::<3, 12, _>(&Ring, plane, 1, guess, &FloquetOptions::default()).unwrap();
         assert!((o.rate - 0.02).abs() < 1e-8 && o.multipliers[0][1] != 0.0, "{o:?}");

@@ -15,7 +15,7 @@
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
-use super::reference::{ExtendedCrossing, ExtendedPoint, Plane, REFERENCE_TOLERANCE, first_crossing, refine};
+use super::reference::{ExtendedCrossing, ExtendedPoint, REFERENCE_TOLERANCE, SectionPlane, first_crossing, refine};
 use twofold_integrate::roots::Passages;
 use twofold_integrate::{Failure, Flow, Observer, Radau5, Statistics, Step, Stepper, Taylor, Tolerance};
 use twofold_num::elementary::sqrt;
@@ -170,9 +170,9 @@ pub struct Passage {
 }
 
 /// The section on which visits and exits lie.
-const SECTION: Plane = Plane { coordinate: 1, value: 0.0 };
+const SECTION: SectionPlane = SectionPlane { coordinate: 1, value: 0.0 };
 /// The switching surface.
-const SURFACE: Plane = Plane { coordinate: 0, value: 0.0 };
+const SURFACE: SectionPlane = SectionPlane { coordinate: 0, value: 0.0 };
 
 /// The larger of |y|, |z|.
 fn extent(x: &SVector<f64, 3>) -> f64 {

@@ -1,9 +1,9 @@
 //! Reference orbits in double-double arithmetic, about 32 digits: what other methods are measured against.
 
 use nalgebra::SVector;
-use serde::{Deserialize, Serialize};
 
 use super::section::Direction;
+pub use twofold_integrate::ensemble::SectionPlane;
 use twofold_integrate::{Failure, Statistics, Stepper, StopReason, Taylor, Tolerance, roots::Passages};
 use twofold_num::Arithmetic;
 use twofold_num::{DoubleDouble, Elementary, Scalar};
@@ -16,23 +16,13 @@ pub type ExtendedPoint<const N: usize = 3> = SVector<DoubleDouble, N>;
 /// it, and roundings, unlike it, may cancel. Absolutely far below: at the two-fold every component is small.
 pub const REFERENCE_TOLERANCE: Tolerance = Tolerance { rtol: 1e-33, atol: 1e-40 };
 
-/// The plane through which crossings are counted: `state[coordinate] = value`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Plane {
-    /// Index of the coordinate.
-    pub coordinate: usize,
-    /// Its value on the plane.
-    pub value: f64,
-}
-
 /// A surface that orbits are watched at: the zeros of a height, which is evaluated in whatever arithmetic the orbit has.
 pub trait Surface<const N: usize> {
     /// The height of `x` over the surface.
     fn height<S: Elementary>(&self, x: &SVector<S, N>) -> S;
 }
 
-impl<const N: usize> Surface<N> for Plane {
+impl<const N: usize> Surface<N> for SectionPlane {
     fn height<S: Elementary>(&self, x: &SVector<S, N>) -> S {
         x[self.coordinate] - S::from_f64(self.value)
     }
@@ -181,7 +171,7 @@ mod tests {
         }
     }
 
-    const PLANE: Plane = Plane { coordinate: 0, value: 0.0 };
+    const PLANE: SectionPlane = SectionPlane { coordinate: 0, value: 0.0 };
 
     fn start() -> ExtendedPoint<2> {
         SVector::from([1.0, 0.0].map(DoubleDouble::from_f64))
@@ -203,7 +193,7 @@ mod tests {
             assert_eq!(c.direction, direction);
         }
         // A sixth of a turn: cos = 1/2.
-        let half = reference(&Oscillator, start(), Plane { value: 0.5, ..PLANE }, 1, 6.0, false).unwrap();
+        let half = reference(&Oscillator, start(), SectionPlane { value: 0.5, ..PLANE }, 1, 6.0, false).unwrap();
         assert_eq!((half.crossings.len(), half.stop), (1, StopReason::Observer));
         close(half.crossings[0].t * DoubleDouble::from_f64(3.0), DoubleDouble::PI);
     }

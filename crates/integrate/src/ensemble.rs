@@ -14,6 +14,7 @@
 use nalgebra::SVector;
 use pulp::bytemuck::{cast_slice, cast_slice_mut};
 use pulp::{Scalar, Simd, WithSimd};
+use serde::{Deserialize, Serialize};
 
 use super::dopri5::{Dense, Dopri5, control, tableau::*};
 use super::driver::{Course, Observer, Summary, Watch};
@@ -44,8 +45,9 @@ pub struct End<O, const N: usize> {
 }
 
 /// The plane x\[coordinate\] = value.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plane {
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SectionPlane {
     /// Which component of the state.
     pub coordinate: usize,
     /// Its value there.
@@ -76,7 +78,7 @@ pub struct Common<'a, const N: usize> {
     /// The local errors that they may make.
     pub tolerances: Tolerances<'a>,
     /// What the observers look at; without one they hear of kicks alone.
-    pub plane: Option<Plane>,
+    pub plane: Option<SectionPlane>,
     /// A corner for each run, which ends as if its observer had stopped it ([`StopReason::Observer`]) at the first step's end where each component of
     /// the state is above the corner's.
     pub corners: Option<&'a [SVector<f64, N>]>,
@@ -151,7 +153,7 @@ pub fn ensemble<E, O, const N: usize>(
     equations: &E,
     runs: &[Run<N>],
     tolerance: Tolerance,
-    plane: Option<Plane>,
+    plane: Option<SectionPlane>,
     observer: impl Fn(usize) -> O,
 ) -> Vec<End<O, N>>
 where
@@ -167,7 +169,7 @@ pub fn ensemble_with<E, O, const N: usize>(
     equations: &E,
     runs: &[Run<N>],
     tolerance: Tolerance,
-    plane: Option<Plane>,
+    plane: Option<SectionPlane>,
     observer: impl Fn(usize) -> O,
 ) -> Vec<End<O, N>>
 where
@@ -623,7 +625,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         let hiding = number(0.5).less(plain.select(zero, one), set).and(accepted);
         noted = noted.or(hiding);
         let mut met = None;
-        if let Some(Plane { coordinate, value }) = common.plane {
+        if let Some(SectionPlane { coordinate, value }) = common.plane {
             let may = may_meet(coordinate, number(value), h, &x0, &x1, [&k1, &k3, &k4, &k5, &k6, &k7], set);
             let may = may.and(accepted);
             met = Some(may.select(one, zero).parts());

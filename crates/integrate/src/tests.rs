@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 use nalgebra::{SVector, vector};
 
-use super::ensemble::{Common, InstructionSet, Plane, Run, Tolerances, ensemble_watched};
+use super::ensemble::{Common, InstructionSet, Run, SectionPlane, Tolerances, ensemble_watched};
 use super::filippov::{
     AllModes, ExitRule, FilippovObserver, FilippovOptions, FunnelGrid, Mode, ModeEvent, Side, SlidingFlow, SlidingLaw,
     connect, funnel, history, run, run_two_surfaces,
@@ -585,10 +585,10 @@ fn lanes_tell_of_the_steps_that_may_meet_the_plane() {
             Flow::Continue
         }
     }
-    struct May(Plane, Vec<u64>, u64);
+    struct May(SectionPlane, Vec<u64>, u64);
     impl Observer<3> for May {
         fn step(&mut self, step: &Step<'_, 3>) -> Flow {
-            let Plane { coordinate, value } = self.0;
+            let SectionPlane { coordinate, value } = self.0;
             let (h0, h1) = (step.x0[coordinate] - value, step.x1[coordinate] - value);
             let reach = step.interpolant.reach(coordinate);
             let margin = 1e-12 * (h0.abs() + h1.abs() + value.abs() + reach);
@@ -608,7 +608,7 @@ fn lanes_tell_of_the_steps_that_may_meet_the_plane() {
     let (mut told, mut all) = (0, 0);
     for coordinate in 0..3 {
         for value in [-1.3, -0.6, -0.05, 0.0, 0.02, 0.3, 0.9, 1e13] {
-            let plane = Plane { coordinate, value };
+            let plane = SectionPlane { coordinate, value };
             let wanted: Vec<_> = runs
                 .iter()
                 .map(|run| {
@@ -669,7 +669,9 @@ fn lanes_are_runs_alone() {
         Ok(s) => format!("{:?} {:?} {:?}", s, s.t.to_bits(), s.x.map(f64::to_bits)),
         Err(failure) => format!("{failure:?}"),
     };
-    for (corner, plane) in [(None, None), (Some(corner), None), (None, Some(Plane { coordinate: 1, value: 0.125 }))] {
+    for (corner, plane) in
+        [(None, None), (Some(corner), None), (None, Some(SectionPlane { coordinate: 1, value: 0.125 }))]
+    {
         // Every third run has none of its own.
         let corners = corner.map(|corner| {
             (0..runs.len())

@@ -72,7 +72,7 @@ mod tests {
     use crate::cases;
     use crate::spec::Method;
     use twofold_analyse::digits::Contender;
-    use twofold_analyse::reference::Plane;
+    use twofold_analyse::reference::SectionPlane;
     use twofold_integrate::StepCap;
 
     /// y and z turn about the origin once in 2 pi: y = 0 is passed at pi/2 and 3 pi/2. The tighter the tolerance, the
@@ -85,7 +85,7 @@ mod tests {
             eps: 1e-2,
             compared: DigitsQuestion {
                 start: [0.0, 1.0, 0.0],
-                section: Plane { coordinate: 1, value: 0.0 },
+                section: SectionPlane { coordinate: 1, value: 0.0 },
                 t_end: 6.0,
                 near: 0.5,
                 methods: methods.into(),

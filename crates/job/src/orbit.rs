@@ -15,7 +15,7 @@ use super::spec::{Observation, RunSpec, SpecError, SwitchSpec};
 use super::table::{Column, Entry, Table};
 use twofold_analyse::branch::{self, Course, End, Newton, Obstacle, Orbit, ReturnMap, Trouble};
 use twofold_analyse::filippov_return;
-use twofold_analyse::floquet::{self, Plane, Returned};
+use twofold_analyse::floquet::{self, ReturnPlane, Returned};
 use twofold_instances::{Motions, Returns};
 use twofold_integrate::{Failure, Schedule, Tolerance, Watch};
 use twofold_num::elementary::sqrt;
@@ -41,7 +41,7 @@ pub struct ClosedOrbit {
     /// How the motion settles before Newton's method begins, at most until this time; 0: not at all.
     pub settle: f64,
     /// The plane.
-    pub plane: Plane,
+    pub plane: ReturnPlane,
     /// Passages per turn in the plane's direction; none: as many as the settled motion shows.
     pub returns: Option<usize>,
     /// Local error of the orbit and its tangent vectors.
@@ -571,7 +571,7 @@ mod tests {
             system,
             switch,
             settle: 0.0,
-            plane: Plane { axis, value: 0.0, upward: true },
+            plane: ReturnPlane { axis, value: 0.0, upward: true },
             returns: None,
             tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
             longest_return: 100.0,
@@ -715,7 +715,7 @@ mod tests {
         assert!((0..2).all(|k| (x[k] + y[k]).abs() < 1e-6) && (x[0] + x[1]).abs() < 1e-6, "{x:?} {y:?}");
         assert!((0..4).all(|k| (x[k].abs() - 0.5_f64.sqrt()).abs() < 1e-6));
         for (upward, word) in [(true, "upwards within t = 40"), (false, "downwards within t = 40")] {
-            let plane = Plane { axis: 2, value: 5.0, upward };
+            let plane = ReturnPlane { axis: 2, value: 5.0, upward };
             let missed = ClosedOrbit { plane, ..question.clone() };
             let said = missed.compute(&Executor::quiet(), &()).unwrap_err().to_string();
             assert!(said.contains(word), "{said}");

@@ -132,7 +132,7 @@ mod tests {
     use crate::sweep::Fate;
     use crate::*;
     use twofold_analyse::digits::DigitsQuestion;
-    use twofold_analyse::floquet::Plane;
+    use twofold_analyse::floquet::ReturnPlane;
     use twofold_analyse::limit::{AfterVisitQuestion, ConvergenceQuestion};
     use twofold_analyse::lyapunov;
     use twofold_analyse::passage::PassageQuestion;
@@ -186,7 +186,7 @@ mod tests {
                     switch: run.switch,
                     start: start.clone(),
                     settle: 0.0,
-                    plane: Plane { axis: 1, value: 0.0, upward: true },
+                    plane: ReturnPlane { axis: 1, value: 0.0, upward: true },
                     returns: None,
                     tolerance,
                     longest_return: 9.0,
@@ -200,7 +200,7 @@ mod tests {
                     eps: 1e-3,
                     compared: DigitsQuestion {
                         start: [0.2, 0.0, -1.0],
-                        section: reference::Plane { coordinate: 1, value: 0.0 },
+                        section: reference::SectionPlane { coordinate: 1, value: 0.0 },
                         t_end: 9.0,
                         near: 0.1,
                         methods: Vec::new(),

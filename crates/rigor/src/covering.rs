@@ -14,7 +14,7 @@ use nalgebra::{SMatrix, SVector};
 use super::Error;
 use super::flow::{Flow, FlowOptions};
 use super::linear::{IMatrix, IVector};
-use super::section::Plane;
+use super::section::AxisPlane;
 use super::set::Set;
 use twofold_num::{Arithmetic, Enclosure, Interval, Tape};
 
@@ -34,7 +34,7 @@ pub struct HSet {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Return {
     /// The plane.
-    pub plane: Plane,
+    pub plane: AxisPlane,
     /// The direction in which the plane is crossed at the start and at the end.
     pub upward: bool,
     /// How many crossings a return takes, in both directions: an even number.
@@ -76,7 +76,7 @@ fn others(axis: usize) -> [usize; 2] {
 
 impl HSet {
     /// Its part with u in `part`, in the plane.
-    fn part<S: Enclosure>(&self, plane: Plane, part: [f64; 2]) -> Set<S, 3> {
+    fn part<S: Enclosure>(&self, plane: AxisPlane, part: [f64; 2]) -> Set<S, 3> {
         let [p, q] = others(plane.axis);
         let middle = (0.5 * part[0] + 0.5 * part[1]).clamp(part[0], part[1]);
         let mut centre = SVector::<S, 3>::from_element(S::from_f64(plane.value));
@@ -92,7 +92,7 @@ impl HSet {
     }
 
     /// A set in the plane, in the coordinates (u, v).
-    fn see<S: Enclosure>(&self, plane: Plane, set: &Set<S, 3>) -> Result<[Interval; 2], Error> {
+    fn see<S: Enclosure>(&self, plane: AxisPlane, set: &Set<S, 3>) -> Result<[Interval; 2], Error> {
         let [p, q] = others(plane.axis);
         let [[a, c], [b, d]] = [self.unstable.map(Interval::from_f64), self.stable.map(Interval::from_f64)];
         let determinant = a * d - b * c;
@@ -201,7 +201,7 @@ mod tests {
         })
     }
 
-    const MAP: Return = Return { plane: Plane { axis: 1, value: 0.0 }, upward: true, crossings: 2, longest: 20.0 };
+    const MAP: Return = Return { plane: AxisPlane { axis: 1, value: 0.0 }, upward: true, crossings: 2, longest: 20.0 };
 
     #[test]
     fn an_unstable_circle_covers_itself() {

@@ -16,7 +16,7 @@ use nalgebra::SVector;
 
 use super::Error;
 use super::flow::{Flow, FlowOptions};
-use super::section::Plane;
+use super::section::AxisPlane;
 use super::set::Set;
 use twofold_num::{Arithmetic, Interval, Tape};
 
@@ -79,7 +79,7 @@ struct Turn {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Search {
     /// The plane; the orbit starts on it, upward.
-    pub plane: Plane,
+    pub plane: AxisPlane,
     /// The other two coordinates, near the orbit.
     pub near: [f64; 2],
     /// Half the width of the box tried, in both.

@@ -25,7 +25,7 @@ pub mod set;
 pub use covering::{Covering, HSet, Return, prove_covering};
 pub use cycle::{Cycle, prove_cycle};
 pub use flow::{Flow, FlowOptions};
-pub use section::{Crossing, Plane};
+pub use section::{AxisPlane, Crossing};
 pub use set::Set;
 
 use twofold_num::Interval;

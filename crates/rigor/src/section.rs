@@ -20,7 +20,7 @@ use twofold_num::{Arithmetic, Elementary, Enclosure, Interval};
 
 /// The plane on which a coordinate has a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plane {
+pub struct AxisPlane {
     /// Index of the coordinate.
     pub axis: usize,
     /// Its value.
@@ -48,7 +48,7 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
     ///
     /// # Errors
     /// See [`Error`]; nothing is returned that is not proved.
-    pub fn next_crossing(&mut self, set: &Set<S, N>, plane: Plane, latest: f64) -> Result<Crossing<S, N>, Error> {
+    pub fn next_crossing(&mut self, set: &Set<S, N>, plane: AxisPlane, latest: f64) -> Result<Crossing<S, N>, Error> {
         let mut set = set.clone();
         let value = Interval::from_f64(plane.value);
         let wide = |set: &Set<S, N>| Error::NotTransversal {
@@ -117,7 +117,7 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
     }
 
     /// Projects a set around the plane onto it, along the flow.
-    fn project(&mut self, set: &Set<S, N>, plane: Plane, upward: bool) -> Result<Crossing<S, N>, Error> {
+    fn project(&mut self, set: &Set<S, N>, plane: AxisPlane, upward: bool) -> Result<Crossing<S, N>, Error> {
         let axis = plane.axis;
         let hull = set.hull();
         let wide =

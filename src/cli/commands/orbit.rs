@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde_json::json;
 
 use crate::analyse::branch::Stability;
-use crate::analyse::floquet::Plane;
+use crate::analyse::floquet::ReturnPlane;
 use crate::cli::ending;
 use crate::cli::exit::part_of;
 use crate::cli::flags::{RunFlags, Use};
@@ -87,7 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         switch: spec.switch,
         start: spec.start,
         settle,
-        plane: Plane { axis: coordinate, value, upward: !arguments.downward },
+        plane: ReturnPlane { axis: coordinate, value, upward: !arguments.downward },
         returns: arguments.returns,
         tolerance: spec.method.tolerance,
         longest_return: arguments.longest_return,

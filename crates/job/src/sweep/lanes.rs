@@ -17,7 +17,7 @@ use crate::table::Entry;
 use twofold_analyse::SectionRecorder;
 use twofold_analyse::path::MOST_POINTS;
 use twofold_instances::{self as instances, Lanes};
-use twofold_integrate::ensemble::{Common, End, InstructionSet, Plane, Run, Tolerances};
+use twofold_integrate::ensemble::{Common, End, InstructionSet, Run, SectionPlane, Tolerances};
 use twofold_integrate::{Course, StopReason, Summary, Watch};
 use twofold_system::{Alike, BindError, BoundField, Field};
 
@@ -48,7 +48,7 @@ impl Cell {
     }
 
     /// What its section is taken at, if lanes compute it: a smoothed run by Dormand-Prince.
-    fn plane(&self) -> Option<Plane> {
+    fn plane(&self) -> Option<SectionPlane> {
         let run = self.run();
         let method = &run.method;
         let plain = method.name == Method::Dopri5 && method.precision.is_none() && method.order.is_none();
@@ -56,7 +56,7 @@ impl Cell {
             (SwitchSpec::Smoothed { .. }, Observation::Section { coordinate, value })
                 if plain && STATES.contains(&run.system.dimension()) && run.validate().is_ok() =>
             {
-                Some(Plane { coordinate, value })
+                Some(SectionPlane { coordinate, value })
             }
             _ => None,
         }
@@ -326,7 +326,7 @@ fn side_by_side<const N: usize>(
     let tolerances: Vec<_> = cells.iter().map(|cell| cell.run().method.tolerance).collect();
     let common = Common { tolerances: Tolerances::Each(&tolerances), plane, corners, carried: None, watch: &watch };
     let section = match plane {
-        Some(Plane { coordinate, value }) => SectionRecorder::<N>::new(coordinate, value),
+        Some(SectionPlane { coordinate, value }) => SectionRecorder::<N>::new(coordinate, value),
         None => SectionRecorder::<N>::new(0, 0.0),
     };
     let mut interrupted = false;
