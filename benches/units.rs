@@ -13,7 +13,7 @@ use twofold::integrate::{
     Course, Dopri5, Failure, Ignore, Layered, Lsoda, Radau5, Schedule, StepCap, Stepper, Taylor, Tolerance, drive,
 };
 use twofold::system::{
-    Alike, BoundField, Caricature, Equations, Field as Recorded, Smoothed, System, Transition, VectorField,
+    BatchedField, BoundField, Caricature, Field as Recorded, ParameterBatch, Smoothed, System, Transition, VectorField,
 };
 
 const TOLERANCE: Tolerance = Tolerance { rtol: 1.0536712e-8, atol: 1.0536712e-8 };
@@ -76,7 +76,7 @@ fn w2<F: VectorField<3>, M: Stepper<3>>(field: &F, make: impl Fn() -> M) -> Done
 }
 
 /// W2 in lanes.
-fn w2_in_lanes<E: Equations<3>>(equations: &E, set: InstructionSet) -> Done {
+fn w2_in_lanes<E: BatchedField<3>>(equations: &E, set: InstructionSet) -> Done {
     let course = Course { step_cap: StepCap::Absolute(10.0), ..Course::to(2000.0) };
     let run = |k: u32| Run { start: vector![0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0, 0.0, -1.0], course };
     let runs: Vec<_> = (0..1000).map(run).collect();
@@ -133,7 +133,7 @@ fn once(unit: &str, set: &str, method: &str) -> Option<Done> {
         // As if each run had parameters of its own.
         ("W2", "dopri5-lanes-parameters") => {
             let field = from_file(set)?;
-            w2_in_lanes(&Alike::new(vec![field; 1000])?, InstructionSet::best())
+            w2_in_lanes(&ParameterBatch::new(vec![field; 1000])?, InstructionSet::best())
         }
         ("W2", "lsoda") => w2(&field, || Lsoda::new(TOLERANCE)),
         _ => return None,

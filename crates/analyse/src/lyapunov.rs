@@ -22,7 +22,7 @@ use twofold_integrate::{
 };
 use twofold_num::elementary::{ln, sqrt};
 use twofold_num::fit::{line, mean};
-use twofold_system::{Equations, VectorField};
+use twofold_system::{BatchedField, VectorField};
 
 /// A largest Lyapunov exponent.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -226,7 +226,7 @@ pub fn estimate_along<const N: usize, const M: usize, T: VectorField<M>>(
 ///
 /// # Panics
 /// If `settings` have kicks, or `tangents` are of fewer runs.
-pub fn largest_side_by_side<const N: usize, const M: usize, E: Equations<M>>(
+pub fn largest_side_by_side<const N: usize, const M: usize, E: BatchedField<M>>(
     set: InstructionSet,
     tangents: &E,
     starts: &[SVector<f64, N>],

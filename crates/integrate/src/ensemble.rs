@@ -1,4 +1,4 @@
-//! Many independent runs at once, of one equation or of equations that differ in numbers alone ([`Alike`](twofold_system::Alike)), side by side
+//! Many independent runs at once, of one equation or of equations that differ in numbers alone ([`ParameterBatch`](twofold_system::ParameterBatch)), side by side
 //! in the lanes of vector registers, by Dormand-Prince 5(4).
 //!
 //! Each lane has its own time, step size, schedule and end, takes and refuses steps by itself, and is given the next run when its own has
@@ -24,7 +24,7 @@ use super::step::{Failure, Flow, Statistics, Step, Stepper, StopReason, Toleranc
 use twofold_num::elementary::kernels::{rough_exp2, rough_log2};
 use twofold_num::elementary::sqrt;
 use twofold_num::{Aligned, Arithmetic, Mask, Registers};
-use twofold_system::{Equations, VectorField};
+use twofold_system::{BatchedField, VectorField};
 
 /// A start and what is to happen from there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -157,7 +157,7 @@ pub fn ensemble<E, O, const N: usize>(
     observer: impl Fn(usize) -> O,
 ) -> Vec<End<O, N>>
 where
-    E: Equations<N>,
+    E: BatchedField<N>,
     O: Observer<N>,
 {
     ensemble_with(InstructionSet::best(), equations, runs, tolerance, plane, observer)
@@ -173,7 +173,7 @@ pub fn ensemble_with<E, O, const N: usize>(
     observer: impl Fn(usize) -> O,
 ) -> Vec<End<O, N>>
 where
-    E: Equations<N>,
+    E: BatchedField<N>,
     O: Observer<N>,
 {
     let mut ends: Vec<Option<End<O, N>>> = runs.iter().map(|_| None).collect();
@@ -194,7 +194,7 @@ pub fn ensemble_watched<E, O, const N: usize>(
     observer: impl Fn(usize) -> O,
     finished: &mut dyn FnMut(usize, End<O, N>),
 ) where
-    E: Equations<N>,
+    E: BatchedField<N>,
     O: Observer<N>,
 {
     let all = All::<_, _, _, N, 1> { equations, runs, common, observer, finished };
@@ -247,7 +247,7 @@ impl<'a, E: Equations<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> All
 }
 
 #[cfg(target_arch = "x86_64")]
-impl<'a, E: Equations<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> All<'a, E, O, M, N, 1> {
+impl<'a, E: BatchedField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> All<'a, E, O, M, N, 1> {
     /// By as many registers at a time as suit the number of runs: while one waits for a quotient the others go on, and of four none waits long,
     /// but they take 1.6 times as long as two for a step. That pays where runs fill their lanes at least twice, and states
     /// are few: six are no faster with four.
@@ -268,7 +268,7 @@ impl<'a, E: Equations<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> All
 /// The watch is asked after so many steps, as [`drive`](super::drive) asks it.
 const STEPS_UNWATCHED: u32 = 4096;
 
-impl<E: Equations<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, const K: usize> WithSimd
+impl<E: BatchedField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, const K: usize> WithSimd
     for All<'_, E, O, M, N, K>
 {
     type Output = ();
@@ -417,7 +417,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
     /// Puts a run into an empty lane; gives its end if it needs no step.
     #[inline(never)]
     #[allow(clippy::too_many_arguments)]
-    fn begin<E: Equations<N>>(
+    fn begin<E: BatchedField<N>>(
         &mut self,
         l: usize,
         equations: &E,
@@ -460,7 +460,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
     }
 
     /// Begins the segment of lane `l`.
-    fn restart<E: Equations<N>>(&mut self, l: usize, equations: &E) -> Option<Failure> {
+    fn restart<E: BatchedField<N>>(&mut self, l: usize, equations: &E) -> Option<Failure> {
         let lane = self.lanes[l].as_mut()?;
         let end = lane.segment.end;
         lane.stages = Stages::new(end, lane.course.step_cap.for_segment(end - get(&self.t, l)));
@@ -468,7 +468,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
     }
 
     /// Begins the stage of lane `l` that is under way.
-    fn begin_stage<E: Equations<N>>(&mut self, l: usize, equations: &E) -> Option<Failure> {
+    fn begin_stage<E: BatchedField<N>>(&mut self, l: usize, equations: &E) -> Option<Failure> {
         let (t, x) = (get(&self.t, l), self.state(l));
         let lane = self.lanes[l].as_mut()?;
         lane.restarts += 1;
@@ -531,7 +531,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
 
     /// One trial step in every lane. Says whether a lane has become empty.
     #[inline(always)]
-    fn step<E: Equations<N>>(
+    fn step<E: BatchedField<N>>(
         &mut self,
         equations: &E,
         common: &Common<'_, N>,
@@ -678,7 +678,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
 
     /// The scalar part of a step, for the lanes that need one. Says whether a lane has become empty.
     #[inline(never)]
-    fn attend<E: Equations<N>>(
+    fn attend<E: BatchedField<N>>(
         &mut self,
         equations: &E,
         common: &Common<'_, N>,
@@ -700,7 +700,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
     }
 
     /// As the loop of [`drive`](super::drive) and [`Dopri5::step`] do it; gives the end of the run.
-    fn attend_one<E: Equations<N>>(
+    fn attend_one<E: BatchedField<N>>(
         &mut self,
         l: usize,
         equations: &E,
@@ -834,7 +834,7 @@ impl<E, S: Simd, const K: usize> Derivative<'_, E, S, K> {
     #[inline(always)]
     fn at<const N: usize>(&mut self, x: &SVector<Registers<S, K>, N>) -> SVector<Registers<S, K>, N>
     where
-        E: Equations<N>,
+        E: BatchedField<N>,
     {
         let Self { set, equations, numbers, ref mut room } = *self;
         vector(set, &set.vectorize(Field { set, equations, numbers, room, x: Aligned(bare(x)) }).0)
@@ -850,7 +850,7 @@ struct Field<'a, E, S: Simd, const N: usize, const K: usize> {
     x: Aligned<[[S::f64s; K]; N]>,
 }
 
-impl<E: Equations<N>, S: Simd, const N: usize, const K: usize> WithSimd for Field<'_, E, S, N, K> {
+impl<E: BatchedField<N>, S: Simd, const N: usize, const K: usize> WithSimd for Field<'_, E, S, N, K> {
     type Output = Aligned<[[S::f64s; K]; N]>;
     #[inline(always)]
     fn with_simd<T: Simd>(self, _: T) -> Self::Output {

@@ -14,7 +14,7 @@ use twofold_instances::{Exponents, Growth};
 use twofold_integrate::Watch;
 use twofold_integrate::ensemble::InstructionSet;
 use twofold_num::tape::Program;
-use twofold_system::{Alike, BoundField, Compiled, Field, Hysteretic, Smoothed, System};
+use twofold_system::{BoundField, Compiled, Field, Hysteretic, ParameterBatch, Smoothed, System};
 
 /// The largest Lyapunov exponent of the orbit from `start`. Facts: `exponent` ([`Exponent`]), `half_width` of its 95 % interval and `sign`
 /// ([`Sign`](lyapunov::Sign)) by that interval; or `failure` with the reason if the orbit could not be followed (it leaves, or its
@@ -70,7 +70,7 @@ impl LargestExponent {
         Alike<M>: Exponents<N>,
     {
         let fields: Option<Vec<BoundField<M>>> = questions.iter().map(|q| q.tangent()?.bind().ok()).collect();
-        let Some(tangents) = fields.and_then(Alike::new) else { return Ok(None) };
+        let Some(tangents) = fields.and_then(ParameterBatch::new) else { return Ok(None) };
         let starts: Vec<_> = questions.iter().map(|q| SVector::<f64, N>::from_column_slice(&q.start)).collect();
         let settings = &questions[0].settings;
         match tangents.exponents(set, &starts, settings, watch) {

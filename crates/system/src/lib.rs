@@ -15,7 +15,7 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
 
-mod alike;
+mod batched;
 pub mod caricature;
 pub mod definition;
 pub mod diagnostic;
@@ -39,7 +39,7 @@ use nalgebra::{SMatrix, SVector};
 use twofold_num::tape::Recorded;
 use twofold_num::{Aligned, Dual, Elementary, Registers, Simd, Tape};
 
-pub use alike::{Alike, Equations};
+pub use batched::{BatchedField, ParameterBatch};
 pub use caricature::Caricature;
 pub use definition::Definition;
 pub use diagnostic::Diagnostic;

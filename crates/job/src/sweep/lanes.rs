@@ -19,7 +19,7 @@ use twofold_analyse::path::MOST_POINTS;
 use twofold_instances::{self as instances, Lanes};
 use twofold_integrate::ensemble::{Common, End, InstructionSet, Run, SectionPlane, Tolerances};
 use twofold_integrate::{Course, StopReason, Summary, Watch};
-use twofold_system::{Alike, BindError, BoundField, Field};
+use twofold_system::{BindError, BoundField, Field, ParameterBatch};
 
 /// Fewer cells than this are computed one after the other.
 const FEWEST: usize = 3;
@@ -121,10 +121,10 @@ impl Group {
         let (mut groups, few): (Vec<Self>, Vec<Self>) = of_one.into_iter().partition(|g| g.cells.len() >= ENOUGH);
         let apart = groups.len();
         for group in few {
-            let alike = |other: &&mut Self| {
+            let batch = |other: &&mut Self| {
                 other.cells[0].is_asked_like(&group.cells[0]) && other.equation.is_like(&group.equation)
             };
-            match groups[apart..].iter_mut().find(alike) {
+            match groups[apart..].iter_mut().find(batch) {
                 Some(other) => {
                     other.cells.extend(group.cells);
                     other.of_one_equation = false;
@@ -136,10 +136,10 @@ impl Group {
     }
 
     /// The cells' equations, in their order.
-    fn alike<const N: usize>(&self) -> Result<Option<Alike<N>>, BindError> {
+    fn batch<const N: usize>(&self) -> Result<Option<ParameterBatch<N>>, BindError> {
         let bound: Result<Vec<BoundField<N>>, _> =
             self.cells.iter().filter_map(Cell::equation).map(|e| e.bind()).collect();
-        Ok(Alike::new(bound?))
+        Ok(ParameterBatch::new(bound?))
     }
 }
 
@@ -286,8 +286,8 @@ impl Sweep {
         }
         macro_rules! of {
             ($n:literal) => {
-                match group.alike::<$n>()? {
-                    Some(alike) => side_by_side(set, &alike, cells, progress, enough, take),
+                match group.batch::<$n>()? {
+                    Some(batch) => side_by_side(set, &batch, cells, progress, enough, take),
                     None => Ok(false),
                 }
             };

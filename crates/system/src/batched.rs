@@ -5,13 +5,13 @@ use twofold_num::{Aligned, Simd};
 
 /// The equations of several runs, which are done with the same operations.
 ///
-/// Any [`VectorField`] is such: every run's. Where runs differ in the values of their parameters, [`Alike`] is.
-pub trait Equations<const N: usize>: Sync {
+/// Any [`VectorField`] is such: every run's. Where runs differ in the values of their parameters, [`ParameterBatch`] is.
+pub trait BatchedField<const N: usize>: Sync {
     /// One run's.
     type One: VectorField<N>;
     /// That of run `run`, counted from 0.
     fn of(&self, run: usize) -> &Self::One;
-    /// The numbers in that of run `run`, as [`Equations::eval_in_registers`] wants them; none if all runs have the same.
+    /// The numbers in that of run `run`, as [`BatchedField::eval_in_registers`] wants them; none if all runs have the same.
     #[doc(hidden)]
     fn numbers(&self, run: usize) -> &[f64];
     /// As [`VectorField::room`].
@@ -28,7 +28,7 @@ pub trait Equations<const N: usize>: Sync {
     ) -> [[S::f64s; K]; N];
 }
 
-impl<F: VectorField<N>, const N: usize> Equations<N> for F {
+impl<F: VectorField<N>, const N: usize> BatchedField<N> for F {
     type One = F;
     fn of(&self, _: usize) -> &F {
         self
@@ -56,22 +56,22 @@ impl<F: VectorField<N>, const N: usize> Equations<N> for F {
 /// ```
 /// use twofold_integrate::ensemble::{Run, ensemble};
 /// use twofold_integrate::{Course, Ignore, Tolerance};
-/// use twofold_system::{Alike, Field, System, Transition};
+/// use twofold_system::{ParameterBatch, Field, System, Transition};
 /// let caricature = System::builtin("caricature").expect("built in");
 /// let widths = [1e-2, 3e-3, 1e-3];
 /// let fields = widths.map(|eps| Field::smoothed(&caricature, Transition::Tanh, eps).bind::<3>().expect("three states"));
-/// let alike = Alike::new(fields.to_vec()).expect("one system");
+/// let batch = ParameterBatch::new(fields.to_vec()).expect("one system");
 /// let run = Run { start: [0.2, 0.0, -1.0].into(), course: Course::to(5.0) };
-/// let ends = ensemble(&alike, &[run; 3], Tolerance { rtol: 1e-8, atol: 1e-8 }, None, |_| Ignore);
+/// let ends = ensemble(&batch, &[run; 3], Tolerance { rtol: 1e-8, atol: 1e-8 }, None, |_| Ignore);
 /// assert!(ends.iter().all(|end| end.summary.is_ok()));
 /// ```
 #[derive(Clone, Debug)]
-pub struct Alike<const N: usize> {
+pub struct ParameterBatch<const N: usize> {
     fields: Vec<BoundField<N>>,
     numbers: Vec<Vec<f64>>,
 }
 
-impl<const N: usize> Alike<N> {
+impl<const N: usize> ParameterBatch<N> {
     /// The runs' equations in the runs' order. `None` if there are none, or they differ in more than numbers.
     pub fn new(fields: Vec<BoundField<N>>) -> Option<Self> {
         let first = fields.first()?.program();
@@ -82,7 +82,7 @@ impl<const N: usize> Alike<N> {
     }
 }
 
-impl<const N: usize> Equations<N> for Alike<N> {
+impl<const N: usize> BatchedField<N> for ParameterBatch<N> {
     type One = BoundField<N>;
     fn of(&self, run: usize) -> &BoundField<N> {
         &self.fields[run]
@@ -117,13 +117,13 @@ mod tests {
         let bound = |f: Field| f.bind::<3>().unwrap();
         let with = |transition, eps| bound(Field::smoothed(&System::builtin("caricature").unwrap(), transition, eps));
         let (a, b) = (with(Transition::Tanh, 1e-2), with(Transition::Tanh, 1e-3));
-        let alike = Alike::new(vec![a.clone(), b.clone()]).unwrap();
-        let differing = alike.numbers(0).iter().zip(alike.numbers(1)).filter(|(a, b)| a != b).count();
+        let batch = ParameterBatch::new(vec![a.clone(), b.clone()]).unwrap();
+        let differing = batch.numbers(0).iter().zip(batch.numbers(1)).filter(|(a, b)| a != b).count();
         assert_eq!(differing, 1, "eps stands in one place");
-        assert!(Alike::new(vec![a.clone(), with(Transition::Arctan, 1e-2)]).is_none());
+        assert!(ParameterBatch::new(vec![a.clone(), with(Transition::Arctan, 1e-2)]).is_none());
         let other = Field::smoothed(&System::builtin("two-fold").unwrap(), Transition::Tanh, 1e-2);
-        assert!(Alike::new(vec![a, bound(other)]).is_none());
-        assert!(Alike::<3>::new(Vec::new()).is_none());
+        assert!(ParameterBatch::new(vec![a, bound(other)]).is_none());
+        assert!(ParameterBatch::<3>::new(Vec::new()).is_none());
     }
 
     /// x' = c, or x' = x.
@@ -137,10 +137,10 @@ mod tests {
     #[test]
     fn a_value_may_be_a_number_in_all_or_in_none() {
         let of = |c| Field::record(["x"], &Drift(c)).bind::<1>().unwrap();
-        assert!(Alike::new(vec![of(Some(2.0)), of(None)]).is_none());
-        let alike = Alike::new(vec![of(Some(2.0)), of(Some(3.0))]).unwrap();
-        assert_eq!((alike.numbers(0), alike.numbers(1)), (&[2.0][..], &[3.0][..]));
-        assert_eq!(alike.of(1).eval(&SVector::from([0.0]))[0], 3.0);
+        assert!(ParameterBatch::new(vec![of(Some(2.0)), of(None)]).is_none());
+        let batch = ParameterBatch::new(vec![of(Some(2.0)), of(Some(3.0))]).unwrap();
+        assert_eq!((batch.numbers(0), batch.numbers(1)), (&[2.0][..], &[3.0][..]));
+        assert_eq!(batch.of(1).eval(&SVector::from([0.0]))[0], 3.0);
         assert!(Drift(None).numbers(5).is_empty(), "one equation for all runs");
     }
 }
