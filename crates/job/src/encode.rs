@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use super::answer::{Answer, Stop};
 use super::question::Question;
 use super::shortest::shortest;
-use super::table::{Cells, Column, Kind, Table, Words};
+use super::table::{Cells, Column, ColumnKind, Table, Words};
 use crate::record::hash::canonical_json;
 
 /// Bytes that are not what they claim to be.
@@ -40,9 +40,9 @@ pub fn bits(tables: &[Table]) -> Vec<u8> {
             text(&mut bytes, &column.name);
             text(&mut bytes, &column.unit);
             bytes.push(match column.kind() {
-                Kind::Number => b'n',
-                Kind::Integer => b'i',
-                Kind::Word => b'w',
+                ColumnKind::Number => b'n',
+                ColumnKind::Integer => b'i',
+                ColumnKind::Word => b'w',
             });
             bytes.extend_from_slice(&(column.len() as u64).to_le_bytes());
             match &column.cells {
@@ -167,7 +167,7 @@ pub struct ColumnHeading {
     /// Its unit, "1" for a pure number.
     pub unit: String,
     /// What it holds.
-    pub kind: Kind,
+    pub kind: ColumnKind,
 }
 
 /// What a file of this table says about itself.
@@ -431,8 +431,10 @@ mod tests {
     use proptest::prelude::*;
 
     fn table(numbers: Vec<f64>, words: Vec<String>) -> Table {
-        let mut table =
-            Table::new("a table", [Column::new("x", "m", Kind::Number), Column::words("word"), Column::integers("n")]);
+        let mut table = Table::new(
+            "a table",
+            [Column::new("x", "m", ColumnKind::Number), Column::words("word"), Column::integers("n")],
+        );
         for (i, (x, word)) in numbers.into_iter().zip(&words).enumerate() {
             table.push([x.into(), word.as_str().into(), (i as i64 - 3).into()]);
         }

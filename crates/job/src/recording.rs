@@ -230,7 +230,7 @@ fn signed(run: &RunSpec, mut table: Table) -> Table {
 }
 
 fn point_columns(names: &[&str]) -> Vec<Column> {
-    std::iter::once(&"t").chain(names).map(|name| Column::new(name, PURE, super::table::Kind::Number)).collect()
+    std::iter::once(&"t").chain(names).map(|name| Column::new(name, PURE, super::table::ColumnKind::Number)).collect()
 }
 
 fn point<const D: usize>(t: f64, x: [f64; D]) -> Vec<Entry> {
@@ -296,7 +296,7 @@ fn motion_tables<const D: usize>(names: &[&str], members: &[Member<'_, D>], firs
     let future = || {
         [
             Column::integers("future"),
-            Column::new("exit_time", PURE, super::table::Kind::Number),
+            Column::new("exit_time", PURE, super::table::ColumnKind::Number),
             Column::words("exit_side"),
         ]
     };

@@ -97,7 +97,7 @@ impl Words {
 /// What a column holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum ColumnKind {
     /// [`Cells::Numbers`].
     Number,
     /// [`Cells::Integers`].
@@ -156,36 +156,36 @@ impl Entry {
 
 impl Column {
     /// An empty column.
-    pub fn new(name: &str, unit: &str, kind: Kind) -> Self {
+    pub fn new(name: &str, unit: &str, kind: ColumnKind) -> Self {
         let cells = match kind {
-            Kind::Number => Cells::Numbers(Vec::new()),
-            Kind::Integer => Cells::Integers(Vec::new()),
-            Kind::Word => Cells::Words(Words::default()),
+            ColumnKind::Number => Cells::Numbers(Vec::new()),
+            ColumnKind::Integer => Cells::Integers(Vec::new()),
+            ColumnKind::Word => Cells::Words(Words::default()),
         };
         Self { name: name.to_owned(), unit: unit.to_owned(), cells }
     }
 
     /// An empty column of pure numbers.
     pub fn numbers(name: &str) -> Self {
-        Self::new(name, "1", Kind::Number)
+        Self::new(name, "1", ColumnKind::Number)
     }
 
     /// An empty column of whole numbers.
     pub fn integers(name: &str) -> Self {
-        Self::new(name, "1", Kind::Integer)
+        Self::new(name, "1", ColumnKind::Integer)
     }
 
     /// An empty column of words.
     pub fn words(name: &str) -> Self {
-        Self::new(name, "", Kind::Word)
+        Self::new(name, "", ColumnKind::Word)
     }
 
     /// What the column holds.
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> ColumnKind {
         match self.cells {
-            Cells::Numbers(_) => Kind::Number,
-            Cells::Integers(_) => Kind::Integer,
-            Cells::Words(_) => Kind::Word,
+            Cells::Numbers(_) => ColumnKind::Number,
+            Cells::Integers(_) => ColumnKind::Integer,
+            Cells::Words(_) => ColumnKind::Word,
         }
     }
 

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use crate::spec::{Method, RunSpec, SwitchSpec};
-use crate::table::{Column, Entry, Kind};
+use crate::table::{Column, ColumnKind, Entry};
 use twofold_integrate::StepCap;
 use twofold_integrate::filippov::ExitRule;
 use twofold_num::elementary::{exp10, log10};
@@ -384,11 +384,11 @@ impl Axis {
     /// An empty column for this axis.
     pub(super) fn column(&self) -> Column {
         let kind = match self.coordinate {
-            Coordinate::Method => Kind::Word,
-            Coordinate::Seed | Coordinate::Stream => Kind::Integer,
-            _ => Kind::Number,
+            Coordinate::Method => ColumnKind::Word,
+            Coordinate::Seed | Coordinate::Stream => ColumnKind::Integer,
+            _ => ColumnKind::Number,
         };
-        Column::new(&self.coordinate.to_string(), if kind == Kind::Word { "" } else { "1" }, kind)
+        Column::new(&self.coordinate.to_string(), if kind == ColumnKind::Word { "" } else { "1" }, kind)
     }
 }
 
@@ -675,10 +675,10 @@ mod tests {
     #[test]
     fn columns_are_of_the_values_kind() {
         for (text, unit, kind) in [
-            ("method=lsoda", "", Kind::Word),
-            ("seed=1", "1", Kind::Integer),
-            ("stream=1..2", "1", Kind::Integer),
-            ("shift.x=1", "1", Kind::Number),
+            ("method=lsoda", "", ColumnKind::Word),
+            ("seed=1", "1", ColumnKind::Integer),
+            ("stream=1..2", "1", ColumnKind::Integer),
+            ("shift.x=1", "1", ColumnKind::Number),
         ] {
             let axis: Axis = text.parse().unwrap();
             let column = axis.column();

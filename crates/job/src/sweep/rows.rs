@@ -9,7 +9,7 @@ use crate::encode::{self, Heading, Malformed};
 use crate::question::{NUMERICS, question_hash};
 use crate::record::Hash;
 use crate::record::hash::canonical_json;
-use crate::table::{Column, Entry, Kind, Table};
+use crate::table::{Column, ColumnKind, Entry, Table};
 
 /// What files of ours say they are.
 const FORMAT: &str = "twofold-sweep";
@@ -50,7 +50,7 @@ pub enum RowsError {
 
 /// The columns that every sweep has after its axes.
 fn found_columns() -> [Column; 16] {
-    let time = |name| Column::new(name, "1", Kind::Number);
+    let time = |name| Column::new(name, "1", ColumnKind::Number);
     [
         Column::integers("key"),
         Column::words("outcome"),
@@ -197,10 +197,10 @@ impl Row {
             .iter()
             .zip(columns)
             .map(|(value, column)| match column.kind() {
-                Kind::Number if value.is_null() => Some(Entry::Number(f64::NAN)),
-                Kind::Number => value.as_f64().map(Entry::Number),
-                Kind::Integer => value.as_i64().map(Entry::Integer),
-                Kind::Word => value.as_str().map(Entry::from),
+                ColumnKind::Number if value.is_null() => Some(Entry::Number(f64::NAN)),
+                ColumnKind::Number => value.as_f64().map(Entry::Number),
+                ColumnKind::Integer => value.as_i64().map(Entry::Integer),
+                ColumnKind::Word => value.as_str().map(Entry::from),
             })
             .collect();
         Self::of_cells(cells.ok_or_else(|| wrong("not of its heading's kinds"))?)
