@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use twofold::integrate::filippov::ExitRule;
 use twofold::job::question::question_hash;
 use twofold::job::spec::{RunSpec, SwitchSpec};
-use twofold::job::sweep::{Axis, Draws, Fate, Outcome, Rows, Shard, Sweep};
+use twofold::job::sweep::{Axis, Draws, Outcome, OutcomeQuestion, Rows, Shard, Sweep};
 use twofold::job::table::Cells;
 use twofold::job::{Answer, Classification, Executor, JobError, Question, Run, Stop, Table, encode};
 
@@ -187,7 +187,7 @@ fn fate(spec: &RunSpec, k: usize, start: Vec<f64>, work: &Work) -> Result<Value,
     if let SwitchSpec::Filippov { exit: ExitRule::Random { stream, .. }, .. } = &mut run.switch {
         *stream = stream.wrapping_add(more);
     }
-    let answer = Executor::new(None, work).ask(&Fate(Classification::of(run)));
+    let answer = Executor::new(None, work).ask(&OutcomeQuestion(Classification::of(run)));
     match answer.and_then(|a| Ok(a.fact::<Outcome>("outcome")?)) {
         Ok(outcome) => Ok(json!({ "outcome": outcome })),
         Err(JobError::Interrupted) => Err(JobError::Interrupted),

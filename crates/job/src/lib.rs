@@ -8,7 +8,7 @@
 //! |---|---|
 //! | [`Run`] | what happens from a start: a path, a section, a Filippov motion, a funnel of futures |
 //! | [`Classification`] | what a run settles on |
-//! | [`Fate`](sweep::Fate) | the same, or that the run leaves for good: a cell of a [`Sweep`](sweep::Sweep) |
+//! | [`OutcomeQuestion`](sweep::OutcomeQuestion) | the same, or that the run leaves for good: a cell of a [`Sweep`](sweep::Sweep) |
 //! | [`LargestExponent`] | how fast neighbours part |
 //! | [`ClosedOrbit`] | where an orbit closes up, its stability, and its branch along a parameter |
 //! | [`PathComparison`] | how alike two paths are |

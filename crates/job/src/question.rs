@@ -129,7 +129,7 @@ mod tests {
 
     use super::*;
     use crate::spec::{Observation, SwitchSpec};
-    use crate::sweep::Fate;
+    use crate::sweep::OutcomeQuestion;
     use crate::*;
     use twofold_analyse::digits::DigitsQuestion;
     use twofold_analyse::floquet::ReturnPlane;
@@ -168,7 +168,7 @@ mod tests {
         let questions: [(AnyQuestion, &str); 12] = [
             (Arc::new(Run(run.clone())), "run"),
             (Arc::new(Classification::of(run.clone())), "classification"),
-            (Arc::new(Fate(Classification::of(run.clone()))), "fate"),
+            (Arc::new(OutcomeQuestion(Classification::of(run.clone()))), "fate"),
             (Arc::new(PathComparison(run.clone(), run.clone())), "path-comparison"),
             (Arc::new(Horizon { run: run.clone(), within: 1e-9 }), "horizon"),
             (

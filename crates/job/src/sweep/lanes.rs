@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::SVector;
 
-use super::{Ending, Fate, Row, Sweep, far};
+use super::{Ending, OutcomeQuestion, Row, Sweep, far};
 use crate::answer::Answer;
 use crate::classification::SoFar;
 use crate::executor::{Executor, Progress};
@@ -38,7 +38,7 @@ const STATES: std::ops::RangeInclusive<usize> = 2..=4;
 struct Cell {
     number: u64,
     settings: Vec<Entry>,
-    question: Fate,
+    question: OutcomeQuestion,
     key: Hash,
 }
 
@@ -312,7 +312,7 @@ fn side_by_side<const N: usize>(
     let first = cells[0].run();
     let plane = cells[0].plane();
     let runs: Vec<Run<N>> = cells.iter().map(|cell| course(cell.run())).collect();
-    // y and z, as `Fate` looks at them; systems that have such a corner have three states. No state is above infinity.
+    // y and z, as `OutcomeQuestion` looks at them; systems that have such a corner have three states. No state is above infinity.
     let corners: Vec<SVector<f64, N>> = cells
         .iter()
         .map(|cell| match far::corner(cell.run()) {

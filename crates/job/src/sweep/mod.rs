@@ -1,7 +1,7 @@
 //! Sweeps: one run with some of its numbers varied, and what becomes of each.
 //!
 //! A [`Sweep`] is a run, the [`Axis`] list over which it varies, and how often random axes are drawn. Its cells are numbered; a cell is a question
-//! ([`Fate`]) with a key of its own and becomes a row of a table: its settings, and where it ends. A cell that fails is a row with its reason.
+//! ([`OutcomeQuestion`]) with a key of its own and becomes a row of a table: its settings, and where it ends. A cell that fails is a row with its reason.
 //!
 //! Rows depend on nothing but their number: [`Rows`] computed anywhere, in any order and any parts ([`Shard`]), by processes that were killed
 //! and resumed, merge to the same bytes. Random axes are drawn and kicks are seeded by the row's number.
@@ -35,14 +35,14 @@
 
 mod axis;
 mod far;
-mod fate;
 mod lanes;
+mod outcome;
 mod rows;
 
 use serde::{Deserialize, Serialize};
 
 pub use axis::{Axis, AxisError, Coordinate, FORMS, Values};
-pub use fate::{Ending, Fate, Outcome};
+pub use outcome::{Ending, Outcome, OutcomeQuestion};
 pub use rows::{Row, Rows, RowsError};
 
 use super::classification::Classification;
@@ -260,7 +260,7 @@ impl Sweep {
     /// # Errors
     ///
     /// Why its settings make none.
-    pub fn question(&self, row: u64) -> Result<Fate, String> {
+    pub fn question(&self, row: u64) -> Result<OutcomeQuestion, String> {
         let mut run = self.run.clone();
         let varied = |c: &Coordinate| self.over.iter().any(|axis| axis.coordinate == *c);
         if !varied(&Coordinate::Stream) {
@@ -279,7 +279,7 @@ impl Sweep {
         for (axis, value) in pairs.iter().filter(|p| !is_shift(p)).chain(pairs.iter().filter(is_shift)) {
             axis.coordinate.apply(&mut run, value)?;
         }
-        Ok(Fate(Classification { run, thresholds: self.thresholds }))
+        Ok(OutcomeQuestion(Classification { run, thresholds: self.thresholds }))
     }
 
     /// Computes a row.
@@ -458,10 +458,10 @@ mod tests {
     }
 
     #[test]
-    fn a_fate_that_is_not_far_is_the_classification() {
+    fn an_outcome_that_is_not_far_is_the_classification() {
         let run = RunSpec { t_end: 400.0, ..run() };
         let outcome: Outcome =
-            Executor::quiet().ask(&Fate(Classification::of(run.clone()))).unwrap().fact("outcome").unwrap();
+            Executor::quiet().ask(&OutcomeQuestion(Classification::of(run.clone()))).unwrap().fact("outcome").unwrap();
         let evidence = Classification::of(run).ask(&Executor::quiet()).unwrap();
         assert_eq!(outcome.crossings, evidence.crossings as u64);
         assert_eq!(outcome.exponent, evidence.lyapunov.map(|l| l.value));

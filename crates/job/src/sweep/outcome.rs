@@ -19,7 +19,7 @@ use twofold_integrate::Watch;
 /// What a run settles on, as [`Classification`] has it, or that it ends at a rest ([`rest`]), or that it goes to the far state: the region that
 /// no orbit leaves. Fact: `outcome` ([`Outcome`]).
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fate(pub Classification);
+pub struct OutcomeQuestion(pub Classification);
 
 /// Where a run ends, in a row's worth of numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -144,7 +144,7 @@ fn steps(answer: &Answer) -> u64 {
     answer.statistics.as_ref().map_or(0, |s| s.steps)
 }
 
-impl Question for Fate {
+impl Question for OutcomeQuestion {
     fn kind(&self) -> &'static str {
         "fate"
     }
@@ -172,7 +172,7 @@ impl Question for Fate {
     }
 }
 
-impl Fate {
+impl OutcomeQuestion {
     /// Whether a state is one that no orbit of the run's system comes back from.
     fn is_far(&self) -> Option<impl Fn(&[f64]) -> bool + use<>> {
         far::corner(&self.0.run).map(|c| move |x: &[f64]| x[1] > c && x[2] > c)
@@ -220,7 +220,7 @@ impl Fate {
     ///
     /// # Errors
     ///
-    /// As [`Fate::judged`].
+    /// As [`OutcomeQuestion::judged`].
     pub(super) fn so_far(&self, executor: &Executor<'_>, answer: &Answer) -> Result<SoFar<Ending>, JobError> {
         if answer.stop == Stop::Interrupted {
             return Err(JobError::Interrupted);
