@@ -8,8 +8,8 @@ use std::hint::black_box;
 use criterion::{BenchmarkId, Criterion, Throughput};
 use nalgebra::{SVector, vector};
 use twofold::integrate::{
-    Course, Dopri5, Failure, Flow, Lsoda, Observer, Radau5, Schedule, Statistics, Step, StepCap, Stepper, Summary,
-    Tolerance, drive,
+    Dopri5, DriveOptions, Failure, Flow, Lsoda, Observer, Radau5, Schedule, Statistics, Step, StepCap, Stepper,
+    Summary, Tolerance, drive,
 };
 use twofold::num::elementary::exp10;
 use twofold::system::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
@@ -52,9 +52,14 @@ fn run<F: VectorField<N>, M: Stepper<N>, const N: usize>(
 ) -> Result<(Statistics, u64), Failure> {
     let mut swings = Swings(0);
     let schedule = Schedule { restart_every: Some(100.0), kick: None };
-    let course =
-        Course { t_end, schedule, step_cap: StepCap::FractionOfSegment(0.1), max_steps: 100_000_000, kicked_states: 3 };
-    drive(field, start, &course, &mut stepper, &mut swings, &())
+    let options = DriveOptions {
+        t_end,
+        schedule,
+        step_cap: StepCap::FractionOfSegment(0.1),
+        max_steps: 100_000_000,
+        kicked_states: 3,
+    };
+    drive(field, start, &options, &mut stepper, &mut swings, &())
         .and_then(Summary::within_budget)
         .map(|s| (s.statistics, swings.0))
 }

@@ -10,7 +10,7 @@ use nalgebra::{SVector, vector};
 use twofold::analyse::SectionRecorder;
 use twofold::integrate::ensemble::{InstructionSet, Run, ensemble_with};
 use twofold::integrate::{
-    Course, Dopri5, Failure, Ignore, Layered, Lsoda, Radau5, Schedule, StepCap, Stepper, Taylor, Tolerance, drive,
+    Dopri5, DriveOptions, Failure, Ignore, Layered, Lsoda, Radau5, Schedule, StepCap, Stepper, Taylor, Tolerance, drive,
 };
 use twofold::system::{
     BatchedField, BoundField, Caricature, Field as Recorded, ParameterBatch, Smoothed, System, Transition, VectorField,
@@ -47,20 +47,20 @@ fn from_file(set: &str) -> Option<BoundField<3>> {
 
 fn w1<F: VectorField<3>, M: Stepper<3>>(field: &F, mut stepper: M) -> Done {
     let mut section = SectionRecorder::<3>::new(1, 0.0);
-    let course = Course {
+    let options = DriveOptions {
         t_end: 2e5,
         schedule: Schedule { restart_every: Some(100.0), kick: None },
         step_cap: StepCap::FractionOfSegment(0.1),
         max_steps: u64::MAX,
         kicked_states: 3,
     };
-    let end = drive(field, vector![0.2, 0.0, -1.0], &course, &mut stepper, &mut section, &())?;
+    let end = drive(field, vector![0.2, 0.0, -1.0], &options, &mut stepper, &mut section, &())?;
     Ok((end.statistics.steps, section.crossings().len(), end.x))
 }
 
 fn w2<F: VectorField<3>, M: Stepper<3>>(field: &F, make: impl Fn() -> M) -> Done {
     let mut done = (0, 0, vector![0.0, 0.0, 0.0]);
-    let course = Course {
+    let options = DriveOptions {
         t_end: 2000.0,
         schedule: Schedule::default(),
         step_cap: StepCap::Absolute(10.0),
@@ -69,7 +69,7 @@ fn w2<F: VectorField<3>, M: Stepper<3>>(field: &F, make: impl Fn() -> M) -> Done
     };
     for k in 0..1000 {
         let x = 0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0;
-        let end = drive(field, vector![x, 0.0, -1.0], &course, &mut make(), &mut Ignore, &())?;
+        let end = drive(field, vector![x, 0.0, -1.0], &options, &mut make(), &mut Ignore, &())?;
         done = (done.0 + end.statistics.steps, 0, end.x);
     }
     Ok(done)
@@ -77,8 +77,8 @@ fn w2<F: VectorField<3>, M: Stepper<3>>(field: &F, make: impl Fn() -> M) -> Done
 
 /// W2 in lanes.
 fn w2_in_lanes<E: BatchedField<3>>(equations: &E, set: InstructionSet) -> Done {
-    let course = Course { step_cap: StepCap::Absolute(10.0), ..Course::to(2000.0) };
-    let run = |k: u32| Run { start: vector![0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0, 0.0, -1.0], course };
+    let options = DriveOptions { step_cap: StepCap::Absolute(10.0), ..DriveOptions::to(2000.0) };
+    let run = |k: u32| Run { start: vector![0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0, 0.0, -1.0], options };
     let runs: Vec<_> = (0..1000).map(run).collect();
     let ends = ensemble_with(set, equations, &runs, TOLERANCE, None, |_| Ignore);
     ends.into_iter().try_fold((0, 0, vector![0.0, 0.0, 0.0]), |done, end| {
@@ -89,15 +89,15 @@ fn w2_in_lanes<E: BatchedField<3>>(equations: &E, set: InstructionSet) -> Done {
 
 /// W0: the short stretch on which the error is known.
 fn w0<F: VectorField<3>, M: Stepper<3>>(field: &F, mut stepper: M) -> Done {
-    let course = Course { step_cap: StepCap::Absolute(10.0), ..Course::to(10.0) };
-    let end = drive(field, vector![0.2, 0.0, -1.0], &course, &mut stepper, &mut Ignore, &())?;
+    let options = DriveOptions { step_cap: StepCap::Absolute(10.0), ..DriveOptions::to(10.0) };
+    let end = drive(field, vector![0.2, 0.0, -1.0], &options, &mut stepper, &mut Ignore, &())?;
     Ok((end.statistics.steps, 0, end.x))
 }
 
 /// W3: ordinary stretches of the orbit in double-double arithmetic.
 fn w3<F: VectorField<3>>(field: &F) -> Done {
-    let course = Course { step_cap: StepCap::Absolute(10.0), ..Course::to(300.0) };
-    let end = drive(field, vector![0.2, 0.0, -1.0], &course, &mut Taylor::extended(EXACT), &mut Ignore, &())?;
+    let options = DriveOptions { step_cap: StepCap::Absolute(10.0), ..DriveOptions::to(300.0) };
+    let end = drive(field, vector![0.2, 0.0, -1.0], &options, &mut Taylor::extended(EXACT), &mut Ignore, &())?;
     Ok((end.statistics.steps, 0, end.x))
 }
 

@@ -5,7 +5,7 @@
 
 use nalgebra::{SVector, vector};
 use twofold::analyse::SectionRecorder;
-use twofold::integrate::{Course, Dopri5, Failure, Interpolant, Statistics, Step, Stepper, Tolerance, drive};
+use twofold::integrate::{Dopri5, DriveOptions, Failure, Interpolant, Statistics, Step, Stepper, Tolerance, drive};
 use twofold::num::Elementary;
 use twofold::system::VectorField;
 
@@ -106,7 +106,7 @@ impl VectorField<2> for Pendulum {
 /// When the pendulum passes its lowest point.
 fn passages<M: Stepper<2>>(mut method: M) -> Result<Vec<f64>, Failure> {
     let mut section = SectionRecorder::<2>::new(0, 0.0);
-    let _ = drive(&Pendulum, vector![1.0, 0.0], &Course::to(30.0), &mut method, &mut section, &())?;
+    let _ = drive(&Pendulum, vector![1.0, 0.0], &DriveOptions::to(30.0), &mut method, &mut section, &())?;
     Ok(section.into_crossings().iter().map(|c| c.t).collect())
 }
 

@@ -5,7 +5,7 @@ use nalgebra::{SVector, vector};
 use twofold::analyse::attractor::{Evidence, Question, SectionPoint, Thresholds, Verdict, classify};
 use twofold::analyse::floquet::{self, ReturnPlane, closed_orbit};
 use twofold::analyse::lyapunov::{self, largest};
-use twofold::integrate::{Course, Dopri5, Flow, Ignore, Observer, Step, StepCap, Tolerance, drive, roots};
+use twofold::integrate::{Dopri5, DriveOptions, Flow, Ignore, Observer, Step, StepCap, Tolerance, drive, roots};
 use twofold::num::Elementary;
 use twofold::num::random::RandomStream;
 use twofold::paper::claim::Claim;
@@ -97,8 +97,8 @@ fn section_to<const N: usize, F: VectorField<N>>(
     let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
     let mut seen = Section { axis, value, shown, points: Vec::new(), passages: roots::Passages::default() };
     let mut stepper = Dopri5::new(tolerance);
-    let course = Course { step_cap: StepCap::Absolute(0.5), ..Course::to(t_end) };
-    let end = drive(field, x0, &course, &mut stepper, &mut seen, &()).unwrap();
+    let options = DriveOptions { step_cap: StepCap::Absolute(0.5), ..DriveOptions::to(t_end) };
+    let end = drive(field, x0, &options, &mut stepper, &mut seen, &()).unwrap();
     assert_eq!(end.t, t_end);
     seen.points
 }
@@ -199,7 +199,7 @@ fn van_der_pol() {
     }
     let mut stepper = Dopri5::new(Tolerance { rtol: 1e-12, atol: 1e-12 });
     let x0 = vector![o.points[0][0], o.points[0][1], 0.0];
-    let turn = drive(&WithDivergence, x0, &Course::to(o.period), &mut stepper, &mut Ignore, &()).unwrap();
+    let turn = drive(&WithDivergence, x0, &DriveOptions::to(o.period), &mut stepper, &mut Ignore, &()).unwrap();
     assert!((o.multipliers[0][0].ln() - turn.x[2]).abs() < 1e-5, "{o:?} {}", turn.x[2]);
 }
 

@@ -4,7 +4,7 @@ use nalgebra::{SVector, vector};
 use twofold::analyse::SectionRecorder;
 use twofold::integrate::ensemble::{End, InstructionSet, Run, SectionPlane, ensemble, ensemble_with};
 use twofold::integrate::{
-    Course, Dopri5, Flow, Ignore, Kick, KickLaw, Observer, Schedule, Step, StepCap, StopReason, Tolerance, drive,
+    Dopri5, DriveOptions, Flow, Ignore, Kick, KickLaw, Observer, Schedule, Step, StepCap, StopReason, Tolerance, drive,
 };
 use twofold::system::{Caricature, Smoothed, Transition};
 
@@ -26,19 +26,24 @@ fn runs() -> Vec<Run<3>> {
             let kick = Kick { every: 0.9, size: 1e-3, law: KickLaw::Sphere, seed: 7, stream: k.into() };
             let schedule = Schedule { restart_every: (k % 3 > 0).then_some(3.7), kick: (k % 5 == 4).then_some(kick) };
             let step_cap = [StepCap::None, StepCap::Absolute(0.3), StepCap::FractionOfSegment(0.1)][k as usize % 3];
-            let course = Course { schedule, step_cap, max_steps: 50_000, ..Course::to(2.0 + f64::from(k * 11 % 17)) };
-            Run { start: vector![0.1 + 0.01 * f64::from(k), 0.0, -1.0], course }
+            let options = DriveOptions {
+                schedule,
+                step_cap,
+                max_steps: 50_000,
+                ..DriveOptions::to(2.0 + f64::from(k * 11 % 17))
+            };
+            Run { start: vector![0.1 + 0.01 * f64::from(k), 0.0, -1.0], options }
         })
         .collect();
     runs[5].start[0] = f64::NAN;
-    runs[11].course.t_end = 0.0;
-    runs[17].course.max_steps = 20;
+    runs[11].options.t_end = 0.0;
+    runs[17].options.max_steps = 20;
     runs
 }
 
 fn alone<O: Observer<3>>(run: &Run<3>, mut observer: O) -> End<O, 3> {
     let mut stepper = Dopri5::new(TOLERANCE);
-    let summary = drive(&field(), run.start, &run.course, &mut stepper, &mut observer, &());
+    let summary = drive(&field(), run.start, &run.options, &mut stepper, &mut observer, &());
     End { summary, observer }
 }
 
@@ -145,13 +150,13 @@ fn failures_are_those_of_a_run_alone() {
         }
     }
     let runs: Vec<Run<1>> =
-        (0..MANY).map(|k| Run { start: vector![0.25 * f64::from(k) - 4.0], course: Course::to(1.0) }).collect();
+        (0..MANY).map(|k| Run { start: vector![0.25 * f64::from(k) - 4.0], options: DriveOptions::to(1.0) }).collect();
     let word = |summary: &Result<twofold::integrate::Summary<1>, twofold::integrate::Failure>| format!("{summary:?}");
     let expected: Vec<_> = runs
         .iter()
         .map(|run| {
             let mut stepper = Dopri5::new(TOLERANCE);
-            word(&drive(&Exploding, run.start, &run.course, &mut stepper, &mut Ignore, &()))
+            word(&drive(&Exploding, run.start, &run.options, &mut stepper, &mut Ignore, &()))
         })
         .collect();
     assert!(expected.iter().any(|e| e.starts_with("Err")) && expected[0].starts_with("Ok"), "{expected:?}");
@@ -175,7 +180,10 @@ fn a_trial_that_has_no_value_is_repeated_as_in_a_run_alone() {
     }
     let coarse = Tolerance { rtol: 1e-2, atol: 1e-2 };
     let runs: Vec<Run<2>> = (0..MANY)
-        .map(|k| Run { start: vector![0.3 + 0.02 * f64::from(k), 0.05 * f64::from(k % 3)], course: Course::to(9.0) })
+        .map(|k| Run {
+            start: vector![0.3 + 0.02 * f64::from(k), 0.05 * f64::from(k % 3)],
+            options: DriveOptions::to(9.0),
+        })
         .collect();
     let word = |summary: &Result<twofold::integrate::Summary<2>, twofold::integrate::Failure>| match summary {
         Ok(end) => format!("{:?} {:?} {:?}", end.x.map(f64::to_bits), end.t.to_bits(), end.statistics),
@@ -183,7 +191,7 @@ fn a_trial_that_has_no_value_is_repeated_as_in_a_run_alone() {
     };
     let alone: Vec<_> = runs
         .iter()
-        .map(|run| drive(&Edge, run.start, &run.course, &mut Dopri5::new(coarse), &mut Ignore, &()))
+        .map(|run| drive(&Edge, run.start, &run.options, &mut Dopri5::new(coarse), &mut Ignore, &()))
         .collect();
     let expected: Vec<_> = alone.iter().map(word).collect();
     assert!(expected.iter().any(|e| e.starts_with("NotFinite")), "{expected:?}");

@@ -3,8 +3,8 @@
 use nalgebra::{SVector, vector};
 use twofold::analyse::{Crossing, SectionRecorder};
 use twofold::integrate::{
-    Course, Dopri5, Failure, Flow, Ignore, Kick, KickLaw, Layered, Observer, Schedule, Step, StepCap, Stepper, Taylor,
-    Tolerance, drive,
+    Dopri5, DriveOptions, Failure, Flow, Ignore, Kick, KickLaw, Layered, Observer, Schedule, Step, StepCap, Stepper,
+    Taylor, Tolerance, drive,
 };
 use twofold::job::spec::*;
 use twofold::num::Elementary;
@@ -43,7 +43,7 @@ fn tolerance(size: f64) -> Tolerance {
 
 fn section(field: &Field, plane: (usize, f64), t_end: f64, mut method: impl Stepper<3>) -> Vec<Crossing> {
     let mut recorder = SectionRecorder::<3>::new(plane.0, plane.1);
-    let end = drive(field, START.into(), &Course::to(t_end), &mut method, &mut recorder, &()).unwrap();
+    let end = drive(field, START.into(), &DriveOptions::to(t_end), &mut method, &mut recorder, &()).unwrap();
     assert_eq!(end.t, t_end);
     recorder.crossings().to_vec()
 }
@@ -89,7 +89,7 @@ fn held() -> impl Iterator<Item = [f64; 3]> {
 
 /// The state in which an orbit ends.
 fn end(field: &Field, start: [f64; 3], t_end: f64, mut method: impl Stepper<3>) -> SVector<f64, 3> {
-    drive(field, start.into(), &Course::to(t_end), &mut method, &mut Ignore, &()).unwrap().x
+    drive(field, start.into(), &DriveOptions::to(t_end), &mut method, &mut Ignore, &()).unwrap().x
 }
 
 #[test]
@@ -140,12 +140,12 @@ fn sections_are_met_while_an_orbit_is_held_and_where_it_leaves() {
     for plane in [(0, 0.0), (0, 1e-3), (1, 0.0), (1, 0.1), (2, 0.0)] {
         let layered = passages(plane, &mut |recorder, start| {
             let mut method = Layered::new(tolerance(1e-13));
-            let end = drive(&field, start.into(), &Course::to(t_end), &mut method, recorder, &()).unwrap();
+            let end = drive(&field, start.into(), &DriveOptions::to(t_end), &mut method, recorder, &()).unwrap();
             assert_eq!(end.t, t_end);
         });
         let taylor = passages(plane, &mut |recorder, start| {
             let mut method = Taylor::new(tolerance(1e-15));
-            let end = drive(&field, start.into(), &Course::to(t_end), &mut method, recorder, &()).unwrap();
+            let end = drive(&field, start.into(), &DriveOptions::to(t_end), &mut method, recorder, &()).unwrap();
             assert_eq!(end.t, t_end);
         });
         let mut worst = 0.0_f64;
@@ -181,9 +181,9 @@ fn a_crossing_that_steps_may_not_go_through_at_once_goes_on_where_it_was_cut() {
     // From outside through the layer, which takes some 0.02; then on.
     let field = caricature(1e-1, 1e-5, Transition::Tanh);
     let end = |cap: f64| {
-        let course = Course { step_cap: StepCap::Absolute(cap), ..Course::to(1.0) };
+        let options = DriveOptions { step_cap: StepCap::Absolute(cap), ..DriveOptions::to(1.0) };
         let mut method = Layered::new(tolerance(1e-11));
-        drive(&field, START.into(), &course, &mut method, &mut Ignore, &()).unwrap()
+        drive(&field, START.into(), &options, &mut method, &mut Ignore, &()).unwrap()
     };
     let whole = end(f64::INFINITY);
     assert!(whole.x[0] < -0.1, "{}", whole.x);
@@ -234,9 +234,9 @@ fn every_kind_of_step_has_its_interpolant_and_ends_where_it_should() {
         (Schedule::default(), StepCap::Absolute(3e-4), 14.0),
     ] {
         let mut looking = Looking { kinds: [0; 3], worst: 0.0 };
-        let course = Course { schedule, step_cap, ..Course::to(t_end) };
+        let options = DriveOptions { schedule, step_cap, ..DriveOptions::to(t_end) };
         let mut method = Layered::new(tolerance(1e-9));
-        let end = drive(&field, START.into(), &course, &mut method, &mut looking, &()).unwrap();
+        let end = drive(&field, START.into(), &options, &mut method, &mut looking, &()).unwrap();
         assert_eq!(end.t, t_end);
         assert!(looking.worst < 1e-12, "{:e}", looking.worst);
         assert!(
@@ -259,12 +259,12 @@ fn a_start_anywhere_in_the_layer_goes_on_as_taylor_does() {
         [0.0, 0.4, 0.7],
         [-30e-3, 0.4, 0.7],
     ] {
-        let run = |stepper: &mut dyn FnMut(&Course) -> SVector<f64, 3>| stepper(&Course::to(0.4));
-        let layered = run(&mut |course| {
-            drive(&field, start.into(), course, &mut Layered::new(tolerance(1e-11)), &mut Ignore, &()).unwrap().x
+        let run = |stepper: &mut dyn FnMut(&DriveOptions) -> SVector<f64, 3>| stepper(&DriveOptions::to(0.4));
+        let layered = run(&mut |options| {
+            drive(&field, start.into(), options, &mut Layered::new(tolerance(1e-11)), &mut Ignore, &()).unwrap().x
         });
-        let taylor = run(&mut |course| {
-            drive(&field, start.into(), course, &mut Taylor::new(tolerance(1e-15)), &mut Ignore, &()).unwrap().x
+        let taylor = run(&mut |options| {
+            drive(&field, start.into(), options, &mut Taylor::new(tolerance(1e-15)), &mut Ignore, &()).unwrap().x
         });
         assert!((layered - taylor).amax() < 2e-9, "{start:?}: {layered} {taylor}");
     }
@@ -274,11 +274,14 @@ fn a_start_anywhere_in_the_layer_goes_on_as_taylor_does() {
 fn a_layer_that_is_no_plane_is_gone_through_in_time() {
     let run = |t_end: f64| {
         let mut method = Layered::new(tolerance(1e-11));
-        drive(&Field::Circle, vector![0.2, 0.9, 0.3], &Course::to(t_end), &mut method, &mut Ignore, &()).unwrap().x
+        drive(&Field::Circle, vector![0.2, 0.9, 0.3], &DriveOptions::to(t_end), &mut method, &mut Ignore, &())
+            .unwrap()
+            .x
     };
     let mut taylor = Taylor::new(tolerance(1e-15));
-    let want =
-        drive(&Field::Circle, vector![0.2, 0.9, 0.3], &Course::to(20.0), &mut taylor, &mut Ignore, &()).unwrap().x;
+    let want = drive(&Field::Circle, vector![0.2, 0.9, 0.3], &DriveOptions::to(20.0), &mut taylor, &mut Ignore, &())
+        .unwrap()
+        .x;
     assert!((run(20.0) - want).amax() < 1e-8, "{} {want}", run(20.0));
 }
 
@@ -286,7 +289,7 @@ fn a_layer_that_is_no_plane_is_gone_through_in_time() {
 fn what_it_cannot_integrate_it_refuses() {
     for field in [Field::Quotient, caricature(1e-1, 1e-5, Transition::Arctan)] {
         let mut method = Layered::new(tolerance(1e-8));
-        let failure = drive(&field, START.into(), &Course::to(1.0), &mut method, &mut Ignore, &()).unwrap_err();
+        let failure = drive(&field, START.into(), &DriveOptions::to(1.0), &mut method, &mut Ignore, &()).unwrap_err();
         assert!(matches!(failure, Failure::NotApplicable { method: "layered", .. }), "{failure}");
         assert!(failure.to_string().contains("polynomial"), "{failure}");
     }

@@ -14,7 +14,7 @@ mod problems;
 use data::{Reference, ReferenceProblem, ReferenceRun, reference};
 use problems::{Problem, Visit, for_each};
 use twofold::integrate::lsoda::{Family, Lsoda, Switch};
-use twofold::integrate::{Course, Ignore, Radau5, Statistics, StepCap, Stepper, Tolerance, drive};
+use twofold::integrate::{DriveOptions, Ignore, Radau5, Statistics, StepCap, Stepper, Tolerance, drive};
 
 /// What our LSODA did.
 struct Ours {
@@ -188,8 +188,8 @@ fn radau5_reaches_the_reference_solutions() {
             let error = |tolerance: f64| {
                 let mut radau = Radau5::new(Tolerance { rtol: tolerance, atol: tolerance * known.atol_over_rtol });
                 let step_cap = known.max_step.map_or(StepCap::None, StepCap::Absolute);
-                let course = Course { step_cap, max_steps: 100_000, ..Course::to(known.t_end) };
-                let end = drive(&problem.field, problem.start, &course, &mut radau, &mut Ignore, &()).unwrap();
+                let options = DriveOptions { step_cap, max_steps: 100_000, ..DriveOptions::to(known.t_end) };
+                let end = drive(&problem.field, problem.start, &options, &mut radau, &mut Ignore, &()).unwrap();
                 known.error(end.within_budget().unwrap().x.as_slice())
             };
             let (loose, tight) = (error(1e-6), error(1e-10));

@@ -5,7 +5,9 @@ use nalgebra::{SVector, vector};
 use proptest::prelude::*;
 use twofold::analyse::SectionRecorder;
 use twofold::integrate::filippov::{self, ExitRule, FilippovObserver, Mode, ModeEvent};
-use twofold::integrate::{Course, Flow, Method, Observer, Step, Stepper, StopReason, Tolerance, WithStepper, drive};
+use twofold::integrate::{
+    DriveOptions, Flow, Method, Observer, Step, Stepper, StopReason, Tolerance, WithStepper, drive,
+};
 use twofold::num::Elementary;
 use twofold::system::{Caricature, Reversed, Smoothed, Transition, VectorField};
 
@@ -56,7 +58,7 @@ struct Look<'a>(Duffing, SVector<f64, 2>, &'a mut Ends);
 impl WithStepper<2> for Look<'_> {
     type Answer = ();
     fn with<M: Stepper<2>>(self, mut stepper: M) {
-        let end = drive(&self.0, self.1, &Course::to(3.0), &mut stepper, self.2, &()).unwrap();
+        let end = drive(&self.0, self.1, &DriveOptions::to(3.0), &mut stepper, self.2, &()).unwrap();
         assert_eq!((end.stop, end.t), (StopReason::EndTime, 3.0));
     }
 }
@@ -68,7 +70,7 @@ impl<F: VectorField<3>> WithStepper<3> for Goes<'_, F> {
     type Answer = SVector<f64, 3>;
     fn with<M: Stepper<3>>(self, mut stepper: M) -> Self::Answer {
         let mut ignore = twofold::integrate::Ignore;
-        drive(self.0, self.1, &Course::to(self.2), &mut stepper, &mut ignore, &()).unwrap().x
+        drive(self.0, self.1, &DriveOptions::to(self.2), &mut stepper, &mut ignore, &()).unwrap().x
     }
 }
 
@@ -132,7 +134,7 @@ proptest! {
             type Answer = Vec<(f64, bool)>;
             fn with<M: Stepper<2>>(mut self, mut stepper: M) -> Self::Answer {
                 let circle = Duffing { friction: 0.0, cubic: 0.0 };
-                let _ = drive(&circle, self.0, &Course::to(20.0), &mut stepper, &mut self.1, &()).unwrap();
+                let _ = drive(&circle, self.0, &DriveOptions::to(20.0), &mut stepper, &mut self.1, &()).unwrap();
                 let up = |c: &twofold::analyse::Crossing<2>| c.direction == twofold::analyse::Direction::Up;
                 self.1.crossings().iter().map(|c| (c.t, up(c))).collect()
             }

@@ -4,7 +4,9 @@ use nalgebra::SVector;
 use proptest::prelude::*;
 use twofold::analyse::tangent::Tangent;
 use twofold::integrate::filippov::{self, ExitRule, Side, Trajectory};
-use twofold::integrate::{Course, Dopri5, Flow, Observer, Schedule, Step, StepCap, Stepper, Taylor, Tolerance, drive};
+use twofold::integrate::{
+    Dopri5, DriveOptions, Flow, Observer, Schedule, Step, StepCap, Stepper, Taylor, Tolerance, drive,
+};
 use twofold::num::series::{Constants, Solution};
 use twofold::num::{Arithmetic, DoubleDouble, Dual, Elementary, Tape};
 use twofold::system::caricature::MinusSign;
@@ -212,7 +214,7 @@ fn orbit<F: VectorField<N>, M: Stepper<N>, const N: usize>(
     t_end: f64,
     mut stepper: M,
 ) -> Vec<u64> {
-    let course = Course {
+    let options = DriveOptions {
         t_end,
         schedule: Schedule { restart_every: Some(20.0), kick: None },
         step_cap: StepCap::FractionOfSegment(0.1),
@@ -220,7 +222,7 @@ fn orbit<F: VectorField<N>, M: Stepper<N>, const N: usize>(
         kicked_states: 3,
     };
     let mut steps = Steps::default();
-    let _ = drive(field, SVector::from(x0), &course, &mut stepper, &mut steps, &()).unwrap();
+    let _ = drive(field, SVector::from(x0), &options, &mut stepper, &mut steps, &()).unwrap();
     assert!(steps.0.len() > 1000);
     steps.0
 }
@@ -361,14 +363,14 @@ fn eight_states_and_more() {
     let field = Field::smoothed(&system, Transition::Tanh, 1e-2).bind::<8>().unwrap();
     let x0 = SVector::<f64, 8>::from_fn(|i, _| 0.1 * i as f64);
     let mut steps = Steps::default();
-    let course = Course {
+    let options = DriveOptions {
         t_end: 20.0,
         schedule: Schedule::default(),
         step_cap: StepCap::None,
         max_steps: 1_000_000,
         kicked_states: 8,
     };
-    let end = drive(&field, x0, &course, &mut Dopri5::new(TIGHT), &mut steps, &()).unwrap();
+    let end = drive(&field, x0, &options, &mut Dopri5::new(TIGHT), &mut steps, &()).unwrap();
     assert!(end.x.iter().all(|x| x.abs() < 10.0));
     // Sixteen states and a tangent vector, evaluated without a dimension at compile time.
     let large = System::new(twofold::system::Definition::from_toml(&chain(8), "chain").unwrap());

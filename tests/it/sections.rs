@@ -3,7 +3,7 @@
 use nalgebra::vector;
 use twofold::integrate::roots::{Passage, Passages, brent};
 use twofold::integrate::{
-    Course, Dopri5, Flow, Lsoda, Observer, Radau5, Schedule, Step, StepCap, Stepper, Taylor, Tolerance, drive,
+    Dopri5, DriveOptions, Flow, Lsoda, Observer, Radau5, Schedule, Step, StepCap, Stepper, Taylor, Tolerance, drive,
 };
 use twofold::system::{Caricature, Smoothed, Transition};
 
@@ -118,14 +118,14 @@ fn compare<M: Stepper<3>>(name: &str, mut stepper: M, t_end: f64) {
         let planes = [(1, 0.0), (0, 0.0), (2, 0.0), (0, 0.3), (1, -0.7), (2, 0.05), (0, 1e-3), (1, 1.0)]
             .map(|(c, v)| (c, v, Passages::default()));
         let mut compared = Compared { planes: planes.into(), steps: 0, passages: 0, several: 0, decided: 0 };
-        let course = Course {
+        let options = DriveOptions {
             t_end,
             schedule: Schedule { restart_every: Some(20.0), kick: None },
             step_cap: StepCap::FractionOfSegment(0.1),
             max_steps: u64::MAX,
             kicked_states: 3,
         };
-        let _ = drive(&field, vector![0.2, 0.0, -1.0], &course, &mut stepper, &mut compared, &()).unwrap();
+        let _ = drive(&field, vector![0.2, 0.0, -1.0], &options, &mut stepper, &mut compared, &()).unwrap();
         let Compared { steps, passages, several, decided, .. } = compared;
         println!(
             "{name} alpha {alpha}: {steps} steps, {passages} passages, {several} steps with several, {decided} of {} decided by the bound",

@@ -137,7 +137,7 @@ fn end<const N: usize, F: VectorField<N>, M: Stepper<N>>(
     t_end: f64,
     mut stepper: M,
 ) -> SVector<f64, N> {
-    drive(field, x0, &Course::to(t_end), &mut stepper, &mut Ignore, &()).unwrap().x
+    drive(field, x0, &DriveOptions::to(t_end), &mut stepper, &mut Ignore, &()).unwrap().x
 }
 
 /// f64 Taylor, double-double Taylor and Dormand-Prince, all at 1e-12, meet.

@@ -10,7 +10,7 @@ use nalgebra::vector;
 use twofold::analyse::SectionRecorder;
 use twofold::integrate::ensemble::{Run, SectionPlane, ensemble};
 use twofold::integrate::{
-    Course, Dopri5, Layered, Lsoda, Radau5, Schedule, StepCap, Stepper, StopReason, Taylor, Tolerance, drive,
+    Dopri5, DriveOptions, Layered, Lsoda, Radau5, Schedule, StepCap, Stepper, StopReason, Taylor, Tolerance, drive,
 };
 use twofold::system::{Caricature, Smoothed, Transition};
 
@@ -24,8 +24,8 @@ fn field(eps: f64) -> Field {
     Smoothed { system: Caricature::with_reinjection(1e-1, 1e-4), transition: Transition::Tanh, eps }
 }
 
-fn course(t_end: f64) -> Course {
-    Course {
+fn options(t_end: f64) -> DriveOptions {
+    DriveOptions {
         t_end,
         schedule: Schedule { restart_every: Some(100.0), kick: None },
         step_cap: StepCap::FractionOfSegment(0.1),
@@ -47,7 +47,7 @@ fn one<M: Stepper<3>>(varied: &str, value: f64, method: &str, eps: f64, t_end: f
     let mut runs = 0.0;
     loop {
         let mut section = SectionRecorder::<3>::new(1, 0.0);
-        let end = drive(&field(eps), vector![0.2, 0.0, -1.0], &course(t_end), &mut stepper(), &mut section, &());
+        let end = drive(&field(eps), vector![0.2, 0.0, -1.0], &options(t_end), &mut stepper(), &mut section, &());
         let took = seconds(start) - before;
         runs += 1.0;
         match end {
@@ -89,7 +89,7 @@ fn main() {
     }
     // 512 runs in lanes, sections recorded, on one thread and on two: of the clock, so an idle machine is needed.
     let runs: Vec<_> = (0..512)
-        .map(|k| Run { start: vector![0.1 + 0.2 * f64::from(k) / 512.0, 0.0, -1.0], course: course(2e3) })
+        .map(|k| Run { start: vector![0.1 + 0.2 * f64::from(k) / 512.0, 0.0, -1.0], options: options(2e3) })
         .collect();
     let plane = Some(SectionPlane { coordinate: 1, value: 0.0 });
     let tolerance = Tolerance { rtol: TOLERANCE, atol: TOLERANCE };

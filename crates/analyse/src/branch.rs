@@ -384,7 +384,7 @@ pub struct Branch {
 
 /// How a branch is followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Course {
+pub struct BranchOptions {
     /// The parameter's range: from where the first orbit is to its other end.
     pub from: f64,
     /// The other end.
@@ -412,35 +412,40 @@ struct Scales {
     parameter: f64,
 }
 
-/// The branch from the orbit `first` on, as far as `course` says; `go_on` is told each orbit and may stop it.
-pub fn follow(map: &dyn ReturnMap, first: Orbit, course: &Course, go_on: &mut dyn FnMut(&Orbit) -> bool) -> Branch {
-    let scales = Scales { state: first.extent, parameter: (course.to - course.from).abs() };
-    let towards = (course.to - course.from).signum();
+/// The branch from the orbit `first` on, as far as `options` says; `go_on` is told each orbit and may stop it.
+pub fn follow(
+    map: &dyn ReturnMap,
+    first: Orbit,
+    options: &BranchOptions,
+    go_on: &mut dyn FnMut(&Orbit) -> bool,
+) -> Branch {
+    let scales = Scales { state: first.extent, parameter: (options.to - options.from).abs() };
+    let towards = (options.to - options.from).signum();
     let mut branch = Branch { orbits: vec![first], bifurcations: Vec::new(), end: End::Enough };
-    let mut step = 0.25 * course.longest;
+    let mut step = 0.25 * options.longest;
     // The first direction: along the parameter.
     let mut direction: Option<(Vec<f64>, f64)> = None;
-    while branch.orbits.len() < course.most {
+    while branch.orbits.len() < options.most {
         let last = &branch.orbits[branch.orbits.len() - 1];
         let n = last.point.len();
         let (du, dp) = direction.clone().unwrap_or((vec![0.0; n], towards));
         let guess: Vec<f64> = last.point.iter().zip(&du).map(|(u, d)| u + step * scales.state * d).collect();
         let p = last.parameter + step * scales.parameter * dp;
-        let beyond = (p - course.to) * towards >= 0.0;
-        let behind = (p - course.from) * towards < 0.0;
+        let beyond = (p - options.to) * towards >= 0.0;
+        let behind = (p - options.from) * towards < 0.0;
         let next = if beyond {
             // On the range's end exactly.
-            let share = (course.to - last.parameter) / (p - last.parameter);
+            let share = (options.to - last.parameter) / (p - last.parameter);
             let guess: Vec<f64> = last.point.iter().zip(&guess).map(|(a, b)| a + share * (b - a)).collect();
-            closed_orbit(map, &guess, course.to, course.newton)
+            closed_orbit(map, &guess, options.to, options.newton)
         } else {
-            arclength(map, &guess, p, (&du, dp), &scales, course.newton)
+            arclength(map, &guess, p, (&du, dp), &scales, options.newton)
         };
         let next = match next {
             Ok(next)
                 if !beyond
                     && (next.iterations > MANY || jumps(last, &next) || next.events != last.events)
-                    && 0.5 * step >= SHORTEST * course.longest =>
+                    && 0.5 * step >= SHORTEST * options.longest =>
             {
                 Err("too long a step".into())
             }
@@ -450,7 +455,7 @@ pub fn follow(map: &dyn ReturnMap, first: Orbit, course: &Course, go_on: &mut dy
             Ok(next) => next,
             Err(trouble) => {
                 step *= 0.5;
-                if step < SHORTEST * course.longest {
+                if step < SHORTEST * options.longest {
                     let missed = 4.0 * step * scales.parameter;
                     let (change, end) = ended(map, &branch.orbits, trouble, missed);
                     branch.bifurcations.extend(change);
@@ -465,12 +470,12 @@ pub fn follow(map: &dyn ReturnMap, first: Orbit, course: &Course, go_on: &mut dy
             (next.parameter - last.parameter) / scales.parameter,
         );
         let length = sqrt(su.iter().map(|s| s * s).sum::<f64>() + sp * sp);
-        branch.bifurcations.extend(changes(map, last, &next, &scales, course.newton));
+        branch.bifurcations.extend(changes(map, last, &next, &scales, options.newton));
         if length > 0.0 {
             direction = Some((su.iter().map(|s| s / length).collect(), sp / length));
         }
         if next.iterations <= FEW {
-            step = (1.5 * step).min(course.longest);
+            step = (1.5 * step).min(options.longest);
         }
         let stop = !go_on(&next);
         branch.orbits.push(next);
@@ -841,8 +846,8 @@ mod tests {
     #[test]
     fn the_logistic_map_doubles_at_three() {
         let first = closed_orbit(&Logistic, &[0.5, 0.0], 2.0, NEWTON).unwrap();
-        let course = Course { from: 2.0, to: 3.5, longest: 0.1, most: 200, newton: NEWTON };
-        let branch = follow(&Logistic, first, &course, &mut |_| true);
+        let options = BranchOptions { from: 2.0, to: 3.5, longest: 0.1, most: 200, newton: NEWTON };
+        let branch = follow(&Logistic, first, &options, &mut |_| true);
         assert_eq!(branch.end, End::Reached);
         let last = branch.orbits.last().unwrap();
         assert!((last.parameter - 3.5).abs() < 1e-12 && (last.point[0] - (1.0 - 1.0 / 3.5)).abs() < 1e-12, "{last:?}");
@@ -856,8 +861,8 @@ mod tests {
     #[test]
     fn a_fold_is_passed() {
         let first = closed_orbit(&FoldMap, &[1.1, 0.0], 1.0, NEWTON).unwrap();
-        let course = Course { from: 1.0, to: -1.0, longest: 0.05, most: 400, newton: NEWTON };
-        let branch = follow(&FoldMap, first, &course, &mut |_| true);
+        let options = BranchOptions { from: 1.0, to: -1.0, longest: 0.05, most: 400, newton: NEWTON };
+        let branch = follow(&FoldMap, first, &options, &mut |_| true);
         assert_eq!(branch.end, End::TurnedBack, "{:?}", branch.orbits.len());
         let last = branch.orbits.last().unwrap();
         assert!(last.point[0] < -0.9 && (last.point[0] * last.point[0] - last.parameter).abs() < 1e-9, "{last:?}");
@@ -990,8 +995,8 @@ mod tests {
         // x = p, from 1 to 5: of the state's scale 2 and the parameter's 4.
         let line = Zeros(|x: f64, p: f64| Some([0.5 * (p - x), -0.5]));
         let first = Orbit { extent: 2.0, ..closed_orbit(&line, &[1.0, 0.0], 1.0, NEWTON).unwrap() };
-        let course = Course { from: 1.0, to: 5.0, longest: 0.1, most: 200, newton: NEWTON };
-        let branch = follow(&line, first, &course, &mut |_| true);
+        let options = BranchOptions { from: 1.0, to: 5.0, longest: 0.1, most: 200, newton: NEWTON };
+        let branch = follow(&line, first, &options, &mut |_| true);
         assert_eq!(branch.end, End::Reached);
         assert!(branch.bifurcations.is_empty());
         let n = branch.orbits.len();
@@ -1019,8 +1024,8 @@ mod tests {
         // x^2 + p^2 = 25 from (5, 0) by the fold at p = 5 to (-5, 0).
         let circle = Zeros(|x: f64, p: f64| Some([0.1 * (25.0 - x * x - p * p), -0.2 * x]));
         let first = Orbit { extent: 6.0, ..closed_orbit(&circle, &[4.9, 0.0], 0.0, NEWTON).unwrap() };
-        let course = Course { from: 0.0, to: 6.0, longest: 0.05, most: 400, newton: NEWTON };
-        let branch = follow(&circle, first, &course, &mut |_| true);
+        let options = BranchOptions { from: 0.0, to: 6.0, longest: 0.05, most: 400, newton: NEWTON };
+        let branch = follow(&circle, first, &options, &mut |_| true);
         assert_eq!(branch.end, End::TurnedBack);
         for (k, pair) in branch.orbits.windows(2).enumerate() {
             let [x, p] = [pair[1].point[0], pair[1].parameter];
@@ -1042,22 +1047,22 @@ mod tests {
     #[test]
     fn a_branch_ends_where_its_orbits_do_or_where_it_is_told() {
         let ray = Zeros(|x: f64, p: f64| (p <= 1.0).then_some([-0.5 * x, -0.5]));
-        let course = Course { from: 0.0, to: 4.0, longest: 0.1, most: 100, newton: NEWTON };
+        let options = BranchOptions { from: 0.0, to: 4.0, longest: 0.1, most: 100, newton: NEWTON };
         let first = || closed_orbit(&ray, &[0.0, 0.0], 0.0, NEWTON).unwrap();
-        let branch = follow(&ray, first(), &course, &mut |_| true);
+        let branch = follow(&ray, first(), &options, &mut |_| true);
         assert_eq!(branch.end, End::Lost("nothing there".into()));
         // As near to the end as two of the shortest steps.
         let left = 1.0 - branch.orbits.last().unwrap().parameter;
         assert!((0.0..2.0 * SHORTEST * 0.1 * 4.0).contains(&left), "{left}");
 
-        let branch = follow(&ray, first(), &Course { most: 4, ..course }, &mut |_| true);
+        let branch = follow(&ray, first(), &BranchOptions { most: 4, ..options }, &mut |_| true);
         assert_eq!((branch.end, branch.orbits.len()), (End::Enough, 4));
         let mut told = 0;
         let mut third = |_: &Orbit| {
             told += 1;
             told < 3
         };
-        let branch = follow(&ray, first(), &course, &mut third);
+        let branch = follow(&ray, first(), &options, &mut third);
         assert_eq!((branch.end, branch.orbits.len()), (End::Interrupted, 4));
     }
 
@@ -1066,8 +1071,8 @@ mod tests {
         for steepness in [40.0, 4000.0] {
             let steep = Zeros(|x: f64, p: f64| Some([(steepness * p - 1.0) * x, steepness * p - 1.0]));
             let first = closed_orbit(&steep, &[0.0, 0.0], -1.0, NEWTON).unwrap();
-            let course = Course { from: -1.0, to: 1.0, longest: 0.1, most: 200, newton: NEWTON };
-            let branch = follow(&steep, first, &course, &mut |_| true);
+            let options = BranchOptions { from: -1.0, to: 1.0, longest: 0.1, most: 200, newton: NEWTON };
+            let branch = follow(&steep, first, &options, &mut |_| true);
             assert_eq!(branch.end, End::Reached);
             let within = &branch.orbits[..branch.orbits.len() - 1];
             assert!(within.windows(2).all(|pair| !jumps(&pair[0], &pair[1])));
@@ -1156,8 +1161,8 @@ mod tests {
     fn a_branch_ends_where_its_orbits_shrink_to_a_hopf_point() {
         let first = closed_orbit(&Shrinking, &[0.7, 0.0], 0.5, NEWTON).unwrap();
         for to in [-0.5, -3.0] {
-            let course = Course { from: 0.5, to, longest: 0.1, most: 200, newton: NEWTON };
-            let branch = follow(&Shrinking, first.clone(), &course, &mut |_| true);
+            let options = BranchOptions { from: 0.5, to, longest: 0.1, most: 200, newton: NEWTON };
+            let branch = follow(&Shrinking, first.clone(), &options, &mut |_| true);
             assert_eq!(branch.end, End::Vanished);
             assert!(branch.orbits.iter().all(|o| o.parameter > -1e-12 && o.point[0] > 0.0), "{branch:?}");
             let [hopf] = &branch.bifurcations[..] else { panic!("{:?}", branch.bifurcations) };

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::reference::{ExtendedCrossing, SectionPlane, reference};
 use super::section::SectionRecorder;
 use twofold_integrate::{
-    Course, Failure, Flow, Method, Observer, Statistics, Step, StepCap, Stepper, Tolerance, WithStepper, drive,
+    DriveOptions, Failure, Flow, Method, Observer, Statistics, Step, StepCap, Stepper, Tolerance, WithStepper, drive,
 };
 use twofold_num::elementary::log10;
 use twofold_num::{Arithmetic, DoubleDouble, Scalar};
@@ -171,8 +171,8 @@ pub fn agreement<F: VectorField<3>, M: Stepper<3>>(
     let Some(last) = reference.last() else { return Ok(Vec::new()) };
     let mut until = Until { section: SectionRecorder::new(plane.coordinate, plane.value), crossings: reference.len() };
     let t_end = 2.0 * last.t.to_f64();
-    let course = Course { step_cap: cap, max_steps, ..Course::to(t_end) };
-    let _ = drive(field, x0, &course, stepper, &mut until, &())?.within_budget()?;
+    let options = DriveOptions { step_cap: cap, max_steps, ..DriveOptions::to(t_end) };
+    let _ = drive(field, x0, &options, stepper, &mut until, &())?.within_budget()?;
     let pairs = reference.iter().zip(until.section.crossings()).enumerate();
     Ok(pairs
         .map(|(i, (want, got))| {

@@ -5,7 +5,7 @@
 //! ```
 //! use nalgebra::{SVector, vector};
 //! use twofold_analyse::{Direction, SectionRecorder};
-//! use twofold_integrate::{Course, Dopri5, Tolerance, drive};
+//! use twofold_integrate::{DriveOptions, Dopri5, Tolerance, drive};
 //! use twofold_num::Elementary;
 //! use twofold_system::VectorField;
 //!
@@ -20,7 +20,7 @@
 //! // Its passages through x = 0: downwards at pi/2, upwards at 3 pi/2.
 //! let mut section = SectionRecorder::<2>::new(0, 0.0);
 //! let mut method = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
-//! let _ = drive(&Oscillator, vector![1.0, 0.0], &Course::to(6.0), &mut method, &mut section, &())?;
+//! let _ = drive(&Oscillator, vector![1.0, 0.0], &DriveOptions::to(6.0), &mut method, &mut section, &())?;
 //! let [down, up] = section.crossings() else { panic!("two passages") };
 //! assert_eq!((down.direction, up.direction), (Direction::Down, Direction::Up));
 //! assert!((up.t - 4.712_388_98).abs() < 1e-7);

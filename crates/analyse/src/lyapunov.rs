@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use super::tangent::Tangent;
 use twofold_integrate::ensemble::{Carried, Common, InstructionSet, Run, Tolerances, ensemble_watched};
 use twofold_integrate::{
-    Course, Dopri5, Failure, Flow, Kick, Kicker, Observer, Step, StepCap, Stepper, Tolerance, Watch,
+    Dopri5, DriveOptions, Failure, Flow, Kick, Kicker, Observer, Step, StepCap, Stepper, Tolerance, Watch,
 };
 use twofold_num::elementary::{ln, sqrt};
 use twofold_num::fit::{line, mean};
@@ -237,8 +237,9 @@ pub fn largest_side_by_side<const N: usize, const M: usize, E: BatchedField<M>>(
     assert!(settings.kick.is_none(), "orbits without kicks");
     let LyapunovOptions { tolerance, max_step, transient, duration, max_steps, .. } = *settings;
     let stops: Vec<f64> = (0..=BLOCKS).map(|block| block_end(settings, block)).skip_while(|end| *end <= 0.0).collect();
-    let course = Course { step_cap: StepCap::Absolute(max_step), max_steps, ..Course::to(transient + duration) };
-    let runs: Vec<Run<M>> = starts.iter().map(|x0| Run { start: begin(x0), course }).collect();
+    let options =
+        DriveOptions { step_cap: StepCap::Absolute(max_step), max_steps, ..DriveOptions::to(transient + duration) };
+    let runs: Vec<Run<M>> = starts.iter().map(|x0| Run { start: begin(x0), options }).collect();
     let carried = Carried { first: N, range: [1.0 / RANGE, RANGE], stops: &stops };
     let tolerances = Tolerances::All(tolerance);
     let common = Common { tolerances, plane: None, corners: None, carried: Some(carried), watch };

@@ -4,7 +4,8 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use twofold_integrate::{
-    Course, Failure, Ignore, Method, Statistics, StepCap, Stepper, StopReason, Summary, Tolerance, WithStepper, drive,
+    DriveOptions, Failure, Ignore, Method, Statistics, StepCap, Stepper, StopReason, Summary, Tolerance, WithStepper,
+    drive,
 };
 use twofold_system::VectorField;
 
@@ -80,10 +81,10 @@ pub fn work_precision<F: VectorField<N>, const N: usize>(
     if q.solution.len() != N {
         return Err(wrong("the solution", &q.solution));
     }
-    let course = Course { step_cap: q.step_cap, max_steps: q.max_steps, ..Course::to(q.t_end) };
+    let options = DriveOptions { step_cap: q.step_cap, max_steps: q.max_steps, ..DriveOptions::to(q.t_end) };
     let runs = q.methods.iter().flat_map(|m| q.tolerances.iter().map(move |t| (*m, *t)));
     let rows = runs.map(|(method, tolerance)| {
-        let run = Run { field, x0: SVector::from(start), course };
+        let run = Run { field, x0: SVector::from(start), options };
         let mut row = WorkPrecisionRow { method, tolerance, error: None, statistics: None, stop: None, failure: None };
         match method.with_stepper(tolerance, run) {
             Ok(end) => {
@@ -102,13 +103,13 @@ pub fn work_precision<F: VectorField<N>, const N: usize>(
 struct Run<'a, F, const N: usize> {
     field: &'a F,
     x0: SVector<f64, N>,
-    course: Course,
+    options: DriveOptions,
 }
 
 impl<F: VectorField<N>, const N: usize> WithStepper<N> for Run<'_, F, N> {
     type Answer = Result<Summary<N>, Failure>;
     fn with<M: Stepper<N>>(self, mut stepper: M) -> Self::Answer {
-        drive(self.field, self.x0, &self.course, &mut stepper, &mut Ignore, &())
+        drive(self.field, self.x0, &self.options, &mut stepper, &mut Ignore, &())
     }
 }
 

@@ -44,7 +44,7 @@ impl Watch for () {
 /// How far a run goes and by what rules, whatever the equation and the method.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Course {
+pub struct DriveOptions {
     /// The end time; a run starts at 0.
     pub t_end: f64,
     /// Restarts and kicks.
@@ -57,7 +57,7 @@ pub struct Course {
     pub kicked_states: usize,
 }
 
-impl Course {
+impl DriveOptions {
     /// Straight to `t_end`: no restarts, no kicks, steps as long and as many as the method wants.
     pub fn to(t_end: f64) -> Self {
         Self { t_end, schedule: Schedule::default(), step_cap: StepCap::None, max_steps: u64::MAX, kicked_states: 3 }
@@ -95,14 +95,14 @@ impl<const N: usize> Summary<N> {
     }
 }
 
-/// Runs `stepper` from (0, x0) over `course`.
+/// Runs `stepper` from (0, x0) over `options`.
 ///
 /// # Errors
 /// What the method could not do. Running out of steps is no error but a [`StopReason`]: what was observed until then stands.
 pub fn drive<const N: usize, F, M>(
     field: &F,
     x0: SVector<f64, N>,
-    course: &Course,
+    options: &DriveOptions,
     stepper: &mut M,
     observer: &mut dyn Observer<N>,
     watch: &dyn Watch,
@@ -111,7 +111,7 @@ where
     F: VectorField<N>,
     M: Stepper<N>,
 {
-    let Course { t_end, ref schedule, step_cap, max_steps, kicked_states } = *course;
+    let DriveOptions { t_end, ref schedule, step_cap, max_steps, kicked_states } = *options;
     let mut kicker = schedule.kick.map(|kick| Kicker::new(kick, kicked_states));
     let (mut t, mut x) = (0.0, x0);
     let mut begun = false;
@@ -193,43 +193,47 @@ mod tests {
         }
     }
 
-    fn run(course: Course, observer: &mut dyn Observer<2>, watch: &dyn Watch) -> Summary<2> {
+    fn run(options: DriveOptions, observer: &mut dyn Observer<2>, watch: &dyn Watch) -> Summary<2> {
         let mut stepper = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
-        drive(&Turning, vector![1.0, 0.0], &course, &mut stepper, observer, watch).unwrap()
+        drive(&Turning, vector![1.0, 0.0], &options, &mut stepper, observer, watch).unwrap()
     }
 
     #[test]
     fn every_end_has_its_reason() {
-        let whole = run(Course::to(10.0), &mut Ignore, &());
+        let whole = run(DriveOptions::to(10.0), &mut Ignore, &());
         assert_eq!((whole.stop, whole.t), (StopReason::EndTime, 10.0));
         assert_eq!(whole.most_steps_in_segment, whole.statistics.steps);
 
-        let seen = run(Course::to(10.0), &mut After(7), &());
+        let seen = run(DriveOptions::to(10.0), &mut After(7), &());
         assert_eq!((seen.stop, seen.statistics.steps), (StopReason::Observer, 7));
         assert!(seen.t < 10.0 && seen.most_steps_in_segment == 7);
         // Three segments, the last of them hardly begun.
-        let often = Course { schedule: Schedule { restart_every: Some(1.0), kick: None }, ..Course::to(10.0) };
-        let first = run(Course { t_end: 1.0, ..often }, &mut Ignore, &()).statistics.steps;
-        let second = run(Course { t_end: 2.0, ..often }, &mut Ignore, &()).statistics.steps - first;
+        let often =
+            DriveOptions { schedule: Schedule { restart_every: Some(1.0), kick: None }, ..DriveOptions::to(10.0) };
+        let first = run(DriveOptions { t_end: 1.0, ..often }, &mut Ignore, &()).statistics.steps;
+        let second = run(DriveOptions { t_end: 2.0, ..often }, &mut Ignore, &()).statistics.steps - first;
         let third = run(often, &mut After(first + second + 1), &());
         assert_eq!((third.stop, third.most_steps_in_segment), (StopReason::Observer, first.max(second)));
 
-        let poor = run(Course { max_steps: 5, ..Course::to(10.0) }, &mut Ignore, &());
+        let poor = run(DriveOptions { max_steps: 5, ..DriveOptions::to(10.0) }, &mut Ignore, &());
         assert_eq!((poor.stop, poor.statistics.steps), (StopReason::StepBudget, 5));
         assert!(matches!(poor.within_budget(), Err(Failure::TooManySteps { limit: 5, .. })));
 
         let refuses = Refuses(AtomicBool::new(false));
-        let cut = run(Course { step_cap: StepCap::Absolute(1e-3), ..Course::to(10.0) }, &mut Ignore, &refuses);
+        let cut =
+            run(DriveOptions { step_cap: StepCap::Absolute(1e-3), ..DriveOptions::to(10.0) }, &mut Ignore, &refuses);
         assert_eq!((cut.stop, cut.statistics.steps), (StopReason::Watch, 4096));
         assert!(cut.clone().within_budget().is_ok(), "only the budget is an error");
 
         // A budget that is just enough is enough, and a watch that refuses at the very end has cut nothing short.
-        let just = run(Course { max_steps: whole.statistics.steps, ..Course::to(10.0) }, &mut Ignore, &refuses);
+        let just =
+            run(DriveOptions { max_steps: whole.statistics.steps, ..DriveOptions::to(10.0) }, &mut Ignore, &refuses);
         assert_eq!(just.stop, StopReason::EndTime);
         assert_eq!(just.x, whole.x);
 
         // Neither has one that is asked when the last step is the 4096th.
-        let last = run(Course { step_cap: StepCap::Absolute(1e-3), ..Course::to(cut.t) }, &mut Ignore, &refuses);
+        let last =
+            run(DriveOptions { step_cap: StepCap::Absolute(1e-3), ..DriveOptions::to(cut.t) }, &mut Ignore, &refuses);
         assert_eq!((last.stop, last.statistics.steps, last.t), (StopReason::EndTime, 4096, cut.t));
     }
 
@@ -246,9 +250,10 @@ mod tests {
     fn what_is_counted_was_done() {
         let field = Counted(Default::default());
         let mut stepper = Dopri5::new(Tolerance { rtol: 1e-6, atol: 1e-6 });
-        let course = Course { schedule: Schedule { restart_every: Some(30.0), kick: None }, ..Course::to(100.0) };
+        let options =
+            DriveOptions { schedule: Schedule { restart_every: Some(30.0), kick: None }, ..DriveOptions::to(100.0) };
         let mut seen = Lengths::default();
-        let end = drive(&field, vector![2.0, 0.0], &course, &mut stepper, &mut seen, &()).unwrap();
+        let end = drive(&field, vector![2.0, 0.0], &options, &mut stepper, &mut seen, &()).unwrap();
         let s = &end.statistics;
         assert_eq!((s.restarts, s.highest_order), (4, 5));
         assert!(s.rejected > 20, "the orbit has fast parts: {} rejected", s.rejected);

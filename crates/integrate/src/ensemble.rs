@@ -17,7 +17,7 @@ use pulp::{Scalar, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
 use super::dopri5::{Dense, Dopri5, control, tableau::*};
-use super::driver::{Course, Observer, Summary, Watch};
+use super::driver::{DriveOptions, Observer, Summary, Watch};
 use super::guard::{Gates, SMALL_BEND, Stage, Stages};
 use super::schedule::{Kicker, Segment};
 use super::step::{Failure, Flow, Statistics, Step, Stepper, StopReason, Tolerance};
@@ -32,7 +32,7 @@ pub struct Run<const N: usize> {
     /// The state at time 0.
     pub start: SVector<f64, N>,
     /// How far and by what rules.
-    pub course: Course,
+    pub options: DriveOptions,
 }
 
 /// How one run ended.
@@ -287,7 +287,7 @@ impl<E: BatchedField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, cons
                     state.give(l, equations.numbers(run), common.corners.map(|corners| &corners[run]));
                     let tolerance = common.tolerances.of(run);
                     let segments: Box<dyn Iterator<Item = Segment>> = match common.carried {
-                        None => Box::new(runs[run].course.schedule.segments(0.0, runs[run].course.t_end)),
+                        None => Box::new(runs[run].options.schedule.segments(0.0, runs[run].options.t_end)),
                         Some(Carried { stops, .. }) => {
                             let stops = Vec::from(stops);
                             Box::new(stops.into_iter().map(|end| Segment { end, kick: false }))
@@ -318,7 +318,7 @@ impl<E: BatchedField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, cons
 /// What a lane's run needs besides its numbers.
 struct Lane<O, const N: usize> {
     run: usize,
-    course: Course,
+    options: DriveOptions,
     segments: Box<dyn Iterator<Item = Segment>>,
     segment: Segment,
     kicker: Option<Kicker>,
@@ -404,7 +404,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         }
     }
 
-    /// What is a run's own besides its course, for lane `l`.
+    /// What is a run's own besides its options, for lane `l`.
     fn give(&mut self, l: usize, numbers: &[f64], corner: Option<&SVector<f64, N>>) {
         for (of_lanes, number) in self.numbers.iter_mut().zip(numbers) {
             put(&mut of_lanes.0, l, *number);
@@ -422,7 +422,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         l: usize,
         equations: &E,
         run: usize,
-        Run { start, course }: &Run<N>,
+        Run { start, options }: &Run<N>,
         mut segments: Box<dyn Iterator<Item = Segment>>,
         tolerance: Tolerance,
         observer: O,
@@ -432,17 +432,17 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         put(&mut self.steps, l, 0.0);
         put(&mut self.rejected, l, 0.0);
         put(&mut self.t, l, 0.0);
-        put(&mut self.max_steps, l, course.max_steps as f64);
+        put(&mut self.max_steps, l, options.max_steps as f64);
         for i in 0..N {
             put(&mut self.x[i], l, start[i]);
         }
         let first = segments.next();
         self.lanes[l] = Some(Lane {
             run,
-            course: *course,
+            options: *options,
             segments,
             segment: first.unwrap_or(Segment { end: 0.0, kick: false }),
-            kicker: course.schedule.kick.map(|kick| Kicker::new(kick, course.kicked_states)),
+            kicker: options.schedule.kick.map(|kick| Kicker::new(kick, options.kicked_states)),
             observer,
             restarts: 0,
             steps_before: 0.0,
@@ -463,7 +463,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
     fn restart<E: BatchedField<N>>(&mut self, l: usize, equations: &E) -> Option<Failure> {
         let lane = self.lanes[l].as_mut()?;
         let end = lane.segment.end;
-        lane.stages = Stages::new(end, lane.course.step_cap.for_segment(end - get(&self.t, l)));
+        lane.stages = Stages::new(end, lane.options.step_cap.for_segment(end - get(&self.t, l)));
         self.begin_stage(l, equations)
     }
 
@@ -771,7 +771,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         let stop = if flow == Flow::Stop {
             Some(StopReason::Observer)
         } else {
-            (steps >= lane.course.max_steps as f64 && t1 < lane.course.t_end).then_some(StopReason::StepBudget)
+            (steps >= lane.options.max_steps as f64 && t1 < lane.options.t_end).then_some(StopReason::StepBudget)
         };
         if stop.is_some() || last {
             lane.most_steps_in_segment = lane.most_steps_in_segment.max(steps - lane.steps_before);

@@ -1,12 +1,12 @@
 //! Time stepping: from an equation and a start to a sequence of accepted steps.
 //!
 //! A method is a [`Stepper`]: it makes one accepted [`Step`] at a time, and every step carries its interpolant (dense
-//! output). The one driver loop, [`drive`], runs a stepper over a [`Course`] (an end time, a [`Schedule`] of restarts and kicks, bounds on steps) and hands each
+//! output). The one driver loop, [`drive`], runs a stepper over a [`DriveOptions`] (an end time, a [`Schedule`] of restarts and kicks, bounds on steps) and hands each
 //! step to an [`Observer`]. What is made of the steps (a path, a section) is not decided here.
 //!
 //! ```
 //! use nalgebra::{SVector, vector};
-//! use twofold_integrate::{Course, Dopri5, Ignore, StopReason, Tolerance, drive};
+//! use twofold_integrate::{DriveOptions, Dopri5, Ignore, StopReason, Tolerance, drive};
 //! use twofold_num::Elementary;
 //! use twofold_system::VectorField;
 //!
@@ -19,7 +19,7 @@
 //! }
 //!
 //! let mut method = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
-//! let end = drive(&Oscillator, vector![1.0, 0.0], &Course::to(1.0), &mut method, &mut Ignore, &())?;
+//! let end = drive(&Oscillator, vector![1.0, 0.0], &DriveOptions::to(1.0), &mut method, &mut Ignore, &())?;
 //! assert_eq!(end.stop, StopReason::EndTime);
 //! assert!((end.x[0] - 0.540_302_305_868).abs() < 1e-8); // cos 1
 //! # Ok::<(), twofold_integrate::Failure>(())
@@ -47,7 +47,7 @@ pub mod taylor;
 mod tests;
 
 pub use dopri5::Dopri5;
-pub use driver::{Course, Ignore, Observer, Summary, Watch, drive};
+pub use driver::{DriveOptions, Ignore, Observer, Summary, Watch, drive};
 pub use guard::Guarded;
 pub use layered::Layered;
 pub use lsoda::Lsoda;

@@ -93,7 +93,7 @@ mod tests {
     use nalgebra::vector;
 
     use super::*;
-    use crate::{Course, Ignore, Statistics, drive};
+    use crate::{DriveOptions, Ignore, Statistics, drive};
     use nalgebra::SVector;
     use twofold_num::Elementary;
     use twofold_system::VectorField;
@@ -117,7 +117,7 @@ mod tests {
     impl WithStepper<1> for ToOneHalf {
         type Answer = (f64, Statistics);
         fn with<M: Stepper<1>>(self, mut stepper: M) -> Self::Answer {
-            let end = drive(&Growing, vector![0.7], &Course::to(0.9), &mut stepper, &mut Ignore, &()).unwrap();
+            let end = drive(&Growing, vector![0.7], &DriveOptions::to(0.9), &mut stepper, &mut Ignore, &()).unwrap();
             (end.x[0], end.statistics)
         }
     }

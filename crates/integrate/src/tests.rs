@@ -138,11 +138,11 @@ fn follow<F: VectorField<N>, const N: usize>(
     name: &str,
     field: &F,
     x0: SVector<f64, N>,
-    course: &Course,
+    options: &DriveOptions,
     mut method: impl Stepper<N>,
 ) -> String {
     let mut seen = Seen::new();
-    let end = drive(field, x0, course, &mut method, &mut seen, &());
+    let end = drive(field, x0, options, &mut method, &mut seen, &());
     assert!(end.as_ref().is_ok_and(|e| e.statistics.steps == seen.steps) || end.is_err());
     let statistics = method.statistics().clone();
     seen.line(name, &(end, statistics))
@@ -208,37 +208,45 @@ fn kicked(law: KickLaw, every: f64) -> Schedule {
 
 const START: [f64; 3] = [0.2, 0.0, -1.0];
 
-/// Every course for a method in space: `t_end` is the length of a plain run, `part` of those with a schedule.
+/// Every options for a method in space: `t_end` is the length of a plain run, `part` of those with a schedule.
 fn in_space<M: Stepper<3>>(method: impl Fn(f64) -> M, t_end: f64, part: f64) -> Vec<String> {
     let smooth = caricature(Transition::Tanh, 1e-3);
-    let course = |schedule, step_cap, kicked_states| Course { schedule, step_cap, kicked_states, ..Course::to(part) };
+    let options = |schedule, step_cap, kicked_states| DriveOptions {
+        schedule,
+        step_cap,
+        kicked_states,
+        ..DriveOptions::to(part)
+    };
     let never = Schedule::default();
-    let go = |name: &str, field: &Spatial, course: &Course, size: f64| {
-        follow(name, field, START.into(), course, method(size))
+    let go = |name: &str, field: &Spatial, options: &DriveOptions, size: f64| {
+        follow(name, field, START.into(), options, method(size))
     };
     vec![
-        go("plain", &smooth, &Course::to(t_end), 1e-8),
-        go("coarse", &smooth, &Course::to(t_end), 1e-5),
-        go("fine", &smooth, &Course::to(part), 1e-11),
-        go("sphere", &smooth, &course(kicked(KickLaw::Sphere, 0.3), StepCap::None, 3), 1e-7),
-        go("cube", &smooth, &course(kicked(KickLaw::Cube, 0.35), StepCap::FractionOfSegment(0.1), 2), 1e-7),
-        go("normal", &smooth, &course(kicked(KickLaw::Normal, 0.9), StepCap::Absolute(0.05), 1), 1e-7),
-        go("circle of two", &smooth, &course(kicked(KickLaw::Sphere, 0.3), StepCap::None, 2), 1e-6),
-        go("cap", &smooth, &course(never, StepCap::Absolute(0.02), 3), 1e-6),
-        go("few", &smooth, &Course { max_steps: 20, ..Course::to(t_end) }, 1e-8),
-        go("wide layer", &caricature(Transition::Tanh, 0.1), &Course::to(part), 1e-8),
-        go("circle", &Spatial::Circle, &Course::to(part), 1e-9),
-        go("crossed", &Spatial::Crossed, &Course::to(part), 1e-9),
-        go("crossed, coarse", &Spatial::Crossed, &Course::to(t_end), 1e-5),
+        go("plain", &smooth, &DriveOptions::to(t_end), 1e-8),
+        go("coarse", &smooth, &DriveOptions::to(t_end), 1e-5),
+        go("fine", &smooth, &DriveOptions::to(part), 1e-11),
+        go("sphere", &smooth, &options(kicked(KickLaw::Sphere, 0.3), StepCap::None, 3), 1e-7),
+        go("cube", &smooth, &options(kicked(KickLaw::Cube, 0.35), StepCap::FractionOfSegment(0.1), 2), 1e-7),
+        go("normal", &smooth, &options(kicked(KickLaw::Normal, 0.9), StepCap::Absolute(0.05), 1), 1e-7),
+        go("circle of two", &smooth, &options(kicked(KickLaw::Sphere, 0.3), StepCap::None, 2), 1e-6),
+        go("cap", &smooth, &options(never, StepCap::Absolute(0.02), 3), 1e-6),
+        go("few", &smooth, &DriveOptions { max_steps: 20, ..DriveOptions::to(t_end) }, 1e-8),
+        go("wide layer", &caricature(Transition::Tanh, 0.1), &DriveOptions::to(part), 1e-8),
+        go("circle", &Spatial::Circle, &DriveOptions::to(part), 1e-9),
+        go("crossed", &Spatial::Crossed, &DriveOptions::to(part), 1e-9),
+        go("crossed, coarse", &Spatial::Crossed, &DriveOptions::to(t_end), 1e-5),
     ]
 }
 
-/// Every course for a method in the plane.
+/// Every options for a method in the plane.
 fn in_the_plane<M: Stepper<2>>(method: impl Fn(f64) -> M, stiff: f64) -> Vec<String> {
     let go = |name: &str, field: Planar, x0: [f64; 2], t_end: f64, size: f64| {
         // At the root's edge a method creeps.
-        let course = Course { max_steps: if matches!(field, Planar::Root) { 200 } else { 5000 }, ..Course::to(t_end) };
-        follow(name, &field, x0.into(), &course, method(size))
+        let options = DriveOptions {
+            max_steps: if matches!(field, Planar::Root) { 200 } else { 5000 },
+            ..DriveOptions::to(t_end)
+        };
+        follow(name, &field, x0.into(), &options, method(size))
     };
     vec![
         go("van der Pol", Planar::VanDerPol(1.0), [2.0, 0.0], 8.0, 1e-9),
@@ -266,7 +274,7 @@ fn lsoda() {
     found.extend(in_the_plane(|size| Lsoda::new(tolerance(size)), 50.0));
     let relative = Tolerance { rtol: 0.0, atol: 1e-7 };
     let start = vector![2.0, 0.0];
-    found.push(follow("absolute", &Planar::VanDerPol(1.0), start, &Course::to(8.0), Lsoda::new(relative)));
+    found.push(follow("absolute", &Planar::VanDerPol(1.0), start, &DriveOptions::to(8.0), Lsoda::new(relative)));
     hold(&found, LSODA);
 }
 
@@ -287,29 +295,29 @@ fn taylor() {
 #[test]
 fn taylor_extended() {
     let smooth = caricature(Transition::Tanh, 1e-2);
-    let course = Course { schedule: kicked(KickLaw::Cube, 0.25), ..Course::to(0.6) };
+    let options = DriveOptions { schedule: kicked(KickLaw::Cube, 0.25), ..DriveOptions::to(0.6) };
     let mut found = Vec::new();
-    for (name, field, course) in [
-        ("plain", &smooth, &Course::to(1.0)),
-        ("cube", &smooth, &course),
-        ("circle", &Spatial::Circle, &Course::to(0.4)),
+    for (name, field, options) in [
+        ("plain", &smooth, &DriveOptions::to(1.0)),
+        ("cube", &smooth, &options),
+        ("circle", &Spatial::Circle, &DriveOptions::to(0.4)),
     ] {
-        found.push(follow(name, field, START.into(), course, Taylor::<3, _>::extended(tolerance(1e-24))));
+        found.push(follow(name, field, START.into(), options, Taylor::<3, _>::extended(tolerance(1e-24))));
         found.push(follow(
             name,
             field,
             START.into(),
-            course,
+            options,
             Taylor::<3, _>::extended(tolerance(1e-20)).with_decimal_constants(),
         ));
         found.push(follow(
             name,
             field,
             START.into(),
-            course,
+            options,
             Taylor::<3, _>::extended(tolerance(1e-16)).with_order(12),
         ));
-        found.push(follow(name, field, START.into(), course, Taylor::<3, MultiFloat<3>>::multi(tolerance(1e-30))));
+        found.push(follow(name, field, START.into(), options, Taylor::<3, MultiFloat<3>>::multi(tolerance(1e-30))));
     }
     hold(&found, TAYLOR_EXTENDED);
 }
@@ -328,20 +336,20 @@ fn layered() {
         ("grazing", [0.02, 0.2, 0.9]),
     ] {
         let field = caricature(Transition::Tanh, 1e-3);
-        found.push(follow(name, &field, start.into(), &Course::to(1.0), Layered::new(tolerance(1e-10))));
+        found.push(follow(name, &field, start.into(), &DriveOptions::to(1.0), Layered::new(tolerance(1e-10))));
         let field = Spatial::Smooth(Smoothed {
             system: Caricature::with_reinjection(1e-3, 1e-5),
             transition: Transition::Tanh,
             eps: 2e-2,
         });
-        found.push(follow(name, &field, start.into(), &Course::to(1.5), Layered::new(tolerance(1e-7))));
+        found.push(follow(name, &field, start.into(), &DriveOptions::to(1.5), Layered::new(tolerance(1e-7))));
     }
     for field in [
         Spatial::Quotient,
         caricature(Transition::Arctan, 1e-3),
         caricature(Transition::PerturbedTanh { sigma: 0.1 }, 1e-3),
     ] {
-        found.push(follow("refused", &field, START.into(), &Course::to(1.0), Layered::new(tolerance(1e-8))));
+        found.push(follow("refused", &field, START.into(), &DriveOptions::to(1.0), Layered::new(tolerance(1e-8))));
     }
     hold(&found, LAYERED);
 }
@@ -352,13 +360,13 @@ fn hysteretic() {
     for relaxation in [Relaxation::Literal, Relaxation::Single] {
         let field =
             Hysteretic { system: Caricature::with_reinjection(1e-1, 1e-4), eps: 5e-2, eps_prime: 5e-2, relaxation };
-        let course = Course { schedule: kicked(KickLaw::Sphere, 0.3), ..Course::to(3.0) };
+        let options = DriveOptions { schedule: kicked(KickLaw::Sphere, 0.3), ..DriveOptions::to(3.0) };
         let start = vector![0.2, 0.0, -1.0, 1.0];
-        for (name, course) in [("plain", &Course::to(3.0)), ("kicked", &course)] {
-            found.push(follow(name, &field, start, course, Lsoda::new(tolerance(1e-8))));
-            found.push(follow(name, &field, start, course, Dopri5::new(tolerance(1e-6))));
-            found.push(follow(name, &field, start, course, Radau5::new(tolerance(1e-6))));
-            found.push(follow(name, &field, start, course, Layered::new(tolerance(1e-7))));
+        for (name, options) in [("plain", &DriveOptions::to(3.0)), ("kicked", &options)] {
+            found.push(follow(name, &field, start, options, Lsoda::new(tolerance(1e-8))));
+            found.push(follow(name, &field, start, options, Dopri5::new(tolerance(1e-6))));
+            found.push(follow(name, &field, start, options, Radau5::new(tolerance(1e-6))));
+            found.push(follow(name, &field, start, options, Layered::new(tolerance(1e-7))));
         }
     }
     hold(&found, HYSTERETIC);
@@ -522,8 +530,8 @@ fn a_layered_series_has_the_degree_that_the_tolerance_asks_for() {
 fn a_crossing_that_a_cap_interrupts_is_the_same_crossing() {
     let field = caricature(Transition::Tanh, 1e-3);
     let end = |cap| {
-        let course = Course { step_cap: cap, ..Course::to(3.0) };
-        drive(&field, START.into(), &course, &mut Layered::new(tolerance(1e-10)), &mut Ignore, &()).unwrap()
+        let options = DriveOptions { step_cap: cap, ..DriveOptions::to(3.0) };
+        drive(&field, START.into(), &options, &mut Layered::new(tolerance(1e-10)), &mut Ignore, &()).unwrap()
     };
     let (whole, pieces) = (end(StepCap::None), end(StepCap::Absolute(3e-4)));
     assert!(pieces.statistics.steps > 20 * whole.statistics.steps);
@@ -602,7 +610,7 @@ fn lanes_tell_of_the_steps_that_may_meet_the_plane() {
     }
     let field = Smoothed { system: Caricature::with_reinjection(1e-1, 1e-4), transition: Transition::Tanh, eps: 1e-1 };
     let runs: Vec<Run<3>> = (0..8_u32)
-        .map(|k| Run { start: vector![0.1 + 0.05 * f64::from(k), 0.02, -1.0], course: Course::to(12.0) })
+        .map(|k| Run { start: vector![0.1 + 0.05 * f64::from(k), 0.02, -1.0], options: DriveOptions::to(12.0) })
         .collect();
     let size = tolerance(1e-4);
     let (mut told, mut all) = (0, 0);
@@ -613,7 +621,7 @@ fn lanes_tell_of_the_steps_that_may_meet_the_plane() {
                 .iter()
                 .map(|run| {
                     let mut may = May(plane, Vec::new(), 0);
-                    let _ = drive(&field, run.start, &run.course, &mut Dopri5::new(size), &mut may, &()).unwrap();
+                    let _ = drive(&field, run.start, &run.options, &mut Dopri5::new(size), &mut may, &()).unwrap();
                     all += may.2;
                     may.1
                 })
@@ -647,15 +655,15 @@ fn lanes_are_runs_alone() {
             let kick = Kick { every: 0.4, size: 1e-3, law: KickLaw::Sphere, seed: 7, stream: k.into() };
             let schedule = Schedule { restart_every: (k % 3 > 0).then_some(0.7), kick: (k % 5 == 4).then_some(kick) };
             let step_cap = [StepCap::None, StepCap::Absolute(0.1), StepCap::FractionOfSegment(0.1)][k as usize % 3];
-            let course = Course { schedule, step_cap, ..Course::to(0.5 + f64::from(k * 7 % 11) / 5.0) };
-            Run { start: vector![0.1 + 0.01 * f64::from(k), 0.0, -1.0], course }
+            let options = DriveOptions { schedule, step_cap, ..DriveOptions::to(0.5 + f64::from(k * 7 % 11) / 5.0) };
+            Run { start: vector![0.1 + 0.01 * f64::from(k), 0.0, -1.0], options }
         })
         .collect();
     let sizes: Vec<Tolerance> = (0..runs.len()).map(|i| tolerance([1e-7, 1e-4, 1e-9][i % 3])).collect();
     runs[5].start[0] = f64::NAN;
     runs[6].start[1] = 1e200;
-    runs[7].course.t_end = 0.0;
-    runs[8].course.max_steps = 20;
+    runs[7].options.t_end = 0.0;
+    runs[8].options.max_steps = 20;
     // Beyond this corner from the start, after a while, or never.
     let corner = SVector::from([-10.0, 0.7, -10.0]);
     struct Stops(Option<SVector<f64, 3>>);
@@ -683,7 +691,7 @@ fn lanes_are_runs_alone() {
             .enumerate()
             .map(|(i, run)| {
                 let mut stops = Stops(corners.as_ref().map(|corners| corners[i]));
-                word(&drive(&field, run.start, &run.course, &mut Dopri5::new(sizes[i]), &mut stops, &()))
+                word(&drive(&field, run.start, &run.options, &mut Dopri5::new(sizes[i]), &mut stops, &()))
             })
             .collect();
         if corner.is_some() {
@@ -710,7 +718,7 @@ fn lanes_are_runs_alone() {
             .zip(&sizes)
             .map(|(run, size)| {
                 let mut met = Met(Passages::default(), Vec::new());
-                let _ = drive(&field, run.start, &run.course, &mut Dopri5::new(*size), &mut met, &());
+                let _ = drive(&field, run.start, &run.options, &mut Dopri5::new(*size), &mut met, &());
                 met.1
             })
             .collect();
@@ -751,8 +759,10 @@ fn lanes_are_runs_alone() {
             }
             // A watch that refuses ends what is not finished; nothing is asked of it before so many steps.
             let mut finished = 0;
-            let long =
-                [Run { start: START.into(), course: Course { step_cap: StepCap::Absolute(1e-3), ..Course::to(50.0) } }];
+            let long = [Run {
+                start: START.into(),
+                options: DriveOptions { step_cap: StepCap::Absolute(1e-3), ..DriveOptions::to(50.0) },
+            }];
             let tolerances = Tolerances::All(size);
             let common = Common { tolerances, plane: None, corners: None, carried: None, watch: &Refuses };
             ensemble_watched(set, &field, &long, common, |_| Ignore, &mut |_, _| finished += 1);

@@ -13,7 +13,7 @@ use super::rest::{self, Rest};
 use super::run::Run;
 use super::spec::{Observation, RunSpec, SpecError, SwitchSpec};
 use super::table::{Column, Entry, Table};
-use twofold_analyse::branch::{self, Course, End, Newton, Obstacle, Orbit, ReturnMap, Trouble};
+use twofold_analyse::branch::{self, BranchOptions, End, Newton, Obstacle, Orbit, ReturnMap, Trouble};
 use twofold_analyse::filippov_return;
 use twofold_analyse::floquet::{self, ReturnPlane, Returned};
 use twofold_instances::{Motions, Returns};
@@ -141,11 +141,16 @@ impl Question for ClosedOrbit {
         };
         let mut answer = self.facts(&first, returns);
         let Some(along) = &self.along else { return Ok(answer) };
-        let course =
-            Course { from: along.from, to: along.to, longest: 1.0 / along.steps as f64, most: along.most, newton };
+        let options = BranchOptions {
+            from: along.from,
+            to: along.to,
+            longest: 1.0 / along.steps as f64,
+            most: along.most,
+            newton,
+        };
         let width = (along.to - along.from).abs();
         let mut go_on = |orbit: &Orbit| watch.reached(((orbit.parameter - along.from) / width).abs().min(1.0));
-        let found = branch::follow(&map, first, &course, &mut go_on);
+        let found = branch::follow(&map, first, &options, &mut go_on);
         if found.end == End::Interrupted {
             answer.stop = Stop::Interrupted;
         }

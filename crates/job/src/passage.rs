@@ -11,7 +11,7 @@ use super::spec::{SpecError, SwitchSpec};
 use super::table::{Column, Entry, Table};
 use twofold_analyse::passage::{self, Passage, PassageQuestion};
 use twofold_instances::{self as instances, How, Orbits};
-use twofold_integrate::{Course, Method, Schedule, Statistics, StepCap, Tolerance, Watch};
+use twofold_integrate::{DriveOptions, Method, Schedule, Statistics, StepCap, Tolerance, Watch};
 use twofold_system::{System, Transition};
 
 /// How the smoothed orbit passes the two-fold at the origin. Table `passage`: one row with the visit's time and the places of leaving (`left_`), of the first
@@ -140,14 +140,14 @@ impl Leaving {
         let mut work = Statistics::default();
         for (at, schedule) in &self.runs {
             let mut leaving = passage::Leaving::new(eps);
-            let course = Course {
+            let options = DriveOptions {
                 schedule: *schedule,
                 step_cap: StepCap::Absolute(self.longest_step * eps),
                 max_steps: 100_000_000,
-                ..Course::to(self.by)
+                ..DriveOptions::to(self.by)
             };
             let tolerance = Tolerance { rtol: self.tolerance, atol: self.tolerance };
-            let how = How { method: Method::Dopri5, tolerance, precision: None, order: None, course };
+            let how = How { method: Method::Dopri5, tolerance, precision: None, order: None, options };
             let end = field.orbit(start(*at), &how, &mut leaving, &())?.within_budget()?;
             work += &end.statistics;
             let mut row: Vec<Entry> = vec![eps.into()];

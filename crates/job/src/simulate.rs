@@ -16,7 +16,7 @@ use twofold_integrate::delay::{DelayError, DelayedSwitch};
 use twofold_integrate::filippov::{
     self, AllModes, ExitRule, Faces, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent,
 };
-use twofold_integrate::{Course, Flow, Observer, Statistics, Step, StopReason, Summary, Watch};
+use twofold_integrate::{DriveOptions, Flow, Observer, Statistics, Step, StopReason, Summary, Watch};
 use twofold_system::{Bound, BoundField, Field};
 
 /// Computes a run of a system with three states.
@@ -571,8 +571,9 @@ fn observed<const D: usize, const N: usize>(
 /// How the run is made; `states` of the equation's components are the system's.
 fn how(spec: &RunSpec, states: usize) -> How {
     let MethodSpec { name, tolerance, step_cap, max_steps, precision, order } = spec.method;
-    let course = Course { t_end: spec.t_end, schedule: spec.schedule, step_cap, max_steps, kicked_states: states };
-    How { method: name, tolerance, precision, order, course }
+    let options =
+        DriveOptions { t_end: spec.t_end, schedule: spec.schedule, step_cap, max_steps, kicked_states: states };
+    How { method: name, tolerance, precision, order, options }
 }
 
 #[cfg(test)]

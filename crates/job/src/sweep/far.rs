@@ -4,7 +4,7 @@
 //! can take away. On the edge y = c of the quadrant y, z >= c is w >= 2 c^2, so wherever (alpha - beta c) 2 c^2 > m no orbit leaves the
 //! quadrant, whatever its x. Inside, x falls where it is positive and rises where it is negative: the orbit slides to the stiff
 //! state near (0, alpha/beta, alpha/beta), where an explicit method needs some 10^4 steps per unit of time. A run that enters
-//! the quadrant has its fate; following it further would only look like a hang.
+//! the quadrant ends in that state; following it further would only look like a hang.
 
 use crate::spec::{RunSpec, SwitchSpec};
 use twofold_num::elementary::sqrt;

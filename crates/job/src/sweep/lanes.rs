@@ -18,7 +18,7 @@ use twofold_analyse::SectionRecorder;
 use twofold_analyse::path::MOST_POINTS;
 use twofold_instances::{self as instances, Lanes};
 use twofold_integrate::ensemble::{Common, End, InstructionSet, Run, SectionPlane, Tolerances};
-use twofold_integrate::{Course, StopReason, Summary, Watch};
+use twofold_integrate::{DriveOptions, StopReason, Summary, Watch};
 use twofold_system::{BindError, BoundField, Field, ParameterBatch};
 
 /// Fewer cells than this are computed one after the other.
@@ -311,7 +311,7 @@ fn side_by_side<const N: usize>(
 ) -> Result<bool, JobError> {
     let first = cells[0].run();
     let plane = cells[0].plane();
-    let runs: Vec<Run<N>> = cells.iter().map(|cell| course(cell.run())).collect();
+    let runs: Vec<Run<N>> = cells.iter().map(|cell| options(cell.run())).collect();
     // y and z, as `OutcomeQuestion` looks at them; systems that have such a corner have three states. No state is above infinity.
     let corners: Vec<SVector<f64, N>> = cells
         .iter()
@@ -428,16 +428,16 @@ fn exponents(
     Ok(())
 }
 
-fn course<const N: usize>(run: &RunSpec) -> Run<N> {
+fn options<const N: usize>(run: &RunSpec) -> Run<N> {
     let start = SVector::from_fn(|i, _| run.start.get(i).copied().unwrap_or(f64::NAN));
-    let course = Course {
+    let options = DriveOptions {
         t_end: run.t_end,
         schedule: run.schedule,
         step_cap: run.method.step_cap,
         max_steps: run.method.max_steps,
         kicked_states: N,
     };
-    Run { start, course }
+    Run { start, options }
 }
 
 /// As [`simulate_until`](crate::simulate::simulate_until) has it.
