@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use nalgebra::{SVector, vector};
 use twofold::analyse::SectionRecorder;
-use twofold::integrate::ensemble::{InstructionSet, Run, ensemble_with};
+use twofold::integrate::ensemble::{EnsembleRun, InstructionSet, ensemble_with};
 use twofold::integrate::{
     Dopri5, DriveOptions, Failure, Ignore, Layered, Lsoda, Radau5, Schedule, StepCap, Stepper, Taylor, Tolerance, drive,
 };
@@ -78,7 +78,7 @@ fn w2<F: VectorField<3>, M: Stepper<3>>(field: &F, make: impl Fn() -> M) -> Done
 /// W2 in lanes.
 fn w2_in_lanes<E: BatchedField<3>>(equations: &E, set: InstructionSet) -> Done {
     let options = DriveOptions { step_cap: StepCap::Absolute(10.0), ..DriveOptions::to(2000.0) };
-    let run = |k: u32| Run { start: vector![0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0, 0.0, -1.0], options };
+    let run = |k: u32| EnsembleRun { start: vector![0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0, 0.0, -1.0], options };
     let runs: Vec<_> = (0..1000).map(run).collect();
     let ends = ensemble_with(set, equations, &runs, TOLERANCE, None, |_| Ignore);
     ends.into_iter().try_fold((0, 0, vector![0.0, 0.0, 0.0]), |done, end| {

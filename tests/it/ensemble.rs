@@ -2,7 +2,7 @@
 
 use nalgebra::{SVector, vector};
 use twofold::analyse::SectionRecorder;
-use twofold::integrate::ensemble::{End, InstructionSet, Run, SectionPlane, ensemble, ensemble_with};
+use twofold::integrate::ensemble::{End, EnsembleRun, InstructionSet, SectionPlane, ensemble, ensemble_with};
 use twofold::integrate::{
     Dopri5, DriveOptions, Flow, Ignore, Kick, KickLaw, Observer, Schedule, Step, StepCap, StopReason, Tolerance, drive,
 };
@@ -20,7 +20,7 @@ fn field() -> Smoothed<Caricature> {
 }
 
 /// Runs of different lengths, under different schedules and caps; one that cannot begin, one that has nothing to do, one with a small budget.
-fn runs() -> Vec<Run<3>> {
+fn runs() -> Vec<EnsembleRun<3>> {
     let mut runs: Vec<_> = (0..37_u32)
         .map(|k| {
             let kick = Kick { every: 0.9, size: 1e-3, law: KickLaw::Sphere, seed: 7, stream: k.into() };
@@ -32,7 +32,7 @@ fn runs() -> Vec<Run<3>> {
                 max_steps: 50_000,
                 ..DriveOptions::to(2.0 + f64::from(k * 11 % 17))
             };
-            Run { start: vector![0.1 + 0.01 * f64::from(k), 0.0, -1.0], options }
+            EnsembleRun { start: vector![0.1 + 0.01 * f64::from(k), 0.0, -1.0], options }
         })
         .collect();
     runs[5].start[0] = f64::NAN;
@@ -41,7 +41,7 @@ fn runs() -> Vec<Run<3>> {
     runs
 }
 
-fn alone<O: Observer<3>>(run: &Run<3>, mut observer: O) -> End<O, 3> {
+fn alone<O: Observer<3>>(run: &EnsembleRun<3>, mut observer: O) -> End<O, 3> {
     let mut stepper = Dopri5::new(TOLERANCE);
     let summary = drive(&field(), run.start, &run.options, &mut stepper, &mut observer, &());
     End { summary, observer }
@@ -149,8 +149,9 @@ fn failures_are_those_of_a_run_alone() {
             vector![x[0] * x[0]]
         }
     }
-    let runs: Vec<Run<1>> =
-        (0..MANY).map(|k| Run { start: vector![0.25 * f64::from(k) - 4.0], options: DriveOptions::to(1.0) }).collect();
+    let runs: Vec<EnsembleRun<1>> = (0..MANY)
+        .map(|k| EnsembleRun { start: vector![0.25 * f64::from(k) - 4.0], options: DriveOptions::to(1.0) })
+        .collect();
     let word = |summary: &Result<twofold::integrate::Summary<1>, twofold::integrate::Failure>| format!("{summary:?}");
     let expected: Vec<_> = runs
         .iter()
@@ -179,8 +180,8 @@ fn a_trial_that_has_no_value_is_repeated_as_in_a_run_alone() {
         }
     }
     let coarse = Tolerance { rtol: 1e-2, atol: 1e-2 };
-    let runs: Vec<Run<2>> = (0..MANY)
-        .map(|k| Run {
+    let runs: Vec<EnsembleRun<2>> = (0..MANY)
+        .map(|k| EnsembleRun {
             start: vector![0.3 + 0.02 * f64::from(k), 0.05 * f64::from(k % 3)],
             options: DriveOptions::to(9.0),
         })

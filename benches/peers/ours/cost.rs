@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use nalgebra::vector;
 use twofold::analyse::SectionRecorder;
-use twofold::integrate::ensemble::{Run, SectionPlane, ensemble};
+use twofold::integrate::ensemble::{EnsembleRun, SectionPlane, ensemble};
 use twofold::integrate::{
     Dopri5, DriveOptions, Layered, Lsoda, Radau5, Schedule, StepCap, Stepper, StopReason, Taylor, Tolerance, drive,
 };
@@ -89,7 +89,7 @@ fn main() {
     }
     // 512 runs in lanes, sections recorded, on one thread and on two: of the clock, so an idle machine is needed.
     let runs: Vec<_> = (0..512)
-        .map(|k| Run { start: vector![0.1 + 0.2 * f64::from(k) / 512.0, 0.0, -1.0], options: options(2e3) })
+        .map(|k| EnsembleRun { start: vector![0.1 + 0.2 * f64::from(k) / 512.0, 0.0, -1.0], options: options(2e3) })
         .collect();
     let plane = Some(SectionPlane { coordinate: 1, value: 0.0 });
     let tolerance = Tolerance { rtol: TOLERANCE, atol: TOLERANCE };

@@ -16,7 +16,7 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use super::tangent::Tangent;
-use twofold_integrate::ensemble::{Carried, Common, InstructionSet, Run, Tolerances, ensemble_watched};
+use twofold_integrate::ensemble::{Carried, Common, EnsembleRun, InstructionSet, Tolerances, ensemble_watched};
 use twofold_integrate::{
     Dopri5, DriveOptions, Failure, Flow, Kick, Kicker, Observer, Step, StepCap, Stepper, Tolerance, Watch,
 };
@@ -239,7 +239,7 @@ pub fn largest_side_by_side<const N: usize, const M: usize, E: BatchedField<M>>(
     let stops: Vec<f64> = (0..=BLOCKS).map(|block| block_end(settings, block)).skip_while(|end| *end <= 0.0).collect();
     let options =
         DriveOptions { step_cap: StepCap::Absolute(max_step), max_steps, ..DriveOptions::to(transient + duration) };
-    let runs: Vec<Run<M>> = starts.iter().map(|x0| Run { start: begin(x0), options }).collect();
+    let runs: Vec<EnsembleRun<M>> = starts.iter().map(|x0| EnsembleRun { start: begin(x0), options }).collect();
     let carried = Carried { first: N, range: [1.0 / RANGE, RANGE], stops: &stops };
     let tolerances = Tolerances::All(tolerance);
     let common = Common { tolerances, plane: None, corners: None, carried: Some(carried), watch };

@@ -28,7 +28,7 @@ use twofold_system::{BatchedField, VectorField};
 
 /// A start and what is to happen from there.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Run<const N: usize> {
+pub struct EnsembleRun<const N: usize> {
     /// The state at time 0.
     pub start: SVector<f64, N>,
     /// How far and by what rules.
@@ -151,7 +151,7 @@ impl InstructionSet {
 /// If `equations` are those of fewer runs than `runs`.
 pub fn ensemble<E, O, const N: usize>(
     equations: &E,
-    runs: &[Run<N>],
+    runs: &[EnsembleRun<N>],
     tolerance: Tolerance,
     plane: Option<SectionPlane>,
     observer: impl Fn(usize) -> O,
@@ -167,7 +167,7 @@ where
 pub fn ensemble_with<E, O, const N: usize>(
     set: InstructionSet,
     equations: &E,
-    runs: &[Run<N>],
+    runs: &[EnsembleRun<N>],
     tolerance: Tolerance,
     plane: Option<SectionPlane>,
     observer: impl Fn(usize) -> O,
@@ -189,7 +189,7 @@ where
 pub fn ensemble_watched<E, O, const N: usize>(
     set: InstructionSet,
     equations: &E,
-    runs: &[Run<N>],
+    runs: &[EnsembleRun<N>],
     common: Common<'_, N>,
     observer: impl Fn(usize) -> O,
     finished: &mut dyn FnMut(usize, End<O, N>),
@@ -225,7 +225,7 @@ where
 /// The whole task, for `K` registers.
 struct All<'a, E, O, M: Fn(usize) -> O, const N: usize, const K: usize> {
     equations: &'a E,
-    runs: &'a [Run<N>],
+    runs: &'a [EnsembleRun<N>],
     common: Common<'a, N>,
     observer: M,
     finished: &'a mut dyn FnMut(usize, End<O, N>),
@@ -422,7 +422,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         l: usize,
         equations: &E,
         run: usize,
-        Run { start, options }: &Run<N>,
+        EnsembleRun { start, options }: &EnsembleRun<N>,
         mut segments: Box<dyn Iterator<Item = Segment>>,
         tolerance: Tolerance,
         observer: O,

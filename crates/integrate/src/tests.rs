@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 use nalgebra::{SVector, vector};
 
-use super::ensemble::{Common, InstructionSet, Run, SectionPlane, Tolerances, ensemble_watched};
+use super::ensemble::{Common, EnsembleRun, InstructionSet, SectionPlane, Tolerances, ensemble_watched};
 use super::filippov::{
     AllModes, ExitRule, FilippovObserver, FilippovOptions, FunnelGrid, Mode, ModeEvent, Side, SlidingFlow, SlidingLaw,
     connect, funnel, history, run, run_two_surfaces,
@@ -609,8 +609,8 @@ fn lanes_tell_of_the_steps_that_may_meet_the_plane() {
         }
     }
     let field = Smoothed { system: Caricature::with_reinjection(1e-1, 1e-4), transition: Transition::Tanh, eps: 1e-1 };
-    let runs: Vec<Run<3>> = (0..8_u32)
-        .map(|k| Run { start: vector![0.1 + 0.05 * f64::from(k), 0.02, -1.0], options: DriveOptions::to(12.0) })
+    let runs: Vec<EnsembleRun<3>> = (0..8_u32)
+        .map(|k| EnsembleRun { start: vector![0.1 + 0.05 * f64::from(k), 0.02, -1.0], options: DriveOptions::to(12.0) })
         .collect();
     let size = tolerance(1e-4);
     let (mut told, mut all) = (0, 0);
@@ -650,13 +650,13 @@ impl Watch for Refuses {
 fn lanes_are_runs_alone() {
     let field = Smoothed { system: Caricature::with_reinjection(1e-1, 1e-4), transition: Transition::Tanh, eps: 1e-2 };
     let size = tolerance(1e-7);
-    let mut runs: Vec<Run<3>> = (0..13_u32)
+    let mut runs: Vec<EnsembleRun<3>> = (0..13_u32)
         .map(|k| {
             let kick = Kick { every: 0.4, size: 1e-3, law: KickLaw::Sphere, seed: 7, stream: k.into() };
             let schedule = Schedule { restart_every: (k % 3 > 0).then_some(0.7), kick: (k % 5 == 4).then_some(kick) };
             let step_cap = [StepCap::None, StepCap::Absolute(0.1), StepCap::FractionOfSegment(0.1)][k as usize % 3];
             let options = DriveOptions { schedule, step_cap, ..DriveOptions::to(0.5 + f64::from(k * 7 % 11) / 5.0) };
-            Run { start: vector![0.1 + 0.01 * f64::from(k), 0.0, -1.0], options }
+            EnsembleRun { start: vector![0.1 + 0.01 * f64::from(k), 0.0, -1.0], options }
         })
         .collect();
     let sizes: Vec<Tolerance> = (0..runs.len()).map(|i| tolerance([1e-7, 1e-4, 1e-9][i % 3])).collect();
@@ -759,7 +759,7 @@ fn lanes_are_runs_alone() {
             }
             // A watch that refuses ends what is not finished; nothing is asked of it before so many steps.
             let mut finished = 0;
-            let long = [Run {
+            let long = [EnsembleRun {
                 start: START.into(),
                 options: DriveOptions { step_cap: StepCap::Absolute(1e-3), ..DriveOptions::to(50.0) },
             }];

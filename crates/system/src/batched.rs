@@ -54,14 +54,14 @@ impl<F: VectorField<N>, const N: usize> BatchedField<N> for F {
 /// An equation for each run, that differ in numbers alone: in the values of parameters, in the width of a layer.
 ///
 /// ```
-/// use twofold_integrate::ensemble::{Run, ensemble};
+/// use twofold_integrate::ensemble::{EnsembleRun, ensemble};
 /// use twofold_integrate::{DriveOptions, Ignore, Tolerance};
 /// use twofold_system::{ParameterBatch, Field, System, Transition};
 /// let caricature = System::builtin("caricature").expect("built in");
 /// let widths = [1e-2, 3e-3, 1e-3];
 /// let fields = widths.map(|eps| Field::smoothed(&caricature, Transition::Tanh, eps).bind::<3>().expect("three states"));
 /// let batch = ParameterBatch::new(fields.to_vec()).expect("one system");
-/// let run = Run { start: [0.2, 0.0, -1.0].into(), options: DriveOptions::to(5.0) };
+/// let run = EnsembleRun { start: [0.2, 0.0, -1.0].into(), options: DriveOptions::to(5.0) };
 /// let ends = ensemble(&batch, &[run; 3], Tolerance { rtol: 1e-8, atol: 1e-8 }, None, |_| Ignore);
 /// assert!(ends.iter().all(|end| end.summary.is_ok()));
 /// ```

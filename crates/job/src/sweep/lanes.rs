@@ -17,7 +17,7 @@ use crate::table::Entry;
 use twofold_analyse::SectionRecorder;
 use twofold_analyse::path::MOST_POINTS;
 use twofold_instances::{self as instances, Lanes};
-use twofold_integrate::ensemble::{Common, End, InstructionSet, Run, SectionPlane, Tolerances};
+use twofold_integrate::ensemble::{Common, End, EnsembleRun, InstructionSet, SectionPlane, Tolerances};
 use twofold_integrate::{DriveOptions, StopReason, Summary, Watch};
 use twofold_system::{BindError, BoundField, Field, ParameterBatch};
 
@@ -311,7 +311,7 @@ fn side_by_side<const N: usize>(
 ) -> Result<bool, JobError> {
     let first = cells[0].run();
     let plane = cells[0].plane();
-    let runs: Vec<Run<N>> = cells.iter().map(|cell| options(cell.run())).collect();
+    let runs: Vec<EnsembleRun<N>> = cells.iter().map(|cell| options(cell.run())).collect();
     // y and z, as `OutcomeQuestion` looks at them; systems that have such a corner have three states. No state is above infinity.
     let corners: Vec<SVector<f64, N>> = cells
         .iter()
@@ -428,7 +428,7 @@ fn exponents(
     Ok(())
 }
 
-fn options<const N: usize>(run: &RunSpec) -> Run<N> {
+fn options<const N: usize>(run: &RunSpec) -> EnsembleRun<N> {
     let start = SVector::from_fn(|i, _| run.start.get(i).copied().unwrap_or(f64::NAN));
     let options = DriveOptions {
         t_end: run.t_end,
@@ -437,7 +437,7 @@ fn options<const N: usize>(run: &RunSpec) -> Run<N> {
         max_steps: run.method.max_steps,
         kicked_states: N,
     };
-    Run { start, options }
+    EnsembleRun { start, options }
 }
 
 /// As [`simulate_until`](crate::simulate::simulate_until) has it.
