@@ -22,11 +22,11 @@ use twofold::system::{System, Transition};
 
 /// The start of the paper's runs.
 const START: [f64; 3] = [0.2, 0.0, -1.0];
-/// Passages through y = 0 are compared.
+/// Crossings of y = 0 are compared.
 const SECTION: SectionPlane = SectionPlane { coordinate: 1, value: 0.0 };
 /// The stiffness parameter of the left panel.
 const EPS: f64 = 1e-3;
-/// Passages are compared up to this time.
+/// Crossings are compared up to this time.
 const T_END: f64 = 100.0;
 /// A passage this close to the singularity is a visit.
 const NEAR: f64 = 0.05;

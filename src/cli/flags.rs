@@ -136,7 +136,7 @@ pub struct RunFlags {
     /// Stream of the random numbers: one per run [default: 0].
     #[arg(long, allow_negative_numbers = true, help_heading = "Random numbers")]
     pub stream: Option<u64>,
-    /// Record passages through a plane instead of the path, such as y=0.
+    /// Record crossings of a plane instead of the path, such as y=0.
     #[arg(long, value_name = "COORDINATE=VALUE", help_heading = "Recording")]
     pub section: Option<String>,
     /// Largest distance between the path's polyline and the dense output [default: 0.001; of a picture 0.0001].
@@ -167,12 +167,12 @@ pub enum Switch {
 /// What a command makes of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Use {
-    /// `twofold run`: the path, or passages if a section is given.
+    /// `twofold run`: the path, or crossings if a section is given.
     Any,
     /// `twofold plot`: the same, the path by default ten times closer to the dense output.
     Picture,
-    /// `twofold sweep`: passages in any case.
-    Passages,
+    /// `twofold sweep`: crossings in any case.
+    Crossings,
     /// `twofold orbit`: a closed orbit through the plane that --section gives.
     Orbit,
     /// `twofold lyapunov`: an average along the orbit.
@@ -182,7 +182,7 @@ pub enum Use {
 impl Use {
     /// Whether the command follows an orbit as `twofold run` does.
     fn is_a_run(self) -> bool {
-        matches!(self, Use::Any | Use::Picture | Use::Passages)
+        matches!(self, Use::Any | Use::Picture | Use::Crossings)
     }
 
     /// Whether it records the orbit's path.
@@ -502,7 +502,7 @@ impl RunFlags {
         (varied && !used_elsewhere).then(|| Coordinate::Eps.to_string())
     }
 
-    /// The spec that the flags describe, checked. For [`Use::Passages`] a path becomes its passages through the plane where the second
+    /// The spec that the flags describe, checked. For [`Use::Crossings`] a path becomes its crossings of the plane where the second
     /// coordinate is zero.
     ///
     /// # Errors
@@ -530,7 +530,7 @@ impl RunFlags {
                 self.unchecked(command)?
             }
         };
-        if command == Use::Passages
+        if command == Use::Crossings
             && let Observation::Path { .. } | Observation::Times { .. } = spec.observe
         {
             if let SwitchSpec::Filippov { funnel: Some(_), .. } = spec.switch {
@@ -616,7 +616,7 @@ impl RunFlags {
                     order: None,
                 }
             }
-            Use::Any | Use::Picture | Use::Passages => {}
+            Use::Any | Use::Picture | Use::Crossings => {}
         }
         let method = MethodSpec {
             name: defaults.name,
@@ -855,7 +855,7 @@ mod tests {
     #[test]
     fn no_flag_is_ignored_on_any_run() {
         let (mut tried, mut refused) = (0, 0);
-        for command in [Use::Any, Use::Picture, Use::Passages, Use::Orbit, Use::Exponent] {
+        for command in [Use::Any, Use::Picture, Use::Crossings, Use::Orbit, Use::Exponent] {
             let mut kinds = kinds();
             kinds.extend([vec!["--every", "0.5"], vec!["--switch", "filippov", "--section", "y=0"]]);
             for kind in kinds {
@@ -863,7 +863,7 @@ mod tests {
                     // Refused by name as it stands; what these commands do take is among the others.
                     let fine = match command {
                         Use::Any | Use::Picture => kind.contains(&"filippov") && !kind.contains(&"--exit"),
-                        Use::Passages => {
+                        Use::Crossings => {
                             kind.contains(&"all") || kind.contains(&"--every") || !kind.contains(&"--exit")
                         }
                         Use::Orbit => {
@@ -934,7 +934,7 @@ mod tests {
             .chain([["start.x=1", "start.y=1", "start.z=1"].iter().map(|a| a.parse().unwrap()).collect()])
             .collect();
         let rows = |flags: &RunFlags, over: &[Axis]| {
-            let sweep = Sweep::new(flags.spec(Use::Passages).ok()?, over.to_vec(), None).ok()?;
+            let sweep = Sweep::new(flags.spec(Use::Crossings).ok()?, over.to_vec(), None).ok()?;
             Some((0..sweep.rows()).map(|row| sweep.question(row).map(|q| q.0.run)).collect::<Vec<_>>())
         };
         let (mut tried, mut refused) = (0, 0);
@@ -946,7 +946,7 @@ mod tests {
                     let (mut counts, mut works) = (false, false);
                     for value in *values {
                         let with = parse(&[&kind[..], &[flag, value]].concat());
-                        let same = |flags: &RunFlags| flags.spec(Use::Passages).ok();
+                        let same = |flags: &RunFlags| flags.spec(Use::Crossings).ok();
                         let Some(changed) = rows(&with, over) else { continue };
                         if same(&with) == same(&parse(&kind)) {
                             continue;

@@ -60,12 +60,12 @@ struct Section {
     value: f64,
     shown: [usize; 2],
     points: Vec<SectionPoint>,
-    passages: roots::Passages,
+    passages: roots::CrossingFinder,
 }
 
 impl<const N: usize> Observer<N> for Section {
     fn step(&mut self, step: &Step<'_, N>) -> Flow {
-        for roots::Passage { theta, .. } in self.passages.through_plane(step, self.axis, self.value) {
+        for roots::Crossing { theta, .. } in self.passages.through_plane(step, self.axis, self.value) {
             let x = step.at(theta);
             let upward = step.x1[self.axis] > step.x0[self.axis];
             self.points.push(SectionPoint { t: step.time(theta), u: self.shown.map(|k| x[k]), upward });
@@ -95,7 +95,7 @@ fn section_to<const N: usize, F: VectorField<N>>(
     shown: [usize; 2],
 ) -> Vec<SectionPoint> {
     let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
-    let mut seen = Section { axis, value, shown, points: Vec::new(), passages: roots::Passages::default() };
+    let mut seen = Section { axis, value, shown, points: Vec::new(), passages: roots::CrossingFinder::default() };
     let mut stepper = Dopri5::new(tolerance);
     let options = DriveOptions { step_cap: StepCap::Absolute(0.5), ..DriveOptions::to(t_end) };
     let end = drive(field, x0, &options, &mut stepper, &mut seen, &()).unwrap();

@@ -696,10 +696,10 @@ fn reference(name: &str, rows: usize) -> Vec<[f64; 3]> {
 fn the_smoothed_reference_lies_within_eps() {
     // Before the first visit the smoothed orbit with eps = 1e-3 is O(eps) from the Filippov orbit.
     use twofold::integrate::filippov::AllModes;
-    use twofold::integrate::roots::Passages;
+    use twofold::integrate::roots::CrossingFinder;
     use twofold::integrate::{Flow, Observer, Step};
     #[derive(Default)]
-    struct Section(Vec<[f64; 3]>, Passages);
+    struct Section(Vec<[f64; 3]>, CrossingFinder);
     impl Observer<3> for Section {
         fn step(&mut self, step: &Step<'_, 3>) -> Flow {
             for passage in self.1.through_plane(step, 1, 0.0) {

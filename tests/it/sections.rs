@@ -1,7 +1,7 @@
-//! Passages through planes, found the quick way, against the whole search on every step of real runs.
+//! Crossings of planes, found the quick way, against the whole search on every step of real runs.
 
 use nalgebra::vector;
-use twofold::integrate::roots::{Passage, Passages, brent};
+use twofold::integrate::roots::{Crossing, CrossingFinder, brent};
 use twofold::integrate::{
     Dopri5, DriveOptions, Flow, Lsoda, Observer, Radau5, Schedule, Step, StepCap, Stepper, Taylor, Tolerance, drive,
 };
@@ -68,10 +68,10 @@ fn smallest(f: &impl Fn(f64) -> f64, mut a: f64, mut b: f64, sign: f64) -> (f64,
 
 /// Compares on every step, for several planes, and counts.
 struct Compared {
-    planes: Vec<(usize, f64, Passages)>,
+    planes: Vec<(usize, f64, CrossingFinder)>,
     steps: u64,
     passages: u64,
-    /// Steps with more than one passage of a plane.
+    /// Steps with more than one crossing of a plane.
     several: u64,
     /// Steps, by planes, that the bound alone decided.
     decided: u64,
@@ -87,7 +87,7 @@ impl Observer<3> for Compared {
             if h0 == 0.0 || h1 == 0.0 {
                 continue; // the rule for a step that begins or ends on the plane is another one now
             }
-            let thetas: Vec<u64> = found.iter().map(|p: &Passage| p.theta.to_bits()).collect();
+            let thetas: Vec<u64> = found.iter().map(|p: &Crossing| p.theta.to_bits()).collect();
             let all: Vec<u64> = whole_search(step, |x| x[c] - v).iter().map(|t| t.to_bits()).collect();
             assert_eq!(thetas, all, "t {} to {}, plane {c} = {v}: {} to {}", step.t0, step.t1, step.x0, step.x1);
             // Senses alternate, beginning from the side of the step's start and ending on that of its end.
@@ -116,7 +116,7 @@ fn compare<M: Stepper<3>>(name: &str, mut stepper: M, t_end: f64) {
         let field =
             Smoothed { system: Caricature::with_reinjection(alpha, 1e-5), transition: Transition::Tanh, eps: 1e-3 };
         let planes = [(1, 0.0), (0, 0.0), (2, 0.0), (0, 0.3), (1, -0.7), (2, 0.05), (0, 1e-3), (1, 1.0)]
-            .map(|(c, v)| (c, v, Passages::default()));
+            .map(|(c, v)| (c, v, CrossingFinder::default()));
         let mut compared = Compared { planes: planes.into(), steps: 0, passages: 0, several: 0, decided: 0 };
         let options = DriveOptions {
             t_end,
@@ -142,7 +142,7 @@ const TOLERANCE: Tolerance = Tolerance { rtol: 1.0536712e-8, atol: 1.0536712e-8 
 #[test]
 fn dopri5() {
     compare("dopri5", Dopri5::new(TOLERANCE), 600.0);
-    // Long steps: several passages in one are not rare.
+    // Long steps: several crossings in one are not rare.
     compare("dopri5, loose", Dopri5::new(Tolerance { rtol: 1e-3, atol: 1e-3 }), 600.0);
 }
 

@@ -11,7 +11,7 @@ use super::floquet::{Extent, FloquetOptions, ReturnPlane, Returned};
 use twofold_integrate::filippov::{
     self, EventKind, ExitRule, FilippovError, FilippovObserver, Mode, ModeEvent, Side, SlidingFlow,
 };
-use twofold_integrate::roots::Passages;
+use twofold_integrate::roots::CrossingFinder;
 use twofold_integrate::{Failure, Flow, Step};
 use twofold_system::filippov::sliding_field;
 use twofold_system::{PiecewiseSmooth, VectorField};
@@ -60,11 +60,11 @@ pub enum Error {
 /// What happened on the way, without when and where.
 type Itinerary = Vec<(std::mem::Discriminant<EventKind>, Option<Mode>, Option<Mode>)>;
 
-/// Watches for passages and set-valued moments.
+/// Watches for crossings and set-valued moments.
 struct Watch<const N: usize> {
     plane: ReturnPlane,
     returns: usize,
-    passages: Passages,
+    passages: CrossingFinder,
     same: Vec<(f64, SVector<f64, N>, Mode)>,
     opposite: Vec<Vec<f64>>,
     itinerary: Itinerary,
@@ -123,7 +123,7 @@ struct Plain<const N: usize> {
 const DIFFERENCE: f64 = 1e-5;
 const SHARES: [f64; 3] = [1.0, 0.1, 0.01];
 
-/// The return from `u`, a point of `plane`, after `returns` passages in its direction, with the derivative of the return map if it is asked for.
+/// The return from `u`, a point of `plane`, after `returns` crossings in its direction, with the derivative of the return map if it is asked for.
 ///
 /// # Errors
 /// [`enum@Error`].
@@ -223,7 +223,7 @@ where
     let watch = || Watch {
         plane,
         returns,
-        passages: Passages::default(),
+        passages: CrossingFinder::default(),
         same: Vec::new(),
         opposite: Vec::new(),
         itinerary: Vec::new(),
@@ -300,7 +300,7 @@ mod tests {
 
     #[test]
     fn returns_of_a_polynomial_are_its_roots() {
-        // Before the edge and after it the method is exact and its dense output, by which passages are found, is not: the passage is landed on. Where the edge
+        // Before the edge and after it the method is exact and its dense output, by which crossings are found, is not: the crossing is landed on. Where the edge
         // is crossed, the dense output says.
         for (edge, value, tolerance) in [(9.0, 0.0, 1e-5), (9.0, 0.7, 1e-5), (-9.0, -3.0, 1e-5), (-0.3, 0.7, 1e-12)] {
             let plane = ReturnPlane { axis: 1, value, upward: true };

@@ -9,7 +9,7 @@ use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 use super::tangent::Tangent;
-use twofold_integrate::roots::{self, Passages};
+use twofold_integrate::roots::{self, CrossingFinder};
 use twofold_integrate::{Dopri5, Failure, Stepper, Tolerance};
 use twofold_num::elementary::{ln, sqrt};
 use twofold_num::linear::{eigenvalues, solve};
@@ -212,9 +212,9 @@ pub struct Returned {
     /// The derivative of the return map, row by row; the row and the column of the plane's coordinate are zero. Empty where none was
     /// asked for.
     pub derivative: Vec<f64>,
-    /// Passages in the plane's direction, the last of them `point` as the dense output has it.
+    /// Crossings in the plane's direction, the last of them `point` as the dense output has it.
     pub same: Vec<Vec<f64>>,
-    /// Passages in the other direction.
+    /// Crossings in the other direction.
     pub opposite: Vec<Vec<f64>>,
     /// Diagonal of the box around the orbit up to there: the size of the loop.
     pub extent: f64,
@@ -226,7 +226,7 @@ pub struct Returned {
     pub events: usize,
 }
 
-/// The return from `u`, a point of `plane`, after `returns` passages in its direction, with the derivative of the return map: `tangent` is an
+/// The return from `u`, a point of `plane`, after `returns` crossings in its direction, with the derivative of the return map: `tangent` is an
 /// equation with its variational equation for `N` vectors, in `M` = `N` (`N` + 1) dimensions.
 ///
 /// # Errors
@@ -262,7 +262,7 @@ fn returned<const N: usize, const M: usize, T: VectorField<M>>(
         SVector::<f64, M>::from_fn(|i, _| if i < N { u[i] } else { f64::from(u8::from((i - N) / N == (i - N) % N)) });
     let mut t = 0.0;
     let (mut same, mut opposite) = (Vec::new(), Vec::new());
-    let mut passages = Passages::default();
+    let mut passages = CrossingFinder::default();
     let mut extent = Extent::new(&u);
     let passes = (tangent.eval(&state)[plane.axis] > 0.0) == plane.upward;
     stepper.restart(tangent, t, state, settings.longest_return, settings.max_step)?;
@@ -430,7 +430,7 @@ mod tests {
 
     #[test]
     fn returns_of_a_polynomial_are_its_roots() {
-        // The method is exact for it and its dense output is not: the passage is landed on, and what is left is mended.
+        // The method is exact for it and its dense output is not: the crossing is landed on, and what is left is mended.
         let settings = FloquetOptions { tolerance: Tolerance { rtol: 1e-5, atol: 1e-5 }, ..FloquetOptions::default() };
         for value in [0.0, 0.7, -3.0] {
             let plane = ReturnPlane { axis: 1, value, upward: true };

@@ -16,7 +16,7 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use super::reference::{ExtendedCrossing, ExtendedPoint, REFERENCE_TOLERANCE, SectionPlane, first_crossing, refine};
-use twofold_integrate::roots::Passages;
+use twofold_integrate::roots::CrossingFinder;
 use twofold_integrate::{Failure, Flow, Observer, Radau5, Statistics, Step, Stepper, Taylor, Tolerance};
 use twofold_num::elementary::sqrt;
 use twofold_num::{Arithmetic, DoubleDouble, Scalar};
@@ -150,7 +150,7 @@ pub struct Disturbed {
 /// The answer to a [`PassageQuestion`]. What did not happen in time is absent.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Passage {
+pub struct PassageAnswer {
     /// When y = 0 was passed within sqrt(eps) of the two-fold.
     pub visit: Option<f64>,
     /// Where the surface was left: [`Leaving`].
@@ -287,7 +287,7 @@ fn approach<F: VectorField<3>>(
 
 /// An orbit in extended precision: what happened, and states to start again from.
 struct Followed {
-    passage: Passage,
+    passage: PassageAnswer,
     steps: Vec<(DoubleDouble, ExtendedPoint)>,
 }
 
@@ -307,9 +307,9 @@ fn follow<F: VectorField<3>>(
         question.by,
         f64::INFINITY,
     )?;
-    let (mut sections, mut surfaces) = (Passages::default(), Passages::default());
+    let (mut sections, mut surfaces) = (CrossingFinder::default(), CrossingFinder::default());
     let mut leaving = Leaving::new(eps);
-    let mut found = Passage::default();
+    let mut found = PassageAnswer::default();
     let mut steps = vec![stepper.state()];
     while stepper.state().0.to_f64() < question.by {
         if stepper.statistics().steps >= MOST_STEPS {
@@ -428,11 +428,11 @@ fn growth<F: VectorField<3>>(
 ///
 /// # Errors
 /// [`Failure`] of an orbit.
-pub fn passage<F: VectorField<3>>(field: &F, eps: f64, question: &PassageQuestion) -> Result<Passage, Failure> {
+pub fn passage<F: VectorField<3>>(field: &F, eps: f64, question: &PassageQuestion) -> Result<PassageAnswer, Failure> {
     let mut work = Statistics::default();
     let start = SVector::from(question.start);
     let Some(near) = approach(field, start, eps, question.by, &mut work)? else {
-        return Ok(Passage { statistics: work, ..Passage::default() });
+        return Ok(PassageAnswer { statistics: work, ..PassageAnswer::default() });
     };
     let mut followed = follow(field, near, eps, question)?;
     growth(field, eps, &mut followed, question)?;
@@ -545,7 +545,7 @@ mod tests {
     }
 
     /// From (x, 0.05, 0) at eps = 0.01: y = 0 is passed at pi/2, 3 pi/2, ..., 0.068, 0.128, 0.240 and 0.451 from the two-fold.
-    fn screwed(crosses: f64, drift: f64, question: &PassageQuestion) -> Passage {
+    fn screwed(crosses: f64, drift: f64, question: &PassageQuestion) -> PassageAnswer {
         let start = [-crosses * drift, 0.05, 0.0];
         passage(&Screw { drift }, 1e-2, &PassageQuestion { start, ..question.clone() }).unwrap()
     }

@@ -4,7 +4,7 @@ use nalgebra::SVector;
 
 use super::section::Direction;
 pub use twofold_integrate::ensemble::SectionPlane;
-use twofold_integrate::{Failure, Statistics, Stepper, StopReason, Taylor, Tolerance, roots::Passages};
+use twofold_integrate::{Failure, Statistics, Stepper, StopReason, Taylor, Tolerance, roots::CrossingFinder};
 use twofold_num::Arithmetic;
 use twofold_num::{DoubleDouble, Elementary, Scalar};
 use twofold_system::VectorField;
@@ -28,7 +28,7 @@ impl<const N: usize> Surface<N> for SectionPlane {
     }
 }
 
-/// A passage through a surface, in double-double precision.
+/// A crossing of a surface, in double-double precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExtendedCrossing<const N: usize = 3> {
     /// Time.
@@ -77,7 +77,7 @@ pub fn reference<F: VectorField<N>, const N: usize>(
     }
     stepper.restart_from(field, DoubleDouble::zero(), x0, t_end, f64::INFINITY)?;
     let mut found = Vec::new();
-    let mut passages = Passages::default();
+    let mut passages = CrossingFinder::default();
     while found.len() < count && stepper.state().0.to_f64() < t_end {
         next_crossings(&mut stepper, field, &surface, &mut passages, |crossing| found.push(crossing))?;
     }
@@ -101,7 +101,7 @@ pub(super) fn first_crossing<F: VectorField<N>, const N: usize>(
     let mut stepper = Taylor::extended(REFERENCE_TOLERANCE);
     stepper.restart_from(field, t, x, t_end, f64::INFINITY)?;
     let mut found = None;
-    let mut passages = Passages::default();
+    let mut passages = CrossingFinder::default();
     while found.is_none() && stepper.state().0.to_f64() < t_end {
         next_crossings(&mut stepper, field, &surface, &mut passages, |c| {
             if found.is_none() && wanted(&c) {
@@ -122,7 +122,7 @@ fn next_crossings<F: VectorField<N>, const N: usize>(
     stepper: &mut Taylor<N, DoubleDouble>,
     field: &F,
     surface: &impl Surface<N>,
-    passages: &mut Passages,
+    passages: &mut CrossingFinder,
     mut found: impl FnMut(ExtendedCrossing<N>),
 ) -> Result<(), Failure> {
     if stepper.statistics().steps >= MOST_STEPS {

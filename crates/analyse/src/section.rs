@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::path::{MOST_POINTS, leading};
-use twofold_integrate::roots::Passages;
+use twofold_integrate::roots::CrossingFinder;
 use twofold_integrate::{Flow, Observer, Step};
 
 /// The sense in which an orbit passes through the section plane.
@@ -17,7 +17,7 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// The sense of a passage.
+    /// The sense of a crossing.
     pub(super) fn of(upward: bool) -> Self {
         if upward { Direction::Up } else { Direction::Down }
     }
@@ -31,7 +31,7 @@ impl Direction {
     }
 }
 
-/// A passage through the section plane.
+/// A crossing of the section plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing<const D: usize = 3> {
     /// Time.
@@ -42,36 +42,36 @@ pub struct Crossing<const D: usize = 3> {
     pub direction: Direction,
 }
 
-/// Records every passage through the plane `state[coordinate] = value`, in both senses, located on the dense output.
-/// What a passage is, [`Passages`] says.
+/// Records every crossing of the plane `state[coordinate] = value`, in both senses, located on the dense output.
+/// What a crossing is, [`CrossingFinder`] says.
 ///
-/// A kick that throws the state across the plane is not a passage of the flow and is not recorded. In a kicked run two
+/// A kick that throws the state across the plane is not a crossing of the flow and is not recorded. In a kicked run two
 /// neighbouring rows can therefore have the same sense: up to some 0.2 % were seen to.
 #[derive(Clone, Debug)]
 pub struct SectionRecorder<const D: usize = 3> {
     coordinate: usize,
     value: f64,
-    passages: Passages,
+    passages: CrossingFinder,
     crossings: Vec<Crossing<D>>,
 }
 
 impl<const D: usize> SectionRecorder<D> {
     /// A recorder for the plane `state[coordinate] = value`.
     pub fn new(coordinate: usize, value: f64) -> Self {
-        Self { coordinate, value, passages: Passages::default(), crossings: Vec::new() }
+        Self { coordinate, value, passages: CrossingFinder::default(), crossings: Vec::new() }
     }
 
-    /// The passages so far, in time order.
+    /// The crossings so far, in time order.
     pub fn crossings(&self) -> &[Crossing<D>] {
         &self.crossings
     }
 
-    /// The passages so far, which are forgotten.
+    /// The crossings so far, which are forgotten.
     pub fn take(&mut self) -> Vec<Crossing<D>> {
         std::mem::take(&mut self.crossings)
     }
 
-    /// The passages, in time order.
+    /// The crossings, in time order.
     pub fn into_crossings(self) -> Vec<Crossing<D>> {
         self.crossings
     }

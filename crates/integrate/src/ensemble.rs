@@ -879,7 +879,7 @@ fn bare<S: Simd, const N: usize, const K: usize>(v: &SVector<Registers<S, K>, N>
     parts
 }
 
-/// Where the step may meet the plane: as [`Passages::through_plane`](super::roots::Passages::through_plane) decides it.
+/// Where the step may meet the plane: as [`CrossingFinder::through_plane`](super::roots::CrossingFinder::through_plane) decides it.
 #[inline(always)]
 fn may_meet<S: Simd, const N: usize, const K: usize>(
     coordinate: usize,

@@ -65,45 +65,49 @@ fn brent_of(f: &mut dyn FnMut(f64) -> f64, a: f64, b: f64, fa: f64, fb: f64) -> 
     b
 }
 
-/// A passage from one side of a surface to the other.
+/// A crossing from one side of a surface to the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Passage {
+pub struct Crossing {
     /// The fraction of the step at which the surface is met.
     pub theta: f64,
     /// Whether the orbit comes from the negative side.
     pub upward: bool,
 }
 
-/// Finds an orbit's passages through a surface g = 0, step by step. The one rule of this program for what a passage and
+/// Finds an orbit's crossings of a surface g = 0, step by step. The one rule of this program for what a crossing and
 /// its sense are:
 ///
-/// - A passage is where g, having last been of one sign, is of the other. Its sense is that of the signs.
+/// - A crossing is where g, having last been of one sign, is of the other. Its sense is that of the signs.
 /// - So a zero is no side: an orbit that starts on the surface has not passed it, and one that touches it and turns back
-///   neither. A zero exactly at a step's end is decided by what follows, and if it is a passage it is reported once, at fraction 0 of
+///   neither. A zero exactly at a step's end is decided by what follows, and if it is a crossing it is reported once, at fraction 0 of
 ///   the next step.
-/// - A jump between two steps (a kick) to the other side is no passage; the new side counts from there.
+/// - A jump between two steps (a kick) to the other side is no crossing; the new side counts from there.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Passages {
+pub struct CrossingFinder {
     /// The sign last seen, or zero before any.
     side: f64,
 }
 
-impl Passages {
+impl CrossingFinder {
     /// Of an orbit that was last on the positive side, or on the other.
     pub fn starting(positive: bool) -> Self {
         Self { side: if positive { 1.0 } else { -1.0 } }
     }
 
-    /// The passages in `step`, in order. Nothing is allocated unless there is one.
+    /// The crossings in `step`, in order. Nothing is allocated unless there is one.
     ///
     /// `g` is sampled at two points more than the interpolant's degree; between samples that keep their sign, a smallest |g| in the
     /// middle is followed to its minimum, so that two zeros between neighbouring samples are found as well.
-    pub fn in_step<const N: usize>(&mut self, step: &Step<'_, N>, g: impl Fn(&SVector<f64, N>) -> f64) -> Vec<Passage> {
+    pub fn in_step<const N: usize>(
+        &mut self,
+        step: &Step<'_, N>,
+        g: impl Fn(&SVector<f64, N>) -> f64,
+    ) -> Vec<Crossing> {
         self.of(step.interpolant.degree(), &|theta| g(&step.at(theta)))
     }
 
-    /// [`Passages::in_step`] for a function of the fraction of the step, on an interpolant of this degree.
-    fn of(&mut self, degree: usize, value: &dyn Fn(f64) -> f64) -> Vec<Passage> {
+    /// [`CrossingFinder::in_step`] for a function of the fraction of the step, on an interpolant of this degree.
+    fn of(&mut self, degree: usize, value: &dyn Fn(f64) -> f64) -> Vec<Crossing> {
         let n = degree + 2;
         let sample = |i: usize| {
             let s = i as f64 / n as f64;
@@ -120,7 +124,7 @@ impl Passages {
                 let side = point.1.signum();
                 if side != self.side && self.side != 0.0 {
                     let theta = if last.1 == 0.0 { last.0 } else { brent(value, last.0, point.0, last.1, point.1) };
-                    found.push(Passage { theta, upward: side > 0.0 });
+                    found.push(Crossing { theta, upward: side > 0.0 });
                 }
                 self.side = side;
             }
@@ -156,9 +160,14 @@ impl Passages {
         found
     }
 
-    /// The passages through the plane x\[coordinate\] = value, as [`Passages::in_step`] finds them, after one cheap test: most steps
+    /// The crossings of the plane x\[coordinate\] = value, as [`CrossingFinder::in_step`] finds them, after one cheap test: most steps
     /// stay so far from the plane that [`Interpolant::reach`](super::Interpolant::reach) proves that they do not meet it.
-    pub fn through_plane<const N: usize>(&mut self, step: &Step<'_, N>, coordinate: usize, value: f64) -> Vec<Passage> {
+    pub fn through_plane<const N: usize>(
+        &mut self,
+        step: &Step<'_, N>,
+        coordinate: usize,
+        value: f64,
+    ) -> Vec<Crossing> {
         let (h0, h1) = (step.x0[coordinate] - value, step.x1[coordinate] - value);
         // Nothing can be proved of a zero or a NaN: both comparisons are false then.
         if h0 > 0.0 && h1 > 0.0 || h0 < 0.0 && h1 < 0.0 {
@@ -172,7 +181,7 @@ impl Passages {
         } else if (h0 > 0.0 && h1 < 0.0 || h0 < 0.0 && h1 > 0.0) && step.interpolant.is_monotone(coordinate) {
             self.side = h1.signum();
             let theta = brent(|theta| step.coordinate(theta, coordinate) - value, 0.0, 1.0, h0, h1);
-            return vec![Passage { theta, upward: h1 > 0.0 }];
+            return vec![Crossing { theta, upward: h1 > 0.0 }];
         }
         self.of(step.interpolant.degree(), &|theta| step.coordinate(theta, coordinate) - value)
     }
@@ -577,19 +586,19 @@ mod tests {
         }
     }
 
-    fn passages(c: [f64; 4]) -> Vec<Passage> {
+    fn passages(c: [f64; 4]) -> Vec<Crossing> {
         let p = Cubic(c);
         let step = Step { t0: 0.0, t1: 1.0, x0: p.at(0.0), x1: p.at(1.0), interpolant: &p };
-        Passages::default().in_step(&step, |x| x[0])
+        CrossingFinder::default().in_step(&step, |x| x[0])
     }
 
     fn zeros(c: [f64; 4]) -> Vec<f64> {
         passages(c).iter().map(|p| p.theta).collect()
     }
 
-    /// The senses of the passages through the plane x = `value` in steps given by their cubics, one after the other.
+    /// The senses of the crossings of the plane x = `value` in steps given by their cubics, one after the other.
     fn senses(value: f64, steps: &[[f64; 4]]) -> Vec<(usize, f64, bool)> {
-        let [mut by_plane, mut by_surface, mut by_proof] = [Passages::default(); 3];
+        let [mut by_plane, mut by_surface, mut by_proof] = [CrossingFinder::default(); 3];
         let mut found = Vec::new();
         for (i, c) in steps.iter().enumerate() {
             let p = Cubic(*c);
@@ -610,7 +619,7 @@ mod tests {
 
     #[test]
     fn the_sense_is_that_of_the_signs() {
-        // Two passages in one step, down and up, through a plane that is not 0: (s - 1/4)(s - 3/4) + 7.
+        // Two crossings in one step, down and up, through a plane that is not 0: (s - 1/4)(s - 3/4) + 7.
         let found = senses(7.0, &[[7.1875, -1.0, 1.0, 0.0]]);
         assert_eq!(found.iter().map(|f| f.2).collect::<Vec<_>>(), [false, true], "{found:?}");
         assert!((found[0].1 - 0.25).abs() < 1e-14 && (found[1].1 - 0.75).abs() < 1e-14, "{found:?}");
@@ -636,15 +645,15 @@ mod tests {
         // Through: reported once, at the start of the step that leaves to the other side.
         assert_eq!(senses(0.0, &[[-1.0, 1.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]]), [(1, 0.0, true)]);
         assert_eq!(senses(0.5, &[[1.5, -1.0, 0.0, 0.0], [0.5, -1.0, 0.0, 0.0]]), [(1, 0.0, false)]);
-        // Back to where it came from: a touch; the next passage still alternates.
+        // Back to where it came from: a touch; the next crossing still alternates.
         let touch = [[1.0, -1.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [1.0, -2.0, 0.0, 0.0]];
         assert_eq!(senses(0.0, &touch), [(2, 0.5, false)]);
         // A touch at a sample inside a step: |s - 2/5|, sampled at fifths.
         let p = Cubic([-0.4, 1.0, 0.0, 0.0]);
         let step = Step { t0: 0.0, t1: 1.0, x0: p.at(0.0), x1: p.at(1.0), interpolant: &p };
         assert_eq!(step.at(0.4)[0], 0.0);
-        assert_eq!(Passages::default().in_step(&step, |x| x[0].abs()), []);
-        assert_eq!(Passages::default().in_step(&step, |x| x[0]), [Passage { theta: 0.4, upward: true }]);
+        assert_eq!(CrossingFinder::default().in_step(&step, |x| x[0].abs()), []);
+        assert_eq!(CrossingFinder::default().in_step(&step, |x| x[0]), [Crossing { theta: 0.4, upward: true }]);
     }
 
     #[test]

@@ -12,7 +12,7 @@ use super::filippov::{
     AllModes, ExitRule, FilippovObserver, FilippovOptions, FunnelGrid, Mode, ModeEvent, Side, SlidingFlow, SlidingLaw,
     connect, funnel, history, run, run_two_surfaces,
 };
-use super::roots::Passages;
+use super::roots::CrossingFinder;
 use super::*;
 use twofold_num::{Elementary, MultiFloat};
 use twofold_system::{Bound, Caricature, Hysteretic, Relaxation, Smoothed, System, Transition, VectorField};
@@ -47,16 +47,16 @@ impl Write for Digest {
 struct Seen<const N: usize> {
     digest: Digest,
     steps: u64,
-    passages: Vec<Passages>,
+    passages: Vec<CrossingFinder>,
     passed: usize,
 }
 
 impl<const N: usize> Seen<N> {
     fn new() -> Self {
-        Self { digest: Digest::new(), steps: 0, passages: vec![Passages::default(); 2], passed: 0 }
+        Self { digest: Digest::new(), steps: 0, passages: vec![CrossingFinder::default(); 2], passed: 0 }
     }
 
-    /// What a run came to, in one line: its last words, its steps, the passages through a plane, the digest of everything.
+    /// What a run came to, in one line: its last words, its steps, the crossings of a plane, the digest of everything.
     fn line<E: std::fmt::Debug>(mut self, name: &str, end: &E) -> String {
         write!(self.digest, "{end:?}").unwrap();
         format!("{name}: {} steps, {} passages, {:016x}", self.steps, self.passed, self.digest.0)
@@ -700,8 +700,8 @@ fn lanes_are_runs_alone() {
                 "{alone:?}"
             );
         }
-        // Passages through the plane are those of a run alone.
-        struct Met(Passages, Vec<u64>);
+        // Crossings of the plane are those of a run alone.
+        struct Met(CrossingFinder, Vec<u64>);
         impl Observer<3> for Met {
             fn step(&mut self, step: &Step<'_, 3>) -> Flow {
                 for passage in self.0.through_plane(step, 1, 0.125) {
@@ -717,7 +717,7 @@ fn lanes_are_runs_alone() {
             .iter()
             .zip(&sizes)
             .map(|(run, size)| {
-                let mut met = Met(Passages::default(), Vec::new());
+                let mut met = Met(CrossingFinder::default(), Vec::new());
                 let _ = drive(&field, run.start, &run.options, &mut Dopri5::new(*size), &mut met, &());
                 met.1
             })
@@ -745,7 +745,7 @@ fn lanes_are_runs_alone() {
                 &field,
                 &cycled,
                 common,
-                |_| Met(Passages::default(), Vec::new()),
+                |_| Met(CrossingFinder::default(), Vec::new()),
                 &mut |i, end: ensemble::End<Met, 3>| {
                     assert!(ends[i].replace((word(&end.summary), end.observer.1)).is_none(), "run {i} ended twice");
                 },

@@ -184,7 +184,7 @@ mod tests {
         assert!(distance.iter().zip(tables[1].numbers("distance")).all(|(a, b)| (a - b).abs() < 1e-6 * a));
     }
 
-    /// Passages that are known already, one of which never came so far.
+    /// Crossings that are known already, one of which never came so far.
     #[test]
     fn where_smoothed_orbits_cross_is_their_passages_far_place() {
         let grid =

@@ -27,7 +27,7 @@ use twofold_system::{Bound, BoundField, Field, System};
 /// Smoothed and hysteretic systems: the return map's derivative is exact (variational equation). Discontinuous ones: by differences,
 /// through crossings and sliding; grazing and set-valued orbits are refused (see [`filippov_return`]).
 ///
-/// Tables: `orbit` (its passages through the plane), `branch` (a row per orbit) and `bifurcations` if a parameter is followed. Facts: `period`,
+/// Tables: `orbit` (its crossings of the plane), `branch` (a row per orbit) and `bifurcations` if a parameter is followed. Facts: `period`,
 /// `multipliers` (real, imaginary), `multiplier_error`, `stability`, `largest_modulus`, `rate`, `residual`, `iterations`, `returns`, `point`; `end` of the branch.
 /// Where the motion comes to a rest: the table `rest` and the fact `rest` alone.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -42,7 +42,7 @@ pub struct ClosedOrbit {
     pub settle: f64,
     /// The plane.
     pub plane: ReturnPlane,
-    /// Passages per turn in the plane's direction; none: as many as the settled motion shows.
+    /// Crossings per turn in the plane's direction; none: as many as the settled motion shows.
     pub returns: Option<usize>,
     /// Local error of the orbit and its tangent vectors.
     pub tolerance: Tolerance,
@@ -89,7 +89,7 @@ const ROUGHLY: f64 = 10.0;
 const ITERATIONS: usize = 30;
 /// Most returns that are looked for in a settled motion.
 const MOST_RETURNS: usize = 32;
-/// Two passages this near, in shares of their size, are taken for one when returns are counted: Newton's method then decides.
+/// Two crossings this near, in shares of their size, are taken for one when returns are counted: Newton's method then decides.
 const SAME_PASSAGE: f64 = 1e-3;
 /// Systems with up to so many states; a hysteretic switch adds one.
 const MOST_STATES: usize = 8;
@@ -705,7 +705,7 @@ mod tests {
     }
 
     /// On the unit circle z is cos 2 theta: it passes 0 twice a turn in each direction, upwards at (1, -1)/sqrt 2 and opposite. What settles there is seen to come back at the
-    /// second passage.
+    /// second crossing.
     #[test]
     fn returns_are_counted_in_the_settled_motion() {
         let field = ["x*(1 - x*x - y*y) - y", "y*(1 - x*x - y*y) + x", "-z + x*x - y*y - 4*x*y"];
@@ -744,7 +744,7 @@ mod tests {
     }
 
     /// Two turns beside each other, of (x, y) at unit speed and of (u, v) at a third of it and a little more: at x = 4,
-    /// where y = 0 is passed upwards, u and v are again what they were after three passages, but for `apart`. That
+    /// where y = 0 is passed upwards, u and v are again what they were after three crossings, but for `apart`. That
     /// counts as the same within a thousandth of 1 + 4.
     #[test]
     fn a_passage_is_the_same_within_a_thousandth_of_its_size() {
@@ -765,7 +765,7 @@ mod tests {
             let (point, found) = guess(apart, 6.0);
             assert!((point[0] - 4.0).abs() < 1e-6 && point[1] == 0.0 && found == returns, "{apart}: {found} {point:?}");
         }
-        // Three passages are too few to see it; one return is tried.
+        // Three crossings are too few to see it; one return is tried.
         assert_eq!(guess(0.0, 3.0).1, 1);
         assert_eq!(guess(0.0, 4.0).1, 3);
     }

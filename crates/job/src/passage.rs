@@ -9,7 +9,7 @@ use super::executor::Executor;
 use super::question::{JobError, Question};
 use super::spec::{SpecError, SwitchSpec};
 use super::table::{Column, Entry, Table};
-use twofold_analyse::passage::{self, Passage, PassageQuestion};
+use twofold_analyse::passage::{self, PassageAnswer, PassageQuestion};
 use twofold_instances::{self as instances, How, Orbits};
 use twofold_integrate::{DriveOptions, Method, Schedule, Statistics, StepCap, Tolerance, Watch};
 use twofold_system::{System, Transition};
@@ -71,7 +71,7 @@ fn cells(place: Option<[f64; 3]>) -> [Entry; 3] {
 }
 
 impl TwoFoldPassage {
-    fn tables(&self, found: &Passage) -> Vec<Table> {
+    fn tables(&self, found: &PassageAnswer) -> Vec<Table> {
         let places = ["left", "surface", "exit", "far"].into_iter().flat_map(place);
         let mut one = Table::new("passage", ["eps", "t_visit"].map(Column::numbers).into_iter().chain(places));
         let mut row: Vec<Entry> = vec![self.eps.into(), found.visit.unwrap_or(f64::NAN).into()];
@@ -243,14 +243,14 @@ mod tests {
             eps: 1e-3,
             followed: PassageQuestion::far([0.2, 0.0, -1.0], 0.6, 80.0),
         };
-        let found = Passage {
+        let found = PassageAnswer {
             visit: Some(13.0),
             leaving: Some([1.0, 2.0, 3.0]),
             exit: Some([4.0, 5.0, 6.0]),
             far: Some([7.0, 8.0, 9.0]),
             growth: vec![passage::Disturbed { offset: -2.0, factors: [10.0, 11.0, 12.0] }],
             carried: Some([13.0, 14.0, 15.0]),
-            ..Passage::default()
+            ..PassageAnswer::default()
         };
         let tables = question.tables(&found);
         let names = |t: &Table| t.columns.iter().map(|c| c.name.clone()).collect::<Vec<_>>().join(" ");
@@ -265,7 +265,7 @@ mod tests {
         assert_eq!(names(&tables[1]), "eps offset across along_y along_z");
         assert_eq!(cells(&tables[1], 0), "0.001 -inf 13.0 14.0 15.0");
         assert_eq!(cells(&tables[1], 1), "0.001 -2.0 10.0 11.0 12.0");
-        let nothing = question.tables(&Passage::default());
+        let nothing = question.tables(&PassageAnswer::default());
         assert!(nothing[1].is_empty() && nothing[0].rows()[0][1..].iter().all(|c| c.value().is_nan()));
     }
 

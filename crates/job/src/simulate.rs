@@ -699,7 +699,7 @@ mod tests {
         }
     }
 
-    /// Passages of a circle at unit speed through y = 0: one each pi.
+    /// Crossings of a circle at unit speed through y = 0: one each pi.
     struct UntilHalf;
     impl Watch for UntilHalf {
         fn reached(&self, t: f64) -> bool {

@@ -186,7 +186,7 @@ pub enum Observation {
         /// The interval.
         every: f64,
     },
-    /// Passages through the plane `coordinate = value`.
+    /// Crossings of the plane `coordinate = value`.
     Section {
         /// Index of the coordinate.
         coordinate: usize,

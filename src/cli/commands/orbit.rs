@@ -31,10 +31,10 @@ use crate::job::{Answer, ClosedOrbit, Executor, JobError, Question, Stop, encode
 pub struct Arguments {
     #[command(flatten)]
     flags: RunFlags,
-    /// Count passages in which the plane's coordinate falls, not rises.
+    /// Count crossings in which the plane's coordinate falls, not rises.
     #[arg(long, help_heading = "Orbit")]
     downward: bool,
-    /// Passages per turn [default: as many as the settled motion shows].
+    /// Crossings per turn [default: as many as the settled motion shows].
     #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Orbit")]
     returns: Option<usize>,
     /// Time in which the motion settles before the search; 0: none [default: 200].
@@ -57,7 +57,7 @@ pub struct Arguments {
 enum Format {
     /// For people.
     Text,
-    /// The orbit's passages, or with --along a row per orbit.
+    /// The orbit's crossings, or with --along a row per orbit.
     Csv,
     /// Everything.
     Json,

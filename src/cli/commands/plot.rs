@@ -16,7 +16,7 @@ use crate::paper::wording;
 use crate::record;
 use crate::render::{RenderError, markup, render};
 
-/// Draw a run: its states against time, a phase plane, its path in space, or with --section its passages through a plane. The file's
+/// Draw a run: its states against time, a phase plane, its path in space, or with --section its crossings of a plane. The file's
 /// name says the format: .png (300 dpi), .svg or .pdf.
 ///
 /// Axes and labels come from the system; the switching surface h = 0 is drawn where it depends on nothing but the states shown, coloured
@@ -75,7 +75,7 @@ enum Kind {
     Plane,
     /// Three states.
     Space,
-    /// Passages through a plane (with --section).
+    /// Crossings of a plane (with --section).
     Section,
 }
 

@@ -15,7 +15,7 @@ use crate::job::spec::{Method, SwitchSpec};
 use crate::job::{self, Executor, Horizon, JobError, Question, Run, Stop, encode, simulate};
 use crate::record::files::Growing;
 
-/// Compute one run: its path, or with --section its passages through a plane.
+/// Compute one run: its path, or with --section its crossings of a plane.
 ///
 /// CSV is written as it is computed: a run of any length needs little memory. A flag that would have no effect on the run is refused. Ctrl-C
 /// keeps what has been computed: on standard output, or beside --out under the name FILE.part, with a last line that says so.

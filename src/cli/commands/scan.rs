@@ -21,7 +21,7 @@ use crate::render::markup;
 
 use super::plot::{Format, small_print, write};
 
-/// Vary one or two settings of a run and see what it does: over one, an orbit diagram (the late passages through the plane for each value); over
+/// Vary one or two settings of a run and see what it does: over one, an orbit diagram (the late crossings of the plane for each value); over
 /// two, such as a plane of starts, a map of what each run ends on.
 ///
 /// Endings are the outcomes of `twofold sweep`: rest, period-K, irregular and so on. Runs that end on the same attractor have the same number. For
@@ -70,14 +70,14 @@ enum Rows {
 
 /// What is kept of a run.
 enum Found {
-    /// Over one setting: late passages, with times.
-    Passages(Vec<(f64, Vec<f64>)>),
+    /// Over one setting: late crossings, with times.
+    Crossings(Vec<(f64, Vec<f64>)>),
     /// Over two.
     Ending(Ending),
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
-    let spec = arguments.flags.spec(Use::Passages)?;
+    let spec = arguments.flags.spec(Use::Crossings)?;
     let usage = |text: String| Err(CliError::Usage(text));
     let two = match arguments.over.len() {
         1 => false,
@@ -203,7 +203,7 @@ fn cell(sweep: &Sweep, row: u64, two: bool, progress: &Progress) -> Option<Cell>
         if answer.stop == job::Stop::Interrupted {
             return Err(JobError::Interrupted);
         }
-        late(&run, &answer).map(Found::Passages).ok_or_else(|| JobError::Other("no section was recorded".into()))
+        late(&run, &answer).map(Found::Crossings).ok_or_else(|| JobError::Other("no section was recorded".into()))
     });
     match found {
         Err(JobError::Interrupted) => None,
@@ -232,7 +232,7 @@ impl job::JobWatch for SilentRun<'_> {
     fn done(self: Box<Self>, _: &str) {}
 }
 
-/// Upward passages of the late half.
+/// Upward crossings of the late half.
 fn late(run: &RunSpec, answer: &Answer) -> Option<Vec<(f64, Vec<f64>)>> {
     let section = answer.table("section")?;
     let columns: Vec<&[f64]> = run.system.coordinates().iter().map(|n| section.numbers(n)).collect();
@@ -269,7 +269,7 @@ fn passages(sweep: &Sweep, cells: &[Cell]) -> Table {
     let columns = setting_columns(sweep).into_iter().chain([Column::numbers("t")]);
     let mut table = Table::new("passages", columns.chain(states.iter().map(|n| Column::numbers(n))));
     for cell in cells {
-        if let Ok(Found::Passages(points)) = &cell.found {
+        if let Ok(Found::Crossings(points)) = &cell.found {
             for (t, x) in points {
                 table.push(
                     cell.settings.iter().cloned().chain([(*t).into()]).chain(x.iter().map(|v| Entry::Number(*v))),
@@ -313,7 +313,7 @@ fn endings(sweep: &Sweep, cells: &[Cell], alike: f64) -> (Table, Vec<Basin>) {
                 known[index].1.cells.push(at);
                 (word.clone(), index as i64 + 1, String::new())
             }
-            Ok(Found::Passages(_)) => continue,
+            Ok(Found::Crossings(_)) => continue,
             Err(error) => {
                 failed.cells.push(at);
                 ("failed".to_owned(), 0, error.to_string())

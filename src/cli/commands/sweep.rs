@@ -126,7 +126,7 @@ fn sweep(arguments: &Arguments) -> Result<Sweep, CliError> {
             format!("--over {axis} gives every row its own; leave one of the two out"),
         ));
     }
-    let spec = arguments.flags.spec(Use::Passages)?;
+    let spec = arguments.flags.spec(Use::Crossings)?;
     let mut over = arguments.over.clone();
     let given = [("--runs", arguments.runs.is_some()), ("--shift", arguments.shift.is_some())];
     if let (false, Some((flag, _))) = (over.is_empty(), given.iter().find(|(_, given)| *given)) {

@@ -46,7 +46,7 @@ pub struct Outcome {
     pub exponent: Option<f64>,
     /// ... and the standard error of its block means.
     pub exponent_error: Option<f64>,
-    /// Passages through the section.
+    /// Crossings of the section.
     pub crossings: u64,
     /// Time reached.
     pub end: f64,
@@ -78,7 +78,7 @@ impl Ending {
             let square = a[i].iter().zip(&b[j]).map(|(x, y)| (x - y) * (x - y)).sum::<f64>();
             square <= near * near
         };
-        // The same turn may be cut at another passage.
+        // The same turn may be cut at another crossing.
         self.outcome.word == other.outcome.word
             && n == b.len()
             && (n == 0 || (0..n).any(|s| (0..n).all(|i| alike(i, (i + s) % n))))

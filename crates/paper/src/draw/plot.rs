@@ -26,7 +26,7 @@ pub enum Kind {
     Plane,
     /// Three states.
     Space,
-    /// Passages through a plane.
+    /// Crossings of a plane.
     Section,
 }
 
