@@ -2,7 +2,7 @@
 
 use pyo3::prelude::*;
 use serde_json::{Value, json};
-use twofold::paper::{Reading, figures, verdict_table};
+use twofold::paper::{Reading, figures, verdict_table as verdicts_as_table};
 use twofold::record::Manifest;
 
 use crate::errors::InternalError;
@@ -46,8 +46,8 @@ pub fn panels() -> PyResult<String> {
     Ok(Value::Array(list).to_string())
 }
 
-/// README's table of verdicts, in Markdown.
+/// The table of verdicts of docs/findings.md, in Markdown.
 #[pyfunction]
 pub fn verdict_table() -> PyResult<String> {
-    Ok(verdict_table::table(&manifests()?))
+    Ok(verdicts_as_table::table(&manifests()?))
 }
