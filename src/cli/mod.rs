@@ -1,4 +1,4 @@
-//! The command line: flags, progress, errors in words, exit codes. Nothing below this room prints, exits or reads the environment.
+//! The command line: flags, progress, errors in words, exit codes. Nothing below this module prints, exits or reads the environment.
 //!
 //! - [`figure`]: the command line that every figure's binary shares. [`commands`]: that of `twofold`.
 //! - [`flags`]: the flags that describe a run, and the table of which of them has an effect when. [`words`]: values by name.

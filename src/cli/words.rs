@@ -1,4 +1,4 @@
-//! The words of the command line for values that other rooms define. Those rooms know no flags.
+//! The words of the command line for values that other crates define. Those crates know no flags.
 
 use clap::ValueEnum;
 
@@ -6,7 +6,7 @@ use crate::integrate;
 use crate::paper;
 use crate::system;
 
-/// Mirrors an enum of another room: same variants, documented for `--help`.
+/// Mirrors an enum of another crate: same variants, documented for `--help`.
 macro_rules! mirror {
     ($(#[$meta:meta])* $name:ident = $other:path { $($(#[doc = $doc:literal])* $variant:ident,)* }) => {
         $(#[$meta])*

@@ -133,8 +133,8 @@ fn the_image_is_built_from_a_whole_workspace() {
     }
     let ignored = text(".containerignore");
     for member in members() {
-        let room = member.split('/').next().unwrap();
-        assert!(ignored.lines().all(|l| l != member && l != room), ".containerignore leaves out {member}");
+        let top = member.split('/').next().unwrap();
+        assert!(ignored.lines().all(|l| l != member && l != top), ".containerignore leaves out {member}");
         assert!(root().join(&member).join("Cargo.toml").is_file(), "{member}");
     }
 }

@@ -278,7 +278,7 @@ impl<E: BatchedField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, cons
         let width = Registers::<S, K>::WIDTH;
         let mut waiting = 0..runs.len();
         let numbers = if runs.is_empty() { 0 } else { equations.numbers(0).len() };
-        let mut state = State::<S, O, N, K>::idle(set, numbers, equations.room());
+        let mut state = State::<S, O, N, K>::idle(set, numbers, equations.scratch_len());
         let mut unwatched = 0;
         loop {
             for l in 0..width {
@@ -360,7 +360,7 @@ struct State<S: Simd, O, const N: usize, const K: usize> {
     /// Those in the runs' equations.
     numbers: Vec<Aligned<[S::f64s; K]>>,
     /// For what lies between in an evaluation; what is left there means nothing.
-    room: Vec<Aligned<[S::f64s; K]>>,
+    scratch: Vec<Aligned<[S::f64s; K]>>,
     lanes: Vec<Option<Lane<O, N>>>,
 }
 
@@ -375,7 +375,7 @@ fn put<V: pulp::bytemuck::Pod, const K: usize>(parts: &mut [V; K], lane: usize, 
 }
 
 impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> {
-    fn idle(set: S, numbers: usize, room: usize) -> Self {
+    fn idle(set: S, numbers: usize, scratch: usize) -> Self {
         let (zero, one) = ([set.splat_f64s(0.0); K], [set.splat_f64s(1.0); K]);
         Self {
             set,
@@ -399,7 +399,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             flat: zero,
             sloping: [false; N],
             numbers: vec![Aligned(zero); numbers],
-            room: vec![Aligned(zero); room],
+            scratch: vec![Aligned(zero); scratch],
             lanes: (0..Registers::<S, K>::WIDTH).map(|_| None).collect(),
         }
     }
@@ -545,7 +545,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         let last = remaining.at_most(of(self.h) * number(1.000_000_1), set);
         let h = last.select(remaining, of(self.h));
 
-        let mut f = Derivative { set, equations, numbers: &self.numbers, room: &mut self.room };
+        let mut f = Derivative { set, equations, numbers: &self.numbers, scratch: &mut self.scratch };
         let k2 = f.at(&advanced(&x0, h, [(&k1, A21)]));
         let k3 = f.at(&advanced(&x0, h, [(&k1, A31), (&k2, A32)]));
         let k4 = f.at(&advanced(&x0, h, [(&k1, A41), (&k2, A42), (&k3, A43)]));
@@ -827,7 +827,7 @@ struct Derivative<'a, E, S: Simd, const K: usize> {
     set: S,
     equations: &'a E,
     numbers: &'a [Aligned<[S::f64s; K]>],
-    room: &'a mut [Aligned<[S::f64s; K]>],
+    scratch: &'a mut [Aligned<[S::f64s; K]>],
 }
 
 impl<E, S: Simd, const K: usize> Derivative<'_, E, S, K> {
@@ -836,8 +836,8 @@ impl<E, S: Simd, const K: usize> Derivative<'_, E, S, K> {
     where
         E: BatchedField<N>,
     {
-        let Self { set, equations, numbers, ref mut room } = *self;
-        vector(set, &set.vectorize(Field { set, equations, numbers, room, x: Aligned(bare(x)) }).0)
+        let Self { set, equations, numbers, ref mut scratch } = *self;
+        vector(set, &set.vectorize(Field { set, equations, numbers, scratch, x: Aligned(bare(x)) }).0)
     }
 }
 
@@ -846,7 +846,7 @@ struct Field<'a, E, S: Simd, const N: usize, const K: usize> {
     set: S,
     equations: &'a E,
     numbers: &'a [Aligned<[S::f64s; K]>],
-    room: &'a mut [Aligned<[S::f64s; K]>],
+    scratch: &'a mut [Aligned<[S::f64s; K]>],
     x: Aligned<[[S::f64s; K]; N]>,
 }
 
@@ -855,7 +855,7 @@ impl<E: BatchedField<N>, S: Simd, const N: usize, const K: usize> WithSimd for F
     #[inline(always)]
     fn with_simd<T: Simd>(self, _: T) -> Self::Output {
         // The instruction set is that of the caller, who has chosen it.
-        Aligned(self.equations.eval_in_registers(self.set, self.x.0, self.numbers, self.room))
+        Aligned(self.equations.eval_in_registers(self.set, self.x.0, self.numbers, self.scratch))
     }
 }
 

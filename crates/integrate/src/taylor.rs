@@ -67,11 +67,11 @@ pub trait Precision: Scalar + FromDecimal {
         log2(self.to_f64().abs())
     }
 
-    /// The numbers rounded, in `room` if they are not what they are.
-    fn rounded<'a>(numbers: &'a [Self], room: &'a mut Vec<f64>) -> &'a [f64] {
-        room.clear();
-        room.extend(numbers.iter().map(|c| c.to_f64()));
-        room
+    /// The numbers rounded, in `scratch` if they are not what they are.
+    fn rounded<'a>(numbers: &'a [Self], scratch: &'a mut Vec<f64>) -> &'a [f64] {
+        scratch.clear();
+        scratch.extend(numbers.iter().map(|c| c.to_f64()));
+        scratch
     }
 }
 
@@ -536,14 +536,14 @@ impl Layers {
     }
 
     /// A series in fractions of `h`, rounded: its coefficients are of ordinary size.
-    fn in_fractions<'a, S: Precision>(&self, w: &[S], h: f64, room: &'a mut Vec<f64>) -> &'a [f64] {
+    fn in_fractions<'a, S: Precision>(&self, w: &[S], h: f64, scratch: &'a mut Vec<f64>) -> &'a [f64] {
         let (step, mut power) = (S::from_f64(h), S::one());
-        room.clear();
+        scratch.clear();
         for c in w {
-            room.push((*c * power).to_f64());
+            scratch.push((*c * power).to_f64());
             power = power * step;
         }
-        room
+        scratch
     }
 
     /// The part of a step over which an exponential with the argument `w`, in fractions of the step, is nothing beside the tolerance, or changes

@@ -17,7 +17,7 @@
 //! | [`Leaving`] | where an orbit under any switching rule leaves the surface behind a two-fold |
 //! | [`SmoothingLimit`], [`AfterVisit`] | what smoothed orbits tend to as the switch steepens, before and after a visit |
 //!
-//! Rooms above add their own by implementing [`Question`].
+//! Crates above add their own by implementing [`Question`].
 //!
 //! ```
 //! use twofold_job::{Executor, Run, Recording, spec::*};
@@ -82,7 +82,7 @@ pub use run::Run;
 pub use store::Store;
 pub use table::{Column, Entry, Table};
 
-/// What the tests of this room ask about.
+/// What the tests of this crate ask about.
 #[cfg(test)]
 mod cases {
     use super::spec::*;

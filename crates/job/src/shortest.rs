@@ -64,6 +64,6 @@ mod tests {
             check(value);
             ties += usize::from(zmij::Buffer::new().format_finite(value) != format!("{value:?}"));
         }
-        assert!(ties > 0, "zmij and the standard library agree by now: this room can go");
+        assert!(ties > 0, "zmij and the standard library agree by now: this module can go");
     }
 }

@@ -1,6 +1,6 @@
 //! Arithmetic that results depend on.
 //!
-//! This is the only room that names a math library. Everything that ends in a published number goes through
+//! The only crate that names a math library. Everything that ends in a published number goes through
 //! [`elementary`] (functions with the same bits on every machine), [`Elementary`] (what an equation may do with a
 //! number, so that one definition serves plain evaluation, differentiation, power series and extended precision), and
 //! [`random`] (a named generator and our own map from bits to numbers).
@@ -34,7 +34,7 @@ pub use interval::{Enclosure, Interval};
 pub use interval_extended::Ball;
 pub use lanes::Lanes;
 pub use multi::MultiFloat;
-/// An instruction set, for rooms that hand numbers on in registers and compute nothing with them.
+/// An instruction set, for crates that hand numbers on in registers and compute nothing with them.
 pub use pulp::Simd;
 pub use registers::{Aligned, Mask, Registers};
 pub use scalar::{Arithmetic, Elementary, Scalar};

@@ -1,4 +1,4 @@
-//! Pictures: from plain data to PNG, SVG and PDF. The only room that names plotters.
+//! Pictures: from plain data to PNG, SVG and PDF. The only crate that names plotters.
 //!
 //! A [`Sheet`] says what is drawn. It is laid out and drawn once, with plotters' charts and series, through a backend of our own
 //! (`backend`) into a device-independent list of paths (`scene`); three writers turn that one list into pixels, SVG and PDF,

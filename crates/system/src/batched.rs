@@ -14,9 +14,9 @@ pub trait BatchedField<const N: usize>: Sync {
     /// The numbers in that of run `run`, as [`BatchedField::eval_in_registers`] wants them; none if all runs have the same.
     #[doc(hidden)]
     fn numbers(&self, run: usize) -> &[f64];
-    /// As [`VectorField::room`].
+    /// As [`VectorField::scratch_len`].
     #[doc(hidden)]
-    fn room(&self) -> usize;
+    fn scratch_len(&self) -> usize;
     /// In every lane, the value of that run's equation whose numbers are in the lane.
     #[doc(hidden)]
     fn eval_in_registers<S: Simd, const K: usize>(
@@ -24,7 +24,7 @@ pub trait BatchedField<const N: usize>: Sync {
         set: S,
         x: [[S::f64s; K]; N],
         numbers: &[Aligned<[S::f64s; K]>],
-        room: &mut [Aligned<[S::f64s; K]>],
+        scratch: &mut [Aligned<[S::f64s; K]>],
     ) -> [[S::f64s; K]; N];
 }
 
@@ -36,8 +36,8 @@ impl<F: VectorField<N>, const N: usize> BatchedField<N> for F {
     fn numbers(&self, _: usize) -> &[f64] {
         &[]
     }
-    fn room(&self) -> usize {
-        VectorField::room(self)
+    fn scratch_len(&self) -> usize {
+        VectorField::scratch_len(self)
     }
     #[inline(always)]
     fn eval_in_registers<S: Simd, const K: usize>(
@@ -45,9 +45,9 @@ impl<F: VectorField<N>, const N: usize> BatchedField<N> for F {
         set: S,
         x: [[S::f64s; K]; N],
         _: &[Aligned<[S::f64s; K]>],
-        room: &mut [Aligned<[S::f64s; K]>],
+        scratch: &mut [Aligned<[S::f64s; K]>],
     ) -> [[S::f64s; K]; N] {
-        VectorField::eval_in_registers(self, set, x, room)
+        VectorField::eval_in_registers(self, set, x, scratch)
     }
 }
 
@@ -90,8 +90,8 @@ impl<const N: usize> BatchedField<N> for ParameterBatch<N> {
     fn numbers(&self, run: usize) -> &[f64] {
         &self.numbers[run]
     }
-    fn room(&self) -> usize {
-        VectorField::room(&self.fields[0])
+    fn scratch_len(&self) -> usize {
+        VectorField::scratch_len(&self.fields[0])
     }
     #[inline(always)]
     fn eval_in_registers<S: Simd, const K: usize>(
@@ -99,9 +99,9 @@ impl<const N: usize> BatchedField<N> for ParameterBatch<N> {
         set: S,
         x: [[S::f64s; K]; N],
         numbers: &[Aligned<[S::f64s; K]>],
-        room: &mut [Aligned<[S::f64s; K]>],
+        scratch: &mut [Aligned<[S::f64s; K]>],
     ) -> [[S::f64s; K]; N] {
-        self.fields[0].program().evaluate_with_numbers(set, x, numbers, room)
+        self.fields[0].program().evaluate_with_numbers(set, x, numbers, scratch)
     }
 }
 

@@ -308,17 +308,17 @@ impl<const N: usize> VectorField<N> for BoundField<N> {
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
         run(&self.program, x)
     }
-    fn room(&self) -> usize {
-        self.program.room()
+    fn scratch_len(&self) -> usize {
+        self.program.scratch_len()
     }
     #[inline(always)]
     fn eval_in_registers<S: Simd, const K: usize>(
         &self,
         set: S,
         x: [[S::f64s; K]; N],
-        room: &mut [Aligned<[S::f64s; K]>],
+        scratch: &mut [Aligned<[S::f64s; K]>],
     ) -> [[S::f64s; K]; N] {
-        self.program.evaluate_in_registers(set, x, room)
+        self.program.evaluate_in_registers(set, x, scratch)
     }
     fn tape(&self) -> Arc<Tape> {
         self.tape.clone()

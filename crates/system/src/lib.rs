@@ -59,7 +59,7 @@ pub trait VectorField<const N: usize>: Sync {
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
     /// How many bundles of registers [`VectorField::eval_in_registers`] wants for what lies between: a power of two, or none.
     #[doc(hidden)]
-    fn room(&self) -> usize {
+    fn scratch_len(&self) -> usize {
         0
     }
     /// The right-hand side at several states side by side, in the registers of an instruction set: in every lane the bits of [`VectorField::eval`].

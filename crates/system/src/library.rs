@@ -44,7 +44,7 @@ pub fn definition(name: &str) -> Option<&'static Definition> {
 /// A built-in system with these values.
 ///
 /// # Panics
-/// If there is no such system or parameter, which the tests of this room exclude for every call in it.
+/// If there is no such system or parameter, which the tests of this crate exclude for every call in it.
 pub(super) fn with_values(name: &str, values: &[(&str, f64)]) -> System {
     let system = System::builtin(name).unwrap_or_else(|| panic!("no built-in system {name}"));
     let parameters: Vec<_> = system.definition().parameters().to_vec();

@@ -1,6 +1,6 @@
 //! Checks certificates of theorems by computing what they claim anew.
 //!
-//! A proof (`proofs/`) encloses orbits and writes down the boxes and numbers on which its statement rests. From a certificate this room takes the starting points
+//! A proof (`proofs/`) encloses orbits and writes down the boxes and numbers on which its statement rests. From a certificate this crate takes the starting points
 //! alone, follows the orbits with a validated integrator of its own (`orbit`, in an arithmetic of its own, `ball`) and refuses every claimed enclosure that does
 //! not hold what it finds. What follows from the enclosures is decided in fractions of whole numbers (`rational`). Nothing is shared with the
 //! prover: neither its intervals nor its integrator nor the equation.
@@ -39,7 +39,7 @@ pub struct Verified {
 /// Why a certificate shows nothing.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Refused {
-    /// It is no certificate that this room knows.
+    /// It is no certificate that this crate knows.
     #[error("not a certificate of a theorem known here: {0}")]
     Unreadable(String),
     /// The statement does not follow from it.

@@ -1,4 +1,4 @@
-//! The room of the program in which an unsafe attribute stands: names of the platform's library of mathematics, defined as our own functions.
+//! The only module with an unsafe attribute: names of the platform's library of mathematics, defined as our own functions.
 //!
 //! Some dependencies name such functions through the standard library: indicatif (the time left beside a bar), num-bigint
 //! (how much memory digits will take), plotters (ticks that are not used here), read-fonts (slanted and composite glyphs, which the embedded fonts do not have). None of it reaches a hash. Defined here, in the program itself, the linker has no need

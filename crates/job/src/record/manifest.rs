@@ -1,7 +1,7 @@
 //! Manifests: which bytes a figure is made of, in layers.
 //!
 //! A picture has a hash for its spec, its data, its verdict, its pixels and each of its files. The first layer that differs
-//! names the room that changed: spec (the question), data (numerics), verdict (judgement), pixels (drawing), file (encoding).
+//! names the part of the program that changed: spec (the question), data (numerics), verdict (judgement), pixels (drawing), file (encoding).
 
 use serde::{Deserialize, Serialize};
 

@@ -44,12 +44,12 @@ impl<S: Simd, const K: usize> Numbers<S, K> for OfLanes<'_, S, K> {
 impl Program {
     /// How many bundles of registers an evaluation wants for its results: a power of two. Whoever evaluates keeps them: to clear them at each evaluation
     /// was a tenth of an ensemble's time.
-    pub fn room(&self) -> usize {
+    pub fn scratch_len(&self) -> usize {
         self.registers.max(self.variables).next_power_of_two()
     }
 
     /// The function's values at `x`: in every lane the bits of [`Program::evaluate`]. `N` is the number of variables and of values;
-    /// `room` is as long as [`Program::room`] says, and what is in it, before and after, means nothing.
+    /// `scratch` is as long as [`Program::scratch_len`] says, and what is in it, before and after, means nothing.
     ///
     /// Always inlined, so that it is compiled with the instructions of whoever calls.
     #[inline(always)]
@@ -57,9 +57,9 @@ impl Program {
         &self,
         set: S,
         x: [Bundle<S, K>; N],
-        room: &mut [Aligned<Bundle<S, K>>],
+        scratch: &mut [Aligned<Bundle<S, K>>],
     ) -> [Bundle<S, K>; N] {
-        self.evaluate_with(set, x, Own, room)
+        self.evaluate_with(set, x, Own, scratch)
     }
 
     /// The same with other numbers in each lane, those of [`Program::numbers`] in their order: in every lane the bits of the program that has them.
@@ -69,10 +69,10 @@ impl Program {
         set: S,
         x: [Bundle<S, K>; N],
         numbers: &[Aligned<Bundle<S, K>>],
-        room: &mut [Aligned<Bundle<S, K>>],
+        scratch: &mut [Aligned<Bundle<S, K>>],
     ) -> [Bundle<S, K>; N] {
         assert!(numbers.len() == 2 * self.code.len() + N, "two numbers an instruction, one a value");
-        self.evaluate_with(set, x, OfLanes::<S, K>(numbers), room)
+        self.evaluate_with(set, x, OfLanes::<S, K>(numbers), scratch)
     }
 
     #[inline(always)]
@@ -84,7 +84,7 @@ impl Program {
         results: &mut [Aligned<Bundle<S, K>>],
     ) -> [Bundle<S, K>; N] {
         assert!(N == self.variables && N == self.outputs.len(), "one number a variable and a value");
-        assert!(results.len() == self.room(), "as much room as the program says");
+        assert!(results.len() == self.scratch_len(), "as much scratch as the program says");
         // The mask changes nothing and spares the way to a panic.
         let last = results.len() - 1;
         for i in 0..N {
@@ -289,8 +289,8 @@ mod tests {
             let lanes = [0, 1].map(|i| (0..width).map(|lane| value(lane, i)).collect::<Vec<_>>());
             let x = lanes.each_ref().map(|lanes| Registers::<S, K>::load(set, lanes).parts());
             // What an earlier evaluation left there must not matter.
-            let mut room = vec![Aligned([set.splat_f64s(f64::NAN); K]); self.0.room()];
-            let found = self.0.evaluate_in_registers(set, x, &mut room);
+            let mut scratch = vec![Aligned([set.splat_f64s(f64::NAN); K]); self.0.scratch_len()];
+            let found = self.0.evaluate_in_registers(set, x, &mut scratch);
             for lane in 0..width {
                 let mut alone = [0.0; 2];
                 self.0.evaluate(&[value(lane, 0), value(lane, 1)], &mut alone);
@@ -329,8 +329,8 @@ mod tests {
                 })
                 .collect();
             let x = [0.7, -0.2].map(|x| Registers::<S, K>::splat(set, x).parts());
-            let mut room = vec![Aligned([set.splat_f64s(f64::NAN); K]); programs[0].room()];
-            let found = programs[0].evaluate_with_numbers(set, x, &numbers, &mut room);
+            let mut scratch = vec![Aligned([set.splat_f64s(f64::NAN); K]); programs[0].scratch_len()];
+            let found = programs[0].evaluate_with_numbers(set, x, &numbers, &mut scratch);
             for lane in 0..width {
                 let mut alone = [0.0; 2];
                 programs[lane].evaluate(&[0.7, -0.2], &mut alone);
@@ -353,19 +353,19 @@ mod tests {
     #[test]
     fn a_value_may_be_a_number() {
         let program = Program::new(&Tape::record(2, |v| vec![v[1], crate::tape::Recorded::from_f64(2.5)]));
-        let mut room = [Aligned([f64::NAN]); 2];
-        let found = program.evaluate_in_registers(Scalar, [[1.0], [3.0]], &mut room);
+        let mut scratch = [Aligned([f64::NAN]); 2];
+        let found = program.evaluate_in_registers(Scalar, [[1.0], [3.0]], &mut scratch);
         assert_eq!(found, [[3.0], [2.5]]);
         assert_eq!(program.numbers(), [0.0, 2.5], "one number a value; no instruction is needed");
-        let found = program.evaluate_with_numbers(Scalar, [[1.0], [3.0]], &[[0.0], [4.5]].map(Aligned), &mut room);
+        let found = program.evaluate_with_numbers(Scalar, [[1.0], [3.0]], &[[0.0], [4.5]].map(Aligned), &mut scratch);
         assert_eq!(found, [[3.0], [4.5]]);
     }
 
     /// A power of two that holds the variables and the registers: three variables want four, even if nothing is computed.
     #[test]
-    fn room_holds_variables_and_registers() {
+    fn scratch_holds_variables_and_registers() {
         let copies = |n: usize| Program::new(&Tape::record(n, |v| v.to_vec()));
-        assert_eq!([1, 2, 3, 4, 5].map(|n| copies(n).room()), [1, 2, 4, 4, 8]);
+        assert_eq!([1, 2, 3, 4, 5].map(|n| copies(n).scratch_len()), [1, 2, 4, 4, 8]);
         // Of the twenty products each is wanted until the end: at least 21 registers at once.
         let many = Program::new(&Tape::record(1, |v| {
             let products: Vec<_> =
@@ -376,11 +376,11 @@ mod tests {
             }
             vec![up - down]
         }));
-        assert_eq!(many.room(), 32);
+        assert_eq!(many.scratch_len(), 32);
     }
 
     #[test]
-    #[should_panic(expected = "as much room as the program says")]
+    #[should_panic(expected = "as much scratch as the program says")]
     fn less_room_is_refused() {
         everything().evaluate_in_registers(Scalar, [[1.0], [3.0]], &mut [Aligned([0.0]); 2]);
     }

@@ -167,7 +167,7 @@ pub(super) fn spaces(html: &mut String, picture: &PictureReport, id: &str) {
     }
 }
 
-/// Which room a layer points to.
+/// Which part of the program a layer points to.
 pub(super) fn meaning(layer: Layer) -> &'static str {
     match layer {
         Layer::Spec => "another question was asked",
