@@ -58,13 +58,13 @@ the value of phi on the canard. Every orbit that comes in along the sliding surf
 between S - c1/S and S, first leaves |p| <= 0.05 at an s = -x with f x^2/2 - ln(x)/mu = (1/mu - 1) ln S - ln|p| + C, and the derivatives of x by p and \
 by q at s = 0 are exp(K) S^(1/mu - 1)/(|p| x) in absolute value, with C and both K in given intervals that do not depend on the orbit or on S.";
 
-/// s at which the first part ends, ...
+/// s at which the first part ends.
 const S0: f64 = 8.0;
-/// ... and -s at which the third begins.
+/// -s at which the third part begins.
 const X0: f64 = 6.0;
-/// Largest |p| coming in ...
+/// Largest |p| of incoming orbits.
 const P1: f64 = 0.05;
-/// ... and |p| that is the exit.
+/// |p| at the exit.
 const P2: f64 = 0.05;
 /// Widths of the cones: c1, c2, k.
 const CONES: [f64; 3] = [5.0, 6.0, 10.0];

@@ -33,9 +33,9 @@ const GROWTH: [f64; 11] = [1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6,
 const PRINTED: [f64; 9] = [1e-2, 8e-3, 5e-3, 3e-3, 2e-3, 1e-3, 3e-4, 1e-4, 1e-5];
 /// Other transition functions'.
 const OTHERS: [f64; 7] = [1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5];
-/// Points a decade of eps, for the far exit, ...
+/// Points per decade of eps, for the far exit.
 const PER_DECADE: usize = 10;
-/// ... and decades, from 1e-2 down: more than three periods.
+/// Decades of eps from 1e-2 down: more than three periods.
 const DECADES: f64 = 4.6;
 /// Steps of the ladder that hold a jump are divided into so many.
 const FINER: usize = 8;

@@ -489,7 +489,7 @@ fn closed_orbits_of_the_paper() {
     );
     assert!((printed.opposite[0][0] + 13.3857).abs() < 1e-4 && (printed.opposite[0][2] + 0.0199).abs() < 1e-4);
     assert!((printed.period - 20.25).abs() < 5e-3 && printed.rate > 0.0, "{printed:?}");
-    // ... and the reconstructed one's two.
+    // The two orbits of the reconstructed reading.
     let one = find(1e-1, 1e-5, 1, 0.81, 0.0);
     assert!((one.points[0][0] - 0.81).abs() < 5e-3 && (one.opposite[0][0] + 0.67).abs() < 5e-3, "{one:?}");
     let three = find(1e-1, 1e-5, 3, 1.21, 0.0);

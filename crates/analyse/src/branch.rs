@@ -157,9 +157,9 @@ impl Stability {
 pub struct Newton {
     /// Largest |P(u) - u| that counts as closed, as a share of the orbit's extent.
     pub closed: f64,
-    /// The integration's error: an absolute one ...
+    /// Absolute error of the integration.
     pub atol: f64,
-    /// ... and a share of the state.
+    /// Relative error of the integration.
     pub rtol: f64,
     /// Most iterations.
     pub iterations: usize,

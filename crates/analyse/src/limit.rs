@@ -157,9 +157,9 @@ pub struct AfterVisitQuestion {
     /// The members that are computed first.
     pub grid: FunnelGrid,
     /// Around the nearest of them ever finer grids are laid, so many in turn, each over the two neighbouring exit times
-    /// of the one before ...
+    /// of the one before.
     pub refinements: usize,
-    /// ... with so many exit times, at least 3.
+    /// Exit times of a refinement, at least 3.
     pub finer: usize,
     /// How Filippov orbits are computed.
     pub settings: FilippovOptions,

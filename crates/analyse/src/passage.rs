@@ -25,13 +25,13 @@ use twofold_system::VectorField;
 /// Beyond this distance from the two-fold the incoming orbit is followed in `f64`. An error made here leaves the singularity HANDOVER^(1 - 1/mu) times
 /// as large as one made at distance 1, and that one shrinks by sqrt(eps): 1e-13 becomes less than 1e-7 at eps = 1e-2, and less and less below.
 pub const HANDOVER: f64 = 0.1;
-/// ... but not nearer than so many sqrt(eps), for large eps.
+/// Lower bound of the handover distance, in units of sqrt(eps).
 const HANDOVER_INNER: f64 = 12.0;
-/// Local tolerance of the incoming orbit in flight, ...
+/// Local tolerance of the incoming orbit in flight.
 const FLIGHT: Tolerance = Tolerance { rtol: 1e-17, atol: 1e-17 };
-/// ... and sliding, ...
+/// Local tolerance of the incoming orbit while it slides.
 const SLIDING: Tolerance = Tolerance { rtol: 1e-13, atol: 1e-15 };
-/// ... with steps no longer than this.
+/// Longest step of the incoming orbit.
 const SLIDING_STEP: f64 = 0.02;
 /// It slides while |x| is below so many eps and y, z > 0.
 const IN_LAYER: f64 = 2.0;
@@ -359,9 +359,9 @@ fn follow<F: VectorField<3>>(
     Ok(Followed { passage: found, steps })
 }
 
-/// A response to a disturbance, in units of sqrt(eps), is small enough to be linear to a per mille or so up to here, ...
+/// Largest response to a disturbance, in units of sqrt(eps), treated as linear (relative error about 1e-3).
 const LARGEST_RESPONSE: f64 = 1e-4;
-/// ... and far above the arithmetic's own amplified rounding down to here, for eps of 1e-6 and more.
+/// Smallest response, in units of sqrt(eps), far above amplified rounding errors for eps >= 1e-6.
 const SMALLEST_RESPONSE: f64 = 1e-7;
 /// Aimed at. At eps = 1e-7 rounding near the visit is worth some 1e-7 of response: when 1e-5 was aimed at, growth there was measured to a per cent only.
 const RESPONSE: f64 = 5e-5;

@@ -63,9 +63,9 @@ pub(super) mod control {
     pub const LEAST_LOG: f64 = -26.575_424_759_098_897;
     /// Squares below this are taken for it: the step then grows by as much as it may.
     pub const LEAST_SQUARE: f64 = 1e-40;
-    /// h may shrink at most by this factor ...
+    /// Least factor by which h changes.
     pub const SHRINK: f64 = 0.2;
-    /// ... and grow at most by this.
+    /// Largest factor by which h changes.
     pub const GROW: f64 = 10.0;
 }
 
@@ -74,9 +74,9 @@ pub(super) mod control {
 mod stiffness {
     /// The boundary of the stability region on the negative axis.
     pub const BOUNDARY: f64 = 3.25;
-    /// Steps at the boundary before the equation is called stiff, ...
+    /// Steps at the boundary of stability before the equation is called stiff.
     pub const AT_IT: u32 = 15;
-    /// ... unless so many in a row are not.
+    /// Steps in a row away from it that begin the count again.
     pub const INSIDE: u32 = 6;
     /// Steps between two looks where none was at the boundary lately.
     pub const EVERY: u64 = 64;

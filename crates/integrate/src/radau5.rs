@@ -20,9 +20,9 @@ use twofold_system::VectorField;
 struct Tableau {
     /// Collocation points: the zeros of d^2/dx^2 [x^2 (x - 1)^3].
     c: [f64; 3],
-    /// Eigenvalues of A^-1: the real one ...
+    /// The real eigenvalue of A^-1.
     real: f64,
-    /// ... and one of the pair.
+    /// One of its pair of complex eigenvalues.
     complex: Complex<f64>,
     /// Their eigenvectors (columns of T in eq. IV.8.12).
     v_real: [f64; 3],
@@ -95,9 +95,9 @@ fn inverse<T: nalgebra::ComplexField<RealField = f64> + Copy>(m: Matrix3<T>) -> 
 /// Step control and Newton iteration, Hairer & Wanner (1996), sec. IV.8.
 mod control {
     pub const SAFETY: f64 = 0.9;
-    /// h may shrink at most by this factor ...
+    /// Least factor by which h changes.
     pub const SHRINK: f64 = 0.2;
-    /// ... and grow at most by this.
+    /// Largest factor by which h changes.
     pub const GROW: f64 = 8.0;
     /// Newton iterations.
     pub const MOST_ITERATIONS: u32 = 7;

@@ -81,11 +81,11 @@ struct Lengths {
     settling: f64,
     /// Fewest points of a noise-free run that make a structure to compare with.
     structure_points: usize,
-    /// Noise-free runs that are made to compare with ...
+    /// Number of noise-free runs that noise is compared with.
     free_runs: usize,
-    /// ... how far apart they start ...
+    /// Distance between their starts.
     free_shift: f64,
-    /// ... and how long they are.
+    /// Their length.
     free_length: f64,
     /// Time over which a hysteretic system's exponent is averaged: stiff for the explicit method of the variational equation.
     hysteretic_average: f64,

@@ -29,7 +29,7 @@ pub struct Cell {
     pub beta: f64,
     /// Runs of each panel.
     pub runs: [u64; 7],
-    /// Runs that bear the paper out.
+    /// Number of runs that support the claim.
     pub hits: [u64; 7],
     /// Runs that go to the far state, all panels together.
     pub far: u64,

@@ -152,7 +152,7 @@ pub fn tally(runs: &[Run], t: f64) -> [u64; 6] {
     Kind::ALL.map(|kind| runs.iter().filter(|r| r.kind(t) == kind).count() as u64)
 }
 
-/// How many runs bear a sentence out: periodic from `shown_from` on, or irregular to the end.
+/// Number of runs that support a claim: periodic from `shown_from` on, or irregular to the end.
 pub fn bears_out(said: Said, runs: &[Run], rules: &Rules) -> u64 {
     let is = |run: &&Run| match said {
         Said::Periodic => {
@@ -184,7 +184,7 @@ pub struct PanelShare {
     pub said: Said,
     /// Runs.
     pub runs: u64,
-    /// Runs that bear it out.
+    /// Number of runs that support it.
     pub hits: u64,
     /// Interval of their share (Wilson).
     pub interval: [f64; 2],
@@ -423,7 +423,7 @@ pub const TESTS: [&str; 7] = [
 pub const LIMITS: [&str; 5] =
     ["as ruled", "periodic from 5e4 on", "periodic from 1.5e5 on", "chaos until 1e5 is enough", "undecided is chaos"];
 
-/// How many of a panel's runs bear its sentence out under each of [`LIMITS`].
+/// Number of a panel's runs that support the claim, for each limit in [`LIMITS`].
 pub fn influence(said: Said, runs: &[Run], rules: &Rules) -> [u64; 5] {
     let from = |shown_from: f64| bears_out(said, runs, &Rules { shown_from, ..*rules });
     let undecided = if said == Said::Chaos { tally(runs, rules.end)[5] } else { 0 };
@@ -634,7 +634,7 @@ pub fn text(found: &[Found; 2], reference: impl Fn(&str) -> Option<&'static str>
     text
 }
 
-/// Whether the one run that a panel shows bears the paper out, by the committed reference of its figure.
+/// Whether the one run that a panel shows supports the claim, by the committed reference of its figure.
 fn single_run(panel: &str, reading: Reading, reference: impl Fn(&str) -> Option<&'static str>) -> Option<bool> {
     let (figure, label) = panel.trim_end_matches(')').split_once('(')?;
     let id = format!("fig{figure}");

@@ -1,4 +1,4 @@
-//! The paper's claims about its sections, and whether a verdict bears one out.
+//! The paper's claims about its sections, and whether a verdict supports one.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,7 +23,7 @@ pub enum Claim {
 pub struct Score {
     /// The claim.
     pub claim: Claim,
-    /// Whether the verdict bears it out.
+    /// Whether the verdict supports it.
     pub agrees: bool,
     /// Why, or with what reservation.
     pub because: String,

@@ -51,9 +51,9 @@ pub struct Thresholds {
     pub fewest_blocks: usize,
     /// Largest gap in angle, in circles, of a ring that counts as one: a few clusters around a common centre are not a ring.
     pub ring_gap: f64,
-    /// An approach is called one when its rate is this many standard errors from zero ...
+    /// An approach has a rate this many standard errors from zero.
     pub significance: f64,
-    /// ... and when ln(distance) has changed by at least this much: a tenth is what an eye can see in a spiral.
+    /// An approach has changed ln(distance) by at least this much: a tenth is what an eye can see in a spiral.
     pub visible_change: f64,
     /// The 0-1 test's K above which motion is irregular. K tends to 0 or 1 (Gottwald & Melbourne 2009); the middle is
     /// the unbiased place to cut.

@@ -381,17 +381,17 @@ const CHORDS: usize = 16;
 struct Limits {
     /// A first Lie derivative below this share of its terms, and of its change over the size of the run, is zero: some fifty roundings.
     lie: f64,
-    /// A two-fold is looked for where both Lie derivatives are below so many of those ...
+    /// A two-fold is looked for where both Lie derivatives are below so many of those.
     near_two_fold: f64,
-    /// ... and taken for the present state, or for one found before, within this share of its size.
+    /// Two-folds within this share of their size are one, and so are a two-fold and the present state.
     same_point: f64,
-    /// Newton steps that sharpen a touch of the surface, which a root finder knows only to half of the digits ...
+    /// Newton steps that sharpen a touch of the surface, which a root finder knows only to half of the digits.
     touch_steps: usize,
-    /// ... as long as they move it by less than this fraction of the step.
+    /// Largest fraction of the step by which such a Newton step moves the touch.
     touch_range: f64,
-    /// The ratios of durations in an accumulation differ by less than this share of their distance from 1 ...
+    /// Largest difference of the ratios of durations in an accumulation, as a share of their distance from 1.
     zeno_spread: f64,
-    /// ... and the rest of it is shorter than this share of the time.
+    /// Largest rest of an accumulation, as a share of the time.
     zeno_left: f64,
     /// Flights that are shorter than this share of the first of such a row are integrated with smaller absolute tolerances.
     zeno_shrunk: f64,
@@ -400,9 +400,9 @@ struct Limits {
     rest: f64,
     /// The end of a run is reached within so many spacings of the numbers there.
     end: f64,
-    /// A sliding step that advances time by no more than this share of it is idle ...
+    /// A sliding step that advances time by no more than this share of it is idle.
     idle: f64,
-    /// ... and so many of them are arrival at a degenerate point.
+    /// So many idle steps are the arrival at a degenerate point.
     idle_steps: u32,
     /// A field without values beyond the surface is asked no nearer to it, where the surface goes through zero.
     depth: f64,
@@ -414,9 +414,9 @@ struct Limits {
     blur: f64,
     /// Where a zero of h is farther from the surface than this share of the state, h jumps.
     jump: f64,
-    /// Sliding restarts on the surface when it has drifted off by this share of the state ...
+    /// Sliding restarts on the surface when it has drifted off by this share of the state, or by `drift_in_tolerances`.
     drift: f64,
-    /// ... or by so many absolute tolerances, whichever is more.
+    /// Drift in absolute tolerances at which sliding restarts, if that is more.
     drift_in_tolerances: f64,
     /// Chords by which the path out of a two-fold is measured.
     departure_chords: usize,

@@ -15,11 +15,11 @@ pub(super) const BIAS_LOWER: f64 = 1.3;
 pub(super) const BIAS_HIGHER: f64 = 1.4;
 /// A change that gains less than this is not worth the rescaling.
 pub(super) const LEAST_GAIN: f64 = 1.1;
-/// Limits on growth: the very first change may be large, because the first step is a guess; ...
+/// Largest growth of the step at the very first change, because the first step is a guess.
 pub(super) const GROWTH_FIRST: f64 = 1e4;
-/// ... later ones less so, ...
+/// Largest growth at later changes.
 pub(super) const GROWTH: f64 = 10.0;
-/// ... and after a failure least.
+/// Largest growth after a failure.
 pub(super) const GROWTH_AFTER_FAILURE: f64 = 2.0;
 /// Factor on the step after a corrector that did not converge.
 pub(super) const SHRINK_NOT_CONVERGED: f64 = 0.25;

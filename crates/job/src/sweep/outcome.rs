@@ -36,15 +36,15 @@ pub struct Outcome {
     pub settled_at: Option<f64>,
     /// Mean distance from the orbit at the end.
     pub radius: Option<f64>,
-    /// Rate of the approach per unit time ...
+    /// Rate of the approach per unit time.
     pub rate: Option<f64>,
-    /// ... and its standard error.
+    /// Standard error of `rate`.
     pub rate_error: Option<f64>,
     /// Time for one turn.
     pub turn: Option<f64>,
-    /// Largest exponent per unit time, where it was needed ...
+    /// Largest Lyapunov exponent per unit time, where it was needed.
     pub exponent: Option<f64>,
-    /// ... and the standard error of its block means.
+    /// Standard error of `exponent`, from block means.
     pub exponent_error: Option<f64>,
     /// Crossings of the section.
     pub crossings: u64,
