@@ -135,6 +135,12 @@ fn every_command_of_the_book_does_what_it_says() {
     assert!(run >= 20, "only {run} commands were found");
 }
 
+/// The anchor of a heading, as GitHub and mdBook make it.
+fn slug(heading: &str) -> String {
+    let words = heading.trim_start_matches('#').trim().to_lowercase();
+    words.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c)).collect::<String>().replace(' ', "-")
+}
+
 #[test]
 fn every_chapter_is_in_the_summary_and_every_link_leads_somewhere() {
     let docs = Path::new(ROOT).join("docs");
@@ -149,6 +155,12 @@ fn every_chapter_is_in_the_summary_and_every_link_leads_somewhere() {
             let file = link.split('#').next().unwrap();
             let elsewhere = file.is_empty() || file.contains("://") || file.starts_with("mailto:");
             assert!(elsewhere || docs.join(file).exists(), "{name}: the link {link} leads nowhere");
+            let (page, anchor) = link.split_once('#').unwrap_or((&link, ""));
+            if page.ends_with(".md") && !page.contains("://") && !anchor.is_empty() {
+                let text = fs::read_to_string(docs.join(page)).unwrap();
+                let headings = text.lines().filter(|l| l.starts_with('#')).map(slug);
+                assert!(headings.into_iter().any(|h| h == anchor), "{name}: {page} has no heading for #{anchor}");
+            }
         }
     }
 }

@@ -180,3 +180,109 @@ fn a_version_of_the_changelog_has_at_most_40_lines() {
         assert!(lines <= 40, "{}: {lines} lines", section.lines().next().unwrap());
     }
 }
+
+/// Terms that pages link to the glossary where they first use them; its other entries are also ordinary words.
+const TERMS: [&str; 22] = [
+    "canard",
+    "captured",
+    "caricature",
+    "certificate",
+    "census",
+    "dense output",
+    "double-double",
+    "exit rule",
+    "Filippov system",
+    "Floquet multiplier",
+    "funnel",
+    "hysteresis",
+    "Lyapunov exponent",
+    "manifest",
+    "Poincaré section",
+    "saltation matrix",
+    "settled",
+    "sliding",
+    "switching function",
+    "two-fold",
+    "verdict",
+    "Zeno",
+];
+
+/// The prose of a page in one line: no code, tables, headings and pictures.
+fn running_text(text: &str) -> String {
+    let prose = lines(text).filter(|(_, line, code)| !code && !line.starts_with(['#', '|', '!', '<']));
+    let joined = prose.flat_map(|(_, line, _)| [line.trim(), " "]).collect::<String>();
+    joined.split('`').step_by(2).collect()
+}
+
+/// Where `term`, or its plural, first stands in `text` outside the texts of links, unless a link to the glossary comes before.
+fn first_unlinked(text: &str, term: &str) -> bool {
+    let (text, term) = (text.to_lowercase(), term.to_lowercase());
+    let target = format!("](glossary.md#{})", term.replace(' ', "-"));
+    let mut rest = text.as_str();
+    let linked = rest.find(&target);
+    let mut at = 0;
+    while let Some(found) = rest.find(&term) {
+        let (start, end) = (at + found, at + found + term.len());
+        let inside = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '-');
+        let after = text[end..].strip_prefix('s').unwrap_or(&text[end..]);
+        let word = !inside(text[..start].chars().next_back()) && !inside(after.chars().next());
+        // A link's text, or its target.
+        let open = text[..start].rfind('[').is_some_and(|o| !text[o..start].contains(']'));
+        let address = text[..start].rfind("](").is_some_and(|o| !text[o..start].contains(')'));
+        if word && !open && !address {
+            return linked.is_none_or(|linked| linked > start);
+        }
+        rest = &text[end..];
+        at = end;
+    }
+    false
+}
+
+#[test]
+fn terms_are_linked_to_the_glossary_where_they_are_first_used() {
+    let glossary = fs::read_to_string(root().join("docs/glossary.md")).unwrap();
+    for term in TERMS {
+        assert!(glossary.contains(&format!("\n## {term}\n")), "{term} is not in the glossary");
+    }
+    let mut missing = Vec::new();
+    for (name, text) in pages().iter().filter(|(name, _)| name.starts_with("docs/")) {
+        if !["docs/glossary.md", "docs/SUMMARY.md"].contains(&name.as_str()) {
+            let text = running_text(text);
+            missing.extend(TERMS.iter().filter(|t| first_unlinked(&text, t)).map(|t| format!("{name}: {t}")));
+        }
+    }
+    assert!(missing.is_empty(), "link these to docs/glossary.md where they first stand: {missing:#?}");
+    assert!(
+        first_unlinked("a canard.", "canard") && !first_unlinked("a [canard](glossary.md#canard), canard", "canard")
+    );
+    assert!(!first_unlinked("[Canards](two-fold.md) and canardly", "canard"));
+}
+
+/// Rust files below a folder.
+fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
+    for path in fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()) {
+        if path.is_dir() && path.file_name().is_some_and(|n| n != "target") {
+            rust_files(&path, found);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+#[test]
+fn comments_do_not_begin_in_the_middle_of_a_sentence() {
+    let mut files = Vec::new();
+    for folder in ["crates", "src", "figures", "tests", "proofs", "examples", "benches", "python/src"] {
+        rust_files(&root().join(folder), &mut files);
+    }
+    assert!(files.len() > 200);
+    let mut wrong = Vec::new();
+    for file in files {
+        for (i, line) in fs::read_to_string(&file).unwrap().lines().enumerate() {
+            if line.trim_start().trim_start_matches(['/', '!']).starts_with(" ... ") && line.contains("//") {
+                wrong.push(format!("{}:{}", file.display(), i + 1));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
