@@ -149,7 +149,7 @@ pub fn fates(
         RunSpec { start: start.clone(), ..spec.clone() }.validate().map_err(|e| errors::spec(&e))?;
     }
     supervise(py, show, move |work| {
-        side_by_side(starts, threads, work, |k, start| Ok(fate(&spec, k, start, work)?.to_string()))
+        side_by_side(starts, threads, work, |k, start| Ok(outcome(&spec, k, start, work)?.to_string()))
     })
 }
 
@@ -177,7 +177,7 @@ fn side_by_side<A: Send, B: Send>(
 }
 
 /// What becomes of start number `k`, counted from 0.
-fn fate(spec: &RunSpec, k: usize, start: Vec<f64>, work: &Work) -> Result<Value, JobError> {
+fn outcome(spec: &RunSpec, k: usize, start: Vec<f64>, work: &Work) -> Result<Value, JobError> {
     let mut run = RunSpec { start, ..spec.clone() };
     // Chance of its own in every run, as the rows of a sweep have it.
     let more = k as u64;

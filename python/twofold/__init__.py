@@ -6,7 +6,7 @@ transition, a hysteretic one, or the discontinuous system itself in Filippov's s
 =============================== ============================================================================
 :class:`System`                 a system: built in, from a file, or from expressions
 :func:`solve`                   its path from a start: ``t``, ``y`` as SciPy has them
-:func:`section`                 its passages through a plane (a Poincaré section)
+:func:`section`                 its crossings of a plane (a Poincaré section)
 :func:`funnel`                  the futures of a point whose future is a set
 :func:`classify`                what a run settles on
 :func:`sweep`                   what runs from many starts settle on, side by side

@@ -704,7 +704,7 @@ def section(
     progress: Progress = False,
     **options: Any,
 ) -> Section:
-    """Integrates a system and records its passages through a plane: a Poincaré section.
+    """Integrates a system and records its crossings of a plane: a Poincaré section.
 
     Parameters
     ----------
@@ -788,7 +788,7 @@ def spec(
     every: Optional[float] = None,
     **options: Any,
 ) -> Dict[str, Any]:
-    """A run as data, computing nothing: what ``twofold run --print-spec`` prints. ``plane`` records passages, else the path is recorded.
+    """A run as data, computing nothing: what ``twofold run --print-spec`` prints. ``plane`` records crossings, else the path is recorded.
 
     The other arguments are those of :func:`solve`. See :func:`run_spec`.
     """
@@ -796,7 +796,7 @@ def spec(
     if plane is None:
         observe: Any = _path(chord, every)
     else:
-        _refuse({"chord": chord, "every": every}, "passages through a plane are recorded where they are")
+        _refuse({"chord": chord, "every": every}, "crossings of a plane are recorded where they are")
         observe = _plane(system, plane)
     return _spec(system, start, t_end, observe, **options)[1]
 
@@ -895,7 +895,7 @@ def classify(
     progress: Progress = False,
     **options: Any,
 ) -> Classification:
-    """Says what a run settles on, judged from its passages through a plane; systems of two states and more.
+    """Says what a run settles on, judged from its crossings of a plane; systems of two states and more.
 
     The arguments are those of :func:`section`. A chaotic run's largest exponent is computed too.
     """

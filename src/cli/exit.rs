@@ -16,12 +16,11 @@ use crate::record::manifest::ManifestError;
 pub enum Exit {
     /// All is well.
     Fine = 0,
-    /// A check failed: something differs, is missing, or is not ours.
+    /// A check failed: something differs, is missing, or was not made by twofold.
     CheckFailed = 1,
-    /// What was asked for cannot be: a flag, a number, an input, or a place (a file that cannot be read or written, whenever that is
-    /// noticed).
+    /// Bad usage or input: a flag, number or file that cannot be used, or a file that cannot be read or written.
     Usage = 2,
-    /// What was asked for was right, and the computation or the drawing failed.
+    /// The computation or the drawing failed, though what was asked for can be asked.
     Failed = 3,
     /// Ended by Ctrl-C (SIGINT): 128 + 2, as shells count.
     Interrupted = 130,

@@ -296,7 +296,7 @@ fn refuse_idle(figures: &[Figure], arguments: &FigureFlags) -> Result<(), CliErr
     if let Some((flag, _)) = of_runs.into_iter().find(|(_, given)| *given)
         && pictures().all(|p| p.panels.is_empty())
     {
-        return Err(CliError::no_effect(flag, format!("{names}: made in one piece, not of single runs; leave it out")));
+        return Err(CliError::no_effect(flag, format!("{names}: not made of single runs; leave it out")));
     }
     if let Some(only) = &arguments.only
         && pictures().all(|p| p.panels.len() < 2 && p.panels.iter().all(|panel| panel.label == label(only)))
@@ -310,7 +310,7 @@ fn refuse_idle(figures: &[Figure], arguments: &FigureFlags) -> Result<(), CliErr
         return Err(CliError::no_effect("--recompute", why));
     }
     if arguments.late && !pictures().any(|p| matches!(p.view, View::Section { .. })) {
-        return Err(CliError::no_effect("--late", format!("{names}: no section of two halves; leave it out")));
+        return Err(CliError::no_effect("--late", format!("{names}: there is no section to halve; leave it out")));
     }
     if arguments.reading.is_some() && pictures().all(|p| p.reading.is_none()) {
         return Err(CliError::no_effect("--reading", format!("{names}: the same in every reading; leave it out")));
@@ -339,7 +339,7 @@ fn select(mut figure: Figure, arguments: &FigureFlags) -> Result<Figure, CliErro
         if !known.iter().any(|k| k == label) {
             known.sort_by_key(|k| (k.len(), k.clone()));
             known.dedup();
-            let known = if known.is_empty() { "none: it is made in one piece".into() } else { known.join(", ") };
+            let known = if known.is_empty() { "none: it is not made of panels".into() } else { known.join(", ") };
             return Err(CliError::NoSuchPanel { panel: only.clone(), figure: figure.id, known });
         }
         figure.pictures.retain(|p| p.panels.iter().any(|q| q.label == label));

@@ -381,13 +381,13 @@ const EFFECTS: [Effect; 39] = {
             "--chord",
             |f| f.chord.is_some(),
             |f, command| command.records_a_path() && f.section.is_none() && f.every.is_none() && !f.exit_begins("all"),
-            "it belongs to a recorded path; passages and --every have none, and futures of a funnel are recorded at fixed points of each step",
+            "it belongs to a recorded path; crossings and --every have none, and futures of a funnel are recorded at fixed points of each step",
         ),
         when(
             "--every",
             |f| f.every.is_some(),
             |f, command| command.records_a_path() && f.section.is_none() && !f.exit_begins("all"),
-            "it belongs to a recorded path; the passages of --section are not thinned, and futures of a funnel are recorded at fixed points of each step",
+            "it belongs to a recorded path; the crossings of --section are not thinned, and futures of a funnel are recorded at fixed points of each step",
         ),
     ]
 };
@@ -427,7 +427,7 @@ enum Misuse {
         "--switch delayed: the state is the whole past, of which neither closed orbits nor exponents are computed; follow a long run (twofold run, twofold sweep), or give another --switch"
     )]
     Past,
-    #[error("--exit all follows many futures and records their paths; a sweep needs passages: give another rule")]
+    #[error("--exit all follows many futures and records their paths; a sweep needs crossings: give another rule")]
     FunnelInSweep,
     #[error("{file} is not a spec of one run: {reason}; make one with `--only PANEL --reading READING --print-spec`")]
     Spec { file: String, reason: String },

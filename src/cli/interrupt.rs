@@ -92,8 +92,8 @@ mod unix {
         record::files::abandon();
         progress::clear();
         complain(match exit {
-            Exit::Terminated => "terminated: files that were finished stay, the rest is gone",
-            _ => "interrupted: files that were finished stay, the rest is gone",
+            Exit::Terminated => "terminated: finished files are kept, unfinished ones are removed",
+            _ => "interrupted: finished files are kept, unfinished ones are removed",
         });
         std::process::exit(i32::from(exit as u8));
     }

@@ -60,7 +60,7 @@ pub fn recompute(data: &[(&str, &[u8])], folder: &Path, threads: usize, progress
     match otherwise.first() {
         None => Ok(()),
         Some(first) => Err(CliError::Differs(format!(
-            "{} committed rows come out otherwise now; the first: {first}. What they are now stands in {}",
+            "{} committed rows have other results now; the first: {first}. The new rows are in {}",
             otherwise.len(),
             folder.display()
         ))),

@@ -109,7 +109,7 @@ fn pictures_that_cannot_be_are_refused_with_reasons() {
     plot(&["--out", "a.png", "--kind", "section"], 2, &["--section y=0"]);
     plot(&["--out", "a.png", "--kind", "plane", "--section", "y=0"], 2, &["leave out --section"]);
     plot(&["--out", "a.png", "--axes", "x,q"], 2, &["no state \"q\"", "x, y, z"]);
-    plot(&["--out", "a.png", "--axes", "x,y,x"], 2, &["stands there twice"]);
+    plot(&["--out", "a.png", "--axes", "x,y,x"], 2, &["is given twice"]);
     plot(&["--out", "a.png", "--kind", "plane", "--axes", "x"], 2, &["two axes", "1 given"]);
     plot(&["--out", "a.png", "--kind", "plane", "--camera", "1,2"], 2, &["--camera has no effect"]);
     plot(&["--out", "a.png", "--camera", "1,200"], 2, &["elevation"]);

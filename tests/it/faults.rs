@@ -111,7 +111,7 @@ fn wrong_numbers_are_named() {
         (vec!["--switch", "filippov", "--exit", "all", "--eps", "1e-3"], vec!["--eps", "no effect"]),
         (vec!["--system", "wheel", "--reading", "printed"], vec!["--reading", "no effect"]),
         (vec!["--seed", "5"], vec!["--seed", "random"]),
-        (vec!["--section", "y=0", "--chord", "0.1"], vec!["--chord", "passages"]),
+        (vec!["--section", "y=0", "--chord", "0.1"], vec!["--chord", "crossings"]),
         (vec!["--print-spec", "--format", "json"], vec!["--print-spec", "--format"]),
         (vec!["--method", "taylor-extended", "--rtol", "1e-40"], vec!["--rtol", "32 digits"]),
         (vec!["--switch", "filippov", "--exit", "at-once:up"], vec!["--exit", "at-once:plus"]),
@@ -583,7 +583,7 @@ fn hostile_pictures_cost_one_line_each() {
     fs::write(at("fig1.png"), &bytes).unwrap();
     let nowhere = at("nowhere");
     let inspected = twofold(&["inspect", at("fig1.png").to_str().unwrap(), "--expected", nowhere.to_str().unwrap()]);
-    refuses(&inspected, 1, &["Not one of ours"]);
+    refuses(&inspected, 1, &["Not made by twofold"]);
     let here = folder.path().to_str().unwrap();
     #[cfg(unix)]
     std::os::unix::fs::symlink("nowhere", at("gone.png")).unwrap();

@@ -17,7 +17,7 @@ use crate::record::hash::canonical_json;
 
 /// Bytes that are not what they claim to be.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("this is not a table of twofold's: {0}")]
+#[error("this is not a table that twofold wrote: {0}")]
 pub struct Malformed(pub String);
 
 fn malformed<T>(what: impl Into<String>) -> Result<T, Malformed> {

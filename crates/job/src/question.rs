@@ -94,7 +94,7 @@ pub enum JobError {
     Filippov(#[from] FilippovError),
     /// More points than fit in memory.
     #[error(
-        "more than {limit} points were recorded by t = {t}, the most that are kept in memory (0.6 GB): record passages through a plane instead of the path, give a larger chord, or an earlier end time"
+        "more than {limit} points were recorded by t = {t}, the most that are kept in memory (0.6 GB): record crossings of a plane instead of the path, give a larger chord, or an earlier end time"
     )]
     TooManyPoints {
         /// Time reached.

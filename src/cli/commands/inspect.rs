@@ -10,9 +10,9 @@ use crate::paper::pipeline::pixel_hash;
 use crate::record::{self, Hash, Manifest, PictureEntry, read_tree};
 use crate::render::{Format, Provenance, ProvenanceError, decode_png, read_provenance};
 
-/// Print the provenance inside a PNG, SVG or PDF file and say whether it is one of ours and unchanged.
+/// Print the provenance inside a PNG, SVG or PDF file and say whether twofold made it and nobody changed it.
 ///
-/// Exit code 0: ours and unchanged. 1: not ours, or changed, or of the name of a committed picture but not its bytes. 2: the file cannot
+/// Exit code 0: made by twofold and unchanged. 1: not made by twofold, or changed, or of the name of a committed picture but not its bytes. 2: the file cannot
 /// be read as a picture. The seal inside a file tells damage and editing; only the committed hash tells forgery.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  twofold inspect fig7-printed.png\n  twofold inspect --json someone-elses.pdf")]
@@ -168,7 +168,7 @@ fn describe(i: &Inspection, file: &Path, expected: &Path) -> String {
             format!("Reference: the pixels of the committed {picture}, in another file")
         }
         Committed::Different { picture } => {
-            format!("Reference: bears the name of {picture} and is NOT the committed file")
+            format!("Reference: it has the name of {picture} and is NOT the committed file")
         }
         Committed::Unlisted => {
             "Reference: no committed manifest lists it (an altered picture, or another version's)".into()
@@ -179,10 +179,10 @@ fn describe(i: &Inspection, file: &Path, expected: &Path) -> String {
     });
     lines.push(
         match (i.ours_and_unchanged, i.seal) {
-            (true, _) => "One of ours, and unchanged.",
-            (false, Seal::Absent) => "Not one of ours.",
-            (false, Seal::Intact) => "Ours by its seal, but not the committed picture.",
-            (false, _) => "One of ours, but changed.",
+            (true, _) => "Made by twofold, and unchanged.",
+            (false, Seal::Absent) => "Not made by twofold.",
+            (false, Seal::Intact) => "Made by twofold by its seal, but not the committed picture.",
+            (false, _) => "Made by twofold, and changed since.",
         }
         .into(),
     );

@@ -172,10 +172,13 @@ fn text(question: &ClosedOrbit, answer: &Answer) -> Result<String, CliError> {
     let mut line = |label: &str, what: String| {
         let _ = writeln!(out, "{label:<13} {what}");
     };
-    let passages = if returns == 1 { "1 passage".to_owned() } else { format!("{returns} passages") };
+    let crossings = if returns == 1 { "crossing" } else { "crossings" };
     line(
         "closed orbit",
-        format!("through {plane}, {passages} {}wards a turn", if question.plane.upward { "up" } else { "down" }),
+        format!(
+            "through {plane}, {returns} {}ward {crossings} per turn",
+            if question.plane.upward { "up" } else { "down" }
+        ),
     );
     line("period", format!("{period}"));
     line("point", names.iter().zip(&point).map(|(n, x)| format!("{n} = {x}")).collect::<Vec<_>>().join(", "));
@@ -232,7 +235,7 @@ fn at_rest(question: &ClosedOrbit, rest: &Rest) -> String {
     };
     let numbers = if rest.eigenvalues.is_empty() { "none".into() } else { complex(&rest.eigenvalues) };
     format!(
-        "{:<13} {state}\n{:<13} {numbers}\n{:<13} {stability}\nThe motion comes to a rest: there is no closed orbit near.\n",
+        "{:<13} {state}\n{:<13} {numbers}\n{:<13} {stability}\nThe motion comes to rest: there is no closed orbit near.\n",
         rest.word(),
         "eigenvalues",
         "stability"

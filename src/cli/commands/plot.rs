@@ -221,7 +221,7 @@ fn look(arguments: &Arguments, spec: &RunSpec) -> Result<Look, CliError> {
             )));
         };
         if axes.contains(&i) {
-            return Err(CliError::Usage(format!("--axes: \"{name}\" stands there twice")));
+            return Err(CliError::Usage(format!("--axes: \"{name}\" is given twice")));
         }
         axes.push(i);
     }

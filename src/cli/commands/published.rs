@@ -93,7 +93,7 @@ pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool, jso
     } else if failures == 0 {
         print(&format!("{checked} checked, all hold"))?;
     } else {
-        print(&format!("{failures} of {checked} hold on no rung"))?;
+        print(&format!("{failures} of {checked} meet no criterion"))?;
     }
     Ok(if failures == 0 { Exit::Fine } else { Exit::CheckFailed })
 }
@@ -128,7 +128,7 @@ fn held(file: &FileBytes, computed: &Computed, limits: &Limits) -> Finding {
             let text = format!("holds within tolerance ({}); {}", limits.describe(rung), say(&comparison));
             finding(Some(rung), text, Some(comparison))
         }
-        None => finding(None, format!("DIFFERS: no rung holds; {}", say(&comparison)), Some(comparison)),
+        None => finding(None, format!("DIFFERS: no criterion is met; {}", say(&comparison)), Some(comparison)),
     }
 }
 

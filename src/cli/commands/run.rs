@@ -90,7 +90,7 @@ fn say_horizon(run: &Run, progress: &Progress) -> Result<(), CliError> {
         fact("order")?,
         fact("other_order")?,
         fact("horizon")?,
-        if whole { ", the end" } else { "; from there on the orbit is the arithmetic's" }
+        if whole { ", the end" } else { "; later digits are rounding errors" }
     ));
     Ok(())
 }

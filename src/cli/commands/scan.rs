@@ -192,13 +192,13 @@ fn cell(sweep: &Sweep, row: u64, two: bool, progress: &Progress) -> Option<Cell>
         return None;
     }
     let settings = sweep.settings(row);
-    let found = sweep.question(row).map_err(JobError::Other).and_then(|fate| {
+    let found = sweep.question(row).map_err(JobError::Other).and_then(|asked| {
         let (silent, watch) = (Silent(progress), SilentRun(progress));
         let executor = Executor::new(None, &silent);
         if two {
-            return fate.ending(&executor, &watch).map(Found::Ending);
+            return asked.ending(&executor, &watch).map(Found::Ending);
         }
-        let run = fate.0.run;
+        let run = asked.0.run;
         let answer = executor.ask(&Run(run.clone()))?;
         if answer.stop == job::Stop::Interrupted {
             return Err(JobError::Interrupted);

@@ -38,7 +38,7 @@ const DRAW_SEED: u64 = 2013;
     interval (between restarts), eps, eps-prime, sigma, kick-every, kick-size, seed, stream, method.\n\
     Values: a,b,c; FROM..TO:COUNT; FROM..TO:log:COUNT; STEP*COUNT; FROM..TO and FROM..TO:log drawn at random; seed=FIRST..LAST.\n\n\
     Examples:\n  \
-    twofold sweep --alpha 0.1 --beta 1e-4 --restart 100 --t-end 1e5 --method dopri5 --out lottery.csv\n  \
+    twofold sweep --alpha 0.1 --beta 1e-4 --restart 100 --t-end 1e5 --method dopri5 --out shifted.csv\n  \
     twofold sweep --t-end 2e5 --over params.alpha=1e-3..1:log:13 --over interval=20,40,100 --out map.csv\n  \
     twofold sweep --t-end 2e5 --over method=lsoda,dopri5 --over shift.x=-1e-9..1e-9 --random 100 --shard 2/8 --out part2.csv\n  \
     twofold sweep merge part*.csv --out whole.csv"
@@ -253,7 +253,12 @@ fn take(arguments: &Arguments, rows: &mut Rows, old: Rows, file: &Path) -> Resul
         for row in there.iter().step_by(step) {
             match old.sweep().row(row.number(), &()) {
                 Ok(again) if again.line() == row.line() => {}
-                Ok(_) => return Err(refuse(format!("row {} comes out otherwise now; start anew", row.number()))),
+                Ok(_) => {
+                    return Err(refuse(format!(
+                        "row {} has another result with this version; start again without --resume, or in another file",
+                        row.number()
+                    )));
+                }
                 Err(error) => return Err(error.into()),
             }
         }

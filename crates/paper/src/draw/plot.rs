@@ -130,10 +130,9 @@ pub fn axes(run: &RunSpec, kind: Kind, given: &[usize]) -> Result<Vec<usize>, Pl
 }
 
 const SECTION_NEEDED: PlotError =
-    PlotError::Recording("a section shows passages through a plane: record them, such as by --section y=0");
-const PATH_NEEDED: PlotError = PlotError::Recording(
-    "passages through a plane were recorded, and this picture needs the path: leave out --section",
-);
+    PlotError::Recording("a section shows crossings of a plane: record them, such as by --section y=0");
+const PATH_NEEDED: PlotError =
+    PlotError::Recording("crossings of a plane were recorded, and this picture needs the path: leave out --section");
 
 /// The drawing of a run; `small_print` stands at its foot.
 ///
@@ -471,7 +470,7 @@ fn section(sheet: Sheet, run: &RunSpec, answer: &Answer, shown: &[usize]) -> Res
         |late: bool| (0..t.len()).filter(|i| (t[*i] > half) == late).map(|i| [xs[i], ys[i]]).collect::<Vec<_>>();
     panel = panel.dots(points(false), DotStyle::early()).dots(points(true), DotStyle::late());
     let plane = format!("{} = {}", markup::name(names[coordinate]), number(value));
-    let sheet = sheet.subtitle(format!("passages through {plane}")).panel_aspect(0.9).panel("", "", panel);
+    let sheet = sheet.subtitle(format!("crossings of {plane}")).panel_aspect(0.9).panel("", "", panel);
     let half = number(half);
     let sheet = sheet
         .legend(LegendEntry::new(LegendKey::Dots(DotStyle::early()), format!("*t* ≤ {half}")))
