@@ -3,9 +3,9 @@
 use nalgebra::SVector;
 use twofold_analyse::SectionRecorder;
 use twofold_analyse::lyapunov::{self, Exponent};
-use twofold_integrate::ensemble::{Common, End, InstructionSet, Run, ensemble_in_vectors};
+use twofold_integrate::ensemble::{Common, End, EnsembleRun, InstructionSet, ensemble_in_vectors};
 use twofold_integrate::{Failure, Watch};
-use twofold_system::{Alike, Caricature, Compiled, Smoothed, System, Transition};
+use twofold_system::{Caricature, Compiled, ParameterBatch, Smoothed, System, Transition};
 
 /// The end of a run among others, and its section.
 pub type Section<const N: usize> = End<SectionRecorder<N>, N>;
@@ -16,7 +16,7 @@ pub trait Lanes<const N: usize> {
     fn sections(
         &self,
         set: InstructionSet,
-        runs: &[Run<N>],
+        runs: &[EnsembleRun<N>],
         common: Common<'_, N>,
         section: &SectionRecorder<N>,
         finished: &mut dyn FnMut(usize, Section<N>),
@@ -29,7 +29,7 @@ macro_rules! lanes {
             fn sections(
                 &self,
                 set: InstructionSet,
-                runs: &[Run<$n>],
+                runs: &[EnsembleRun<$n>],
                 common: Common<'_, $n>,
                 section: &SectionRecorder<$n>,
                 finished: &mut dyn FnMut(usize, Section<$n>),
@@ -41,9 +41,9 @@ macro_rules! lanes {
 }
 
 lanes! {
-    2 Alike<2>;
-    3 Alike<3>;
-    4 Alike<4>;
+    2 ParameterBatch<2>;
+    3 ParameterBatch<3>;
+    4 ParameterBatch<4>;
     3 Smoothed<Caricature>;
 }
 
@@ -54,19 +54,19 @@ pub trait Exponents<const N: usize> {
         &self,
         set: InstructionSet,
         starts: &[SVector<f64, N>],
-        settings: &lyapunov::Settings,
+        settings: &lyapunov::LyapunovOptions,
         watch: &dyn Watch,
     ) -> Option<Vec<Result<Exponent, Failure>>>;
 }
 
 macro_rules! exponents {
     ($($n:literal $m:literal),*) => {
-        $(impl Exponents<$n> for Alike<$m> {
+        $(impl Exponents<$n> for ParameterBatch<$m> {
             fn exponents(
                 &self,
                 set: InstructionSet,
                 starts: &[SVector<f64, $n>],
-                settings: &lyapunov::Settings,
+                settings: &lyapunov::LyapunovOptions,
                 watch: &dyn Watch,
             ) -> Option<Vec<Result<Exponent, Failure>>> {
                 lyapunov::largest_side_by_side::<$n, $m, _>(set, self, starts, settings, watch)

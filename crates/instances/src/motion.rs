@@ -2,13 +2,13 @@
 
 use nalgebra::SVector;
 use twofold_analyse::filippov_return;
-use twofold_analyse::floquet::{self, Plane, Returned};
+use twofold_analyse::floquet::{self, ReturnPlane, Returned};
 use twofold_analyse::limit::{
     AfterVisit, AfterVisitQuestion, Convergence, ConvergenceQuestion, after_visit, convergence,
 };
 use twofold_integrate::Watch;
 use twofold_integrate::filippov::{
-    ExitRule, Faces, FilippovError, FilippovObserver, FilippovSummary, Funnel, FunnelGrid, Settings, funnel,
+    ExitRule, Faces, FilippovError, FilippovObserver, FilippovOptions, FilippovSummary, Funnel, FunnelGrid, funnel,
     run_two_surfaces, run_watched,
 };
 use twofold_system::{BindError, Bound, Caricature, Compiled, System};
@@ -26,7 +26,7 @@ pub trait Motions<const N: usize> {
         &self,
         x0: SVector<f64, N>,
         t_end: f64,
-        settings: &Settings,
+        settings: &FilippovOptions,
         exit: ExitRule,
         observer: &mut dyn FilippovObserver<N>,
         watch: &dyn Watch,
@@ -39,7 +39,7 @@ pub trait Motions<const N: usize> {
         &self,
         x0: SVector<f64, N>,
         t_end: f64,
-        settings: &Settings,
+        settings: &FilippovOptions,
         grid: &FunnelGrid,
     ) -> Result<Funnel<N>, FilippovError>;
     /// As [`filippov_return::return_map`].
@@ -48,10 +48,10 @@ pub trait Motions<const N: usize> {
     /// As there.
     fn return_map(
         &self,
-        plane: Plane,
+        plane: ReturnPlane,
         returns: usize,
         u: &SVector<f64, N>,
-        settings: &floquet::Settings,
+        settings: &floquet::FloquetOptions,
         derivative: bool,
     ) -> Result<Returned, filippov_return::Error>;
 }
@@ -63,7 +63,7 @@ macro_rules! motions {
                 &self,
                 x0: SVector<f64, $n>,
                 t_end: f64,
-                settings: &Settings,
+                settings: &FilippovOptions,
                 exit: ExitRule,
                 observer: &mut dyn FilippovObserver<$n>,
                 watch: &dyn Watch,
@@ -74,17 +74,17 @@ macro_rules! motions {
                 &self,
                 x0: SVector<f64, $n>,
                 t_end: f64,
-                settings: &Settings,
+                settings: &FilippovOptions,
                 grid: &FunnelGrid,
             ) -> Result<Funnel<$n>, FilippovError> {
                 funnel(self, x0, t_end, settings, grid)
             }
             fn return_map(
                 &self,
-                plane: Plane,
+                plane: ReturnPlane,
                 returns: usize,
                 u: &SVector<f64, $n>,
-                settings: &floquet::Settings,
+                settings: &floquet::FloquetOptions,
                 derivative: bool,
             ) -> Result<Returned, filippov_return::Error> {
                 filippov_return::return_map(self, plane, returns, u, settings, derivative)
@@ -148,7 +148,7 @@ pub trait TwoSurfaces<const N: usize> {
         &self,
         x0: SVector<f64, N>,
         t_end: f64,
-        settings: &Settings,
+        settings: &FilippovOptions,
         exit: ExitRule,
         observer: &mut dyn FilippovObserver<N>,
         watch: &dyn Watch,
@@ -162,7 +162,7 @@ macro_rules! two_surfaces {
                 &self,
                 x0: SVector<f64, $n>,
                 t_end: f64,
-                settings: &Settings,
+                settings: &FilippovOptions,
                 exit: ExitRule,
                 observer: &mut dyn FilippovObserver<$n>,
                 watch: &dyn Watch,

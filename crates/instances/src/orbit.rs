@@ -2,9 +2,9 @@
 
 use nalgebra::SVector;
 use twofold_analyse::digits::{Digits, DigitsQuestion, digits};
-use twofold_analyse::passage::{Passage, PassageQuestion, passage};
+use twofold_analyse::passage::{PassageAnswer, PassageQuestion, passage};
 use twofold_integrate::{
-    Course, Failure, Method, Observer, PRECISIONS, Stepper, Summary, Tolerance, Watch, WithStepper, drive,
+    DriveOptions, Failure, Method, Observer, PRECISIONS, Stepper, Summary, Tolerance, Watch, WithStepper, drive,
     with_extended,
 };
 use twofold_system::{
@@ -24,7 +24,7 @@ pub struct How {
     /// Degree of its series; the one that the tolerance asks for if absent.
     pub order: Option<u16>,
     /// How far, and with what restarts and kicks.
-    pub course: Course,
+    pub options: DriveOptions,
 }
 
 /// A smooth equation of `N` states.
@@ -46,7 +46,7 @@ pub trait Orbits<const N: usize>: Sync {
 pub(crate) struct Waiting<'a, F, const N: usize> {
     pub(crate) field: &'a F,
     pub(crate) x0: SVector<f64, N>,
-    pub(crate) course: Course,
+    pub(crate) options: DriveOptions,
     pub(crate) observer: &'a mut dyn Observer<N>,
     pub(crate) watch: &'a dyn Watch,
 }
@@ -54,8 +54,8 @@ pub(crate) struct Waiting<'a, F, const N: usize> {
 impl<F: VectorField<N>, const N: usize> WithStepper<N> for Waiting<'_, F, N> {
     type Answer = Result<Summary<N>, Failure>;
     fn with<M: Stepper<N>>(self, mut stepper: M) -> Self::Answer {
-        let Self { field, x0, course, observer, watch } = self;
-        drive(field, x0, &course, &mut stepper, observer, watch)
+        let Self { field, x0, options, observer, watch } = self;
+        drive(field, x0, &options, &mut stepper, observer, watch)
     }
 }
 
@@ -66,8 +66,8 @@ fn orbit<F: VectorField<N>, const N: usize>(
     observer: &mut dyn Observer<N>,
     watch: &dyn Watch,
 ) -> Result<Summary<N>, Failure> {
-    let How { method, tolerance, precision, order, course } = *how;
-    let waiting = Waiting { field, x0, course, observer, watch };
+    let How { method, tolerance, precision, order, options } = *how;
+    let waiting = Waiting { field, x0, options, observer, watch };
     match (precision, order) {
         (None, None) => method.with_stepper(tolerance, waiting),
         _ => with_extended(precision.unwrap_or(PRECISIONS[0]), order, tolerance, waiting),
@@ -110,7 +110,7 @@ pub trait Visits: Orbits<3> {
     ///
     /// # Errors
     /// As there.
-    fn passage(&self, eps: f64, question: &PassageQuestion) -> Result<Passage, Failure>;
+    fn passage(&self, eps: f64, question: &PassageQuestion) -> Result<PassageAnswer, Failure>;
     /// As [`digits()`].
     ///
     /// # Errors
@@ -121,7 +121,7 @@ pub trait Visits: Orbits<3> {
 macro_rules! visits {
     ($($field:ty),*) => {
         $(impl Visits for $field {
-            fn passage(&self, eps: f64, question: &PassageQuestion) -> Result<Passage, Failure> {
+            fn passage(&self, eps: f64, question: &PassageQuestion) -> Result<PassageAnswer, Failure> {
                 passage(self, eps, question)
             }
             fn digits(&self, question: &DigitsQuestion) -> Result<Digits, Failure> {

@@ -1,7 +1,7 @@
 //! Equations with their variational equations.
 
 use nalgebra::SVector;
-use twofold_analyse::floquet::{self, Plane, Returned};
+use twofold_analyse::floquet::{self, ReturnPlane, Returned};
 use twofold_analyse::lyapunov::{self, Estimate};
 use twofold_analyse::tangent::Tangent;
 use twofold_integrate::{Failure, Watch};
@@ -17,7 +17,7 @@ pub trait Growth<const N: usize> {
         &self,
         x0: SVector<f64, N>,
         kicked_states: usize,
-        settings: &lyapunov::Settings,
+        settings: &lyapunov::LyapunovOptions,
         watch: &dyn Watch,
     ) -> Result<Estimate, Failure>;
 }
@@ -29,7 +29,7 @@ macro_rules! growth {
                 &self,
                 x0: SVector<f64, $n>,
                 kicked_states: usize,
-                settings: &lyapunov::Settings,
+                settings: &lyapunov::LyapunovOptions,
                 watch: &dyn Watch,
             ) -> Result<Estimate, Failure> {
                 lyapunov::estimate_along::<$n, $m, _>(self, x0, kicked_states, settings, watch)
@@ -60,10 +60,10 @@ pub trait Returns<const N: usize> {
     /// As there.
     fn return_map(
         &self,
-        plane: Plane,
+        plane: ReturnPlane,
         returns: usize,
         u: &SVector<f64, N>,
-        settings: &floquet::Settings,
+        settings: &floquet::FloquetOptions,
     ) -> Result<Returned, floquet::Error>;
 }
 
@@ -72,10 +72,10 @@ macro_rules! returns {
         $(impl Returns<$n> for BoundField<$m> {
             fn return_map(
                 &self,
-                plane: Plane,
+                plane: ReturnPlane,
                 returns: usize,
                 u: &SVector<f64, $n>,
-                settings: &floquet::Settings,
+                settings: &floquet::FloquetOptions,
             ) -> Result<Returned, floquet::Error> {
                 floquet::return_map::<$n, $m, _>(self, plane, returns, u, settings)
             }

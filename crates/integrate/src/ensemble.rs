@@ -210,13 +210,13 @@ pub fn ensemble_watched<E, O, const N: usize>(
 pub fn ensemble_in_vectors<E, O, const N: usize>(
     set: InstructionSet,
     equations: &E,
-    runs: &[Run<N>],
+    runs: &[EnsembleRun<N>],
     common: Common<'_, N>,
     observer: impl Fn(usize) -> O,
     finished: &mut dyn FnMut(usize, End<O, N>),
 ) -> bool
 where
-    E: Equations<N>,
+    E: BatchedField<N>,
     O: Observer<N>,
 {
     All::<_, _, _, N, 1> { equations, runs, common, observer, finished }.in_vectors(set).is_none()
@@ -231,7 +231,7 @@ struct All<'a, E, O, M: Fn(usize) -> O, const N: usize, const K: usize> {
     finished: &'a mut dyn FnMut(usize, End<O, N>),
 }
 
-impl<'a, E: Equations<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> All<'a, E, O, M, N, 1> {
+impl<'a, E: BatchedField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> All<'a, E, O, M, N, 1> {
     /// Computes all by these vector instructions, or by this machine's best; gives itself back if there are none.
     fn in_vectors(self, set: InstructionSet) -> Option<Self> {
         match if set.is_here() { set } else { InstructionSet::best() } {

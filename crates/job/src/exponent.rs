@@ -67,7 +67,7 @@ impl LargestExponent {
         watch: &dyn Watch,
     ) -> Result<Option<Vec<Option<Exponent>>>, JobError>
     where
-        Alike<M>: Exponents<N>,
+        ParameterBatch<M>: Exponents<N>,
     {
         let fields: Option<Vec<BoundField<M>>> = questions.iter().map(|q| q.tangent()?.bind().ok()).collect();
         let Some(tangents) = fields.and_then(ParameterBatch::new) else { return Ok(None) };
