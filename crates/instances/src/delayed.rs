@@ -33,9 +33,9 @@ fn late_orbit<P: PiecewiseSmooth<N> + Clone, const N: usize>(
     observer: &mut dyn Observer<N>,
     watch: &dyn Watch,
 ) -> Result<Result<Summary<N>, Failure>, DelayError> {
-    let How { method, tolerance, order, course, .. } = *how;
+    let How { method, tolerance, order, options, .. } = *how;
     let delayed = Delayed { sides: Sides::new(system, data), switch, x0 };
-    delayed.with_stepper(method, order, tolerance, Waiting { field: &Own, x0, course, observer, watch })
+    delayed.with_stepper(method, order, tolerance, Waiting { field: &Own, x0, options, observer, watch })
 }
 
 macro_rules! late {
