@@ -29,6 +29,7 @@ mod filippov_limit;
 mod flags;
 mod fuzz;
 mod golden;
+mod guard;
 mod inspect;
 mod law;
 mod layered;

@@ -412,7 +412,7 @@ struct Missed {
 
 /// The smallest part of a step that is halved again.
 const FINEST: f64 = 1e-12;
-/// Most parts of a step that are looked at.
+/// Most parts of a step that are looked at; a step with more is made in shorter ones.
 const MOST_PARTS: usize = 4000;
 /// What a step has missed is allowed to be so many times the tolerance: what its error estimate does not show.
 const ALLOWED: f64 = 20.0;
@@ -452,9 +452,13 @@ impl Gates {
             if quiet && whole {
                 return None;
             }
-            if quiet || to - from < FINEST || leaves.len() + open.len() > MOST_PARTS {
+            if quiet || to - from < FINEST {
                 leaves.push((from, to));
                 continue;
+            }
+            if leaves.len() + open.len() > MOST_PARTS {
+                // Too long to be searched: shorter steps are.
+                return Some(Missed { from: 0.0, to: 1.0 });
             }
             let middle = 0.5 * (from + to);
             let [a, b, c, d, e] = samples;
