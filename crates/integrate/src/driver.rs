@@ -168,7 +168,7 @@ mod tests {
     use nalgebra::vector;
 
     use super::*;
-    use crate::{Dopri5, Kick, KickLaw, Tolerance};
+    use crate::{Dopri5, Tolerance};
     use twofold_num::Elementary;
 
     /// x'' = -x.
