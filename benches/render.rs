@@ -23,7 +23,7 @@ fn cloud(k: f64, n: usize) -> Vec<[f64; 2]> {
 }
 
 fn sections() -> Sheet {
-    let mut sheet = Sheet::new(ColumnWidth::Double, 3, "Three sections.").title("Sections").footer("*α* = 10^{-3}");
+    let mut sheet = Sheet::new(ColumnWidth::Wide, 3, "Three sections.").title("Sections").footer("*α* = 10^{-3}");
     for (label, k) in [("(i)", 0.9), ("(ii)", 0.97), ("(iii)", 1.1)] {
         let panel = PlanePanel::new(Axis::linear("*x*", 0.0, 6.3), Axis::linear("*z*", 0.0, 6.3))
             .dots(cloud(k + 0.5, 25_000), DotStyle::early())

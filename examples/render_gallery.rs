@@ -32,7 +32,7 @@ fn sections() -> Sheet {
         let (x, y) = axes();
         PlanePanel::new(x, y).dots(first, early()).dots(late, DotStyle::late())
     };
-    Sheet::new(ColumnWidth::Double, 3, "Three sections of made-up maps.")
+    Sheet::new(ColumnWidth::Wide, 3, "Three sections of made-up maps.")
         .title("Sections at *y* = 0, reading *reconstructed*")
         .panel("(i)", "interval 20", panel(transient.clone(), chaos))
         .panel("(ii)", "interval 40", panel(transient.clone(), two))
@@ -93,7 +93,7 @@ fn space() -> Sheet {
 }
 
 fn four_spaces() -> Sheet {
-    let mut sheet = Sheet::new(ColumnWidth::Double, 4, "Four trajectories.").footer("*α* = 10^{-1}");
+    let mut sheet = Sheet::new(ColumnWidth::Wide, 4, "Four trajectories.").footer("*α* = 10^{-1}");
     for (i, label) in ["(i)", "(ii)", "(iii)", "(iv)"].into_iter().enumerate() {
         let path = lorenz(20_000 + 5_000 * i, 0.0015);
         let panel = SpacePanel::new(
@@ -160,7 +160,7 @@ fn charts() -> Sheet {
         .note([0.6, 0.35], "*r*", Anchor::Left)
         .note([0.0, -0.5], "*ω*_{0}", Anchor::Centre)
         .markers(vec![[0.0, 0.0]], MarkerStyle::new(MarkerShape::Dot, style::INK));
-    Sheet::new(ColumnWidth::Double, 3, "Work against precision, regions, a sketch.")
+    Sheet::new(ColumnWidth::Wide, 3, "Work against precision, regions, a sketch.")
         .panel("(a)", "work and precision", work)
         .panel("(b)", "regions", regions)
         .panel("(c)", "sketch", sketch)
@@ -195,7 +195,7 @@ fn helix() -> SpacePanel {
 }
 
 fn edge_cases() -> Sheet {
-    Sheet::new(ColumnWidth::Double, 4, "Edge cases.")
+    Sheet::new(ColumnWidth::Wide, 4, "Edge cases.")
         .title("Edge cases")
         .panel("(a)", "empty", PlanePanel::new(Axis::linear("*x*", 0.0, 1.0), Axis::linear("*y*", 0.0, 1.0)))
         .panel(

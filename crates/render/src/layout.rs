@@ -9,7 +9,7 @@ use super::font::{CAP_HEIGHT, FontFace};
 use super::plane::{self, Insets};
 use super::rich_text;
 use super::scene::{DPI, Scene, UNITS_PER_PIXEL, UNITS_PER_POINT, units};
-use super::sheet::{ColumnWidth, Content, LegendEntry, Panel, Sheet};
+use super::sheet::{Colour, ColumnWidth, Content, LegendEntry, Panel, Sheet};
 use super::space;
 use super::style;
 
@@ -17,7 +17,7 @@ use super::style;
 pub fn width_px(width: ColumnWidth) -> u32 {
     let millimetres = match width {
         ColumnWidth::Single => 86,
-        ColumnWidth::Double => 178,
+        ColumnWidth::Wide => 102,
     };
     (millimetres * DPI * 10 + 127) / 254
 }
@@ -56,9 +56,10 @@ pub fn draw(sheet: &Sheet) -> Result<Scene, RenderError> {
     for (panel, (rect, baseline)) in sheet.panels.iter().zip(&plan.panels) {
         let label_how = TextFormat::new(style::LABEL_PT).bold();
         canvas.text(&panel.label, (rect.x, *baseline), label_how)?;
-        let label = rich_text::width(&panel.label, FontFace::Bold, style::LABEL_PT);
-        let shift = if panel.label.is_empty() { 0 } else { units(label + 4.0) };
-        canvas.text(&panel.title, (rect.x + shift, *baseline), TextFormat::new(style::LABEL_PT))?;
+        for line in panel_heading(panel, rect.w) {
+            let how = TextFormat::new(line.size).colour(line.colour);
+            canvas.text(&line.text, (rect.x + line.indent, baseline + line.below), how)?;
+        }
         match &panel.content {
             Content::Plane(p) => plane::draw(&canvas, p, *rect)?,
             Content::Space(p) => space::draw(&canvas, p, *rect)?,
@@ -121,8 +122,43 @@ fn plan(sheet: &Sheet, width: i32) -> Plan {
     Plan { canvas_height: y + margin, heading, banner, panels, legend, footer }
 }
 
-fn title_height(panel: &Panel) -> i32 {
-    if panel.label.is_empty() && panel.title.is_empty() { 0 } else { units(CAP_HEIGHT * style::LABEL_PT + 4.5) }
+/// A line of a panel's heading.
+struct HeadingLine {
+    text: String,
+    size: f64,
+    colour: Colour,
+    /// Distance from the panel's left edge.
+    indent: i32,
+    /// Distance below the first baseline.
+    below: i32,
+}
+
+/// The title of a panel beside its label and the notes below, broken at the panel's width.
+fn panel_heading(panel: &Panel, width: i32) -> Vec<HeadingLine> {
+    let points = |units: i32| f64::from(units) / f64::from(UNITS_PER_POINT);
+    let label = rich_text::width(&panel.label, FontFace::Bold, style::LABEL_PT);
+    let indent = if panel.label.is_empty() { 0 } else { units(label + 4.0) };
+    let mut lines: Vec<HeadingLine> = Vec::new();
+    let parts = std::iter::once((&panel.title, style::LABEL_PT, style::INK, indent))
+        .chain(panel.notes.iter().map(|note| (note, style::FOOTER_PT, style::SOFT_INK, 0)));
+    for (text, size, colour, indent) in parts.filter(|part| !part.0.is_empty()) {
+        for text in rich_text::wrap(text, FontFace::Regular, size, points(width - indent)) {
+            let below = match lines.last() {
+                Some(last) => last.below + units(size * style::LEADING),
+                // Notes without a title stand below the label.
+                None if indent == 0 && !panel.label.is_empty() => units(size * style::LEADING),
+                None => 0,
+            };
+            lines.push(HeadingLine { text, size, colour, indent, below });
+        }
+    }
+    lines
+}
+
+fn title_height(panel: &Panel, width: i32) -> i32 {
+    let last = panel_heading(panel, width).last().map(|line| line.below);
+    let below = if panel.label.is_empty() { last } else { last.or(Some(0)) };
+    below.map_or(0, |below| below + units(CAP_HEIGHT * style::LABEL_PT + 4.5))
 }
 
 fn content_insets(panel: &Panel, w: i32, h: i32) -> Insets {
@@ -171,7 +207,7 @@ fn plan_panels(sheet: &Sheet, inner: i32, margin: i32, y: &mut i32) -> Vec<(Rect
     for (r, row) in rows.iter().enumerate() {
         let h = row.iter().map(|p| height(p, sheet, w)).max().unwrap_or(0);
         let inset = |f: fn(Insets) -> i32| row.iter().map(|p| f(content_insets(p, w, h))).max().unwrap_or(0);
-        let title = row.iter().map(title_height).max().unwrap_or(0);
+        let title = row.iter().map(|p| title_height(p, w)).max().unwrap_or(0);
         if r > 0 {
             *y += units(7.0);
         }
@@ -197,6 +233,7 @@ pub fn check_texts(sheet: &Sheet) -> Result<(), RenderError> {
     texts.extend(sheet.legend.iter().map(|e| e.text.as_str()));
     for panel in &sheet.panels {
         texts.extend([panel.label.as_str(), panel.title.as_str()]);
+        texts.extend(panel.notes.iter().map(String::as_str));
         match &panel.content {
             Content::Plane(p) => {
                 texts.extend([p.x.title.as_str(), p.y.title.as_str()]);

@@ -10,7 +10,7 @@
 //! use twofold_render::{Sheet, render};
 //! let chart = PlanePanel::new(Axis::linear("*x*", 0.0, 1.0), Axis::linear("*y*", 0.0, 1.0))
 //!     .dots(vec![[0.2, 0.3], [0.7, 0.8]], DotStyle::late());
-//! let rendered = render(&Sheet::new(ColumnWidth::Double, 1, "Two points").panel("(a)", "", chart))?;
+//! let rendered = render(&Sheet::new(ColumnWidth::Wide, 1, "Two points").panel("(a)", "", chart))?;
 //! assert!(rendered.png.starts_with(b"\x89PNG") && rendered.pdf.starts_with(b"%PDF"));
 //! # Ok::<(), twofold_render::RenderError>(())
 //! ```
@@ -121,7 +121,7 @@ pub enum RenderError {
 /// A picture in all formats.
 #[derive(Clone, Debug)]
 pub struct Rendered {
-    /// PNG file, 300 dpi.
+    /// PNG file, 600 dpi.
     pub png: Vec<u8>,
     /// SVG file.
     pub svg: Vec<u8>,

@@ -74,7 +74,12 @@ fn x_ticks(axis: &Axis, span: Span, length: i32) -> Ticks {
         }
         spacing *= 1.5;
     }
-    ticks_of(axis, span, length, spacing)
+    // The fewest labels still touch: every second one.
+    let mut ticks = ticks_of(axis, span, length, spacing);
+    let (kept, dropped): (Vec<_>, Vec<_>) = ticks.major.into_iter().enumerate().partition(|(i, _)| i % 2 == 0);
+    ticks.major = kept.into_iter().map(|(_, tick)| tick).collect();
+    ticks.minor.extend(dropped.into_iter().map(|(_, tick)| tick.value));
+    ticks
 }
 
 fn y_ticks(axis: &Axis, span: Span, length: i32) -> Ticks {
@@ -113,6 +118,7 @@ pub fn insets(panel: &PlanePanel, w: i32, h: i32) -> Insets {
         return Insets::default();
     }
     let (x, y) = spans(panel, w, h);
+    let [across, up] = panel.labelled;
     let widest = y_ticks(&panel.y, y, h).major.iter().map(|t| text_width(&t.label, style::TICK_PT)).max().unwrap_or(0);
     let y_title = if panel.y.title.is_empty() { 0 } else { units(style::LABEL_PT * 1.1) };
     let x_title = if panel.x.title.is_empty() { 0 } else { units(3.5 + CAP_HEIGHT * style::LABEL_PT + DESCENT_PT) };
@@ -123,10 +129,14 @@ pub fn insets(panel: &PlanePanel, w: i32, h: i32) -> Insets {
         (place.round() as i32 + text_width(&t.label, style::TICK_PT) / 2 - w).max(0)
     });
     Insets {
-        left: widest + units(style::TICK_GAP_PT) + y_title + units(1.0),
-        right: right.max(units(1.0)),
+        left: if up { widest + units(style::TICK_GAP_PT) + y_title } else { 0 } + units(1.0),
+        right: if across { right.max(units(1.0)) } else { units(1.0) },
         top: units(3.0),
-        bottom: units(style::TICK_GAP_PT + 0.8 + CAP_HEIGHT * style::TICK_PT + 1.0) + x_title,
+        bottom: if across {
+            units(style::TICK_GAP_PT + 0.8 + CAP_HEIGHT * style::TICK_PT + 1.0) + x_title
+        } else {
+            units(1.0)
+        },
     }
 }
 
@@ -221,22 +231,25 @@ fn draw_axes(
     ];
     canvas.line(&corners, style::SOFT_INK, style::FRAME_PT)?;
     let gap = units(style::TICK_GAP_PT);
-    for t in &xt.major {
+    let [across, up] = panel.labelled;
+    for t in xt.major.iter().filter(|_| across) {
         let px = chart.position(&[scaled(&panel.x, t.value), y.lower]).0;
         let how = TextFormat::new(style::TICK_PT).anchor(HPos::Center, VPos::Top);
         canvas.text(&t.label, (px, rect.bottom() + gap + units(0.8)), how)?;
     }
-    for t in &yt.major {
+    for t in yt.major.iter().filter(|_| up) {
         let py = chart.position(&[x.lower, scaled(&panel.y, t.value)]).1;
         canvas.text(&t.label, (rect.x - gap, py), TextFormat::new(style::TICK_PT).anchor(HPos::Right, VPos::Center))?;
     }
     let room = insets(panel, rect.w, rect.h);
     let base = rect.bottom() + room.bottom - units(DESCENT_PT);
-    canvas.text(
-        &panel.x.title,
-        (rect.x + rect.w / 2, base),
-        TextFormat::new(style::LABEL_PT).anchor(HPos::Center, VPos::Bottom),
-    )?;
+    if across {
+        let how = TextFormat::new(style::LABEL_PT).anchor(HPos::Center, VPos::Bottom);
+        canvas.text(&panel.x.title, (rect.x + rect.w / 2, base), how)?;
+    }
+    if !up {
+        return Ok(());
+    }
     let left = rect.x - room.left + units(CAP_HEIGHT * style::LABEL_PT);
     let how = TextFormat::new(style::LABEL_PT).anchor(HPos::Center, VPos::Bottom).upwards();
     canvas.text(&panel.y.title, (left, rect.y + rect.h / 2), how)

@@ -17,7 +17,7 @@ pub const KEYWORD_PREFIX: &str = "twofold:";
 /// Writes pixels. Pictures of at most 256 colours are stored with a palette, others as RGB.
 pub fn write(pixels: &Pixels, title: &str, description: &str, sealed: &Sealed) -> Result<Vec<u8>, RenderError> {
     let mut info = Info::with_size(pixels.width, pixels.height);
-    // 300 dpi is 11811 pixels per metre.
+    // 600 dpi is 23622 pixels per metre.
     let per_metre = (f64::from(DPI) / 0.0254).round() as u32;
     info.pixel_dims = Some(PixelDimensions { xppu: per_metre, yppu: per_metre, unit: Unit::Meter });
     info.bit_depth = BitDepth::Eight;

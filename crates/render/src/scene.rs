@@ -1,7 +1,7 @@
 //! The device-independent drawing: a list of filled paths, strokes, dots and set text in whole units of 1/50 point.
 //!
 //! Everything that decides where ink lies happens before or in this list; the writers for PNG, SVG and PDF only translate it. That
-//! is what makes the three files the same picture. Coordinates are integers, twelve to a pixel at 300 dpi, so that the formats
+//! is what makes the three files the same picture. Coordinates are integers, six to a pixel at 600 dpi, so that the formats
 //! round alike and the vector files stay small.
 
 use super::sheet::Colour;
@@ -9,9 +9,9 @@ use super::sheet::Colour;
 /// Units in a point.
 pub const UNITS_PER_POINT: i32 = 50;
 /// Units in a pixel at [`DPI`].
-pub const UNITS_PER_PIXEL: i32 = 12;
+pub const UNITS_PER_PIXEL: i32 = 6;
 /// Resolution of the bitmap.
-pub const DPI: u32 = 300;
+pub const DPI: u32 = 600;
 
 /// A position in units, y downwards from the upper left corner of the sheet.
 pub type Position = (i32, i32);

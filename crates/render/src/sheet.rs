@@ -11,8 +11,8 @@ use super::style;
 pub enum ColumnWidth {
     /// One column, 8.6 cm.
     Single,
-    /// Two columns, 17.8 cm.
-    Double,
+    /// 10.2 cm: reduced to a column of 8.5 cm, its smallest letters are 6 points high.
+    Wide,
 }
 
 /// A whole picture.
@@ -66,7 +66,20 @@ impl Sheet {
 
     /// Adds a panel.
     pub fn panel(mut self, label: impl Into<String>, title: impl Into<String>, content: impl Into<Content>) -> Self {
-        self.panels.push(Panel { label: label.into(), title: title.into(), content: content.into() });
+        self.panels.push(Panel {
+            label: label.into(),
+            title: title.into(),
+            notes: Vec::new(),
+            content: content.into(),
+        });
+        self
+    }
+
+    /// Adds small print below the title of the last panel.
+    pub fn notes(mut self, notes: impl IntoIterator<Item = String>) -> Self {
+        if let Some(panel) = self.panels.last_mut() {
+            panel.notes.extend(notes);
+        }
         self
     }
 
@@ -120,6 +133,8 @@ pub struct Panel {
     pub label: String,
     /// What it shows, set beside the name.
     pub title: String,
+    /// Small print below the title, a paragraph each.
+    pub notes: Vec<String>,
     /// The drawing.
     pub content: Content,
 }
@@ -449,6 +464,8 @@ pub struct PlanePanel {
     pub equal: bool,
     /// Whether the axes are drawn.
     pub axes: bool,
+    /// Whether the horizontal axis has numbers and a title, and the vertical one: panels that share an axis say it once.
+    pub labelled: [bool; 2],
     /// Whether grid lines are drawn at the major ticks.
     pub grid: bool,
     /// Height divided by width of the drawing area; if absent, the sheet's.
@@ -469,6 +486,7 @@ impl PlanePanel {
             y,
             equal: false,
             axes: true,
+            labelled: [true; 2],
             grid: false,
             aspect: None,
             layers: Vec::new(),
@@ -488,6 +506,12 @@ impl PlanePanel {
     /// Makes a unit as long on both axes.
     pub fn equal(mut self) -> Self {
         self.equal = true;
+        self
+    }
+
+    /// Says whether the horizontal and the vertical axis have numbers and titles.
+    pub fn labelled(mut self, horizontal: bool, vertical: bool) -> Self {
+        self.labelled = [horizontal, vertical];
         self
     }
 

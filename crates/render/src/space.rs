@@ -135,7 +135,7 @@ fn ticked_edges(bounds: &Bounds, scale: f64) -> Vec<TickedEdge> {
             if out[0] * middle[0] + out[1] * middle[1] < 0.0 {
                 out = [-out[0], -out[1]];
             }
-            let spacing = if axis == 2 { style::TICK_SPACING_Y_PT } else { 0.85 * style::TICK_SPACING_X_PT };
+            let spacing = if axis == 2 { style::TICK_SPACING_Y_PT } else { 1.2 * style::TICK_SPACING_X_PT };
             let wanted = (length * scale / (spacing * f64::from(UNITS_PER_POINT))).max(1.8);
             let s = bounds.spans[axis];
             TickedEdge { axis, at, ticks: ticks::linear(s.lower, s.upper, wanted).major, out }

@@ -125,7 +125,7 @@ fn full_sheet() -> Sheet {
     let unit = |title: &str| Axis::linear(title, -1.0, 1.0);
     let space =
         SpacePanel::new(unit("*x*"), unit("*y*"), unit("*z*")).surface(surface).line(helix, LineStyle::default());
-    Sheet::new(ColumnWidth::Double, 2, "Everything.")
+    Sheet::new(ColumnWidth::Wide, 2, "Everything.")
         .title("Title")
         .subtitle("subtitle")
         .banner("SHORTENED")
@@ -168,20 +168,20 @@ fn sixty_thousand_points_stay_under_two_megabytes() {
     let points: Vec<[f64; 2]> = (0..60_000).map(|_| [next(), next()]).collect();
     let panel =
         PlanePanel::new(Axis::linear("*x*", 0.0, 1.0), Axis::linear("*z*", 0.0, 1.0)).dots(points, DotStyle::late());
-    let picture = render(&Sheet::new(ColumnWidth::Double, 1, "Noise.").panel("", "", panel)).unwrap();
+    let picture = render(&Sheet::new(ColumnWidth::Wide, 1, "Noise.").panel("", "", panel)).unwrap();
     assert!(picture.svg.len() < 1_000_000, "{}", picture.svg.len());
     assert!(picture.pdf.len() < 1_000_000, "{}", picture.pdf.len());
 }
 
 #[test]
 fn the_png_states_its_printed_size_and_decodes_to_the_pixels() {
-    for (width, centimetres) in [(ColumnWidth::Single, 8.6), (ColumnWidth::Double, 17.8)] {
+    for (width, centimetres) in [(ColumnWidth::Single, 8.6), (ColumnWidth::Wide, 10.2)] {
         let mut sheet = full_sheet();
         sheet.width = width;
         let picture = render(&sheet).unwrap();
         let reader = png::Decoder::new(std::io::Cursor::new(&picture.png)).read_info().unwrap();
         let dims = reader.info().pixel_dims.unwrap();
-        assert_eq!((dims.xppu, dims.yppu, dims.unit), (11_811, 11_811, png::Unit::Meter));
+        assert_eq!((dims.xppu, dims.yppu, dims.unit), (23_622, 23_622, png::Unit::Meter));
         let printed = f64::from(reader.info().width) / f64::from(dims.xppu) * 100.0;
         assert!((printed - centimetres).abs() < 0.005, "{printed}");
         assert_eq!(decode_png(&picture.png).unwrap(), picture.pixels);
@@ -298,7 +298,7 @@ fn two_distinct_late_points_are_seen_among_a_faint_transient() {
     let panel = PlanePanel::new(Axis::linear("*x*", 0.0, 1.0), Axis::linear("*z*", 0.0, 1.0))
         .dots(early, DotStyle::early())
         .dots(late, DotStyle::late());
-    let scene = layout::draw(&Sheet::new(ColumnWidth::Double, 3, "").panel("", "", panel)).unwrap();
+    let scene = layout::draw(&Sheet::new(ColumnWidth::Wide, 3, "").panel("", "", panel)).unwrap();
     let of = |colour: Colour| {
         scene.items.iter().find_map(|i| match i {
             Item::Dots { paint, diameter, centres } if paint.colour == colour => Some((*diameter, centres.len())),
@@ -332,7 +332,7 @@ fn unusable_axes_and_numbers_are_named() {
     assert!(render(&space(good())).is_ok());
     assert!(matches!(render(&space(good().camera(0.0, 91.0))), Err(RenderError::Number { .. })));
     assert!(matches!(render(&space(good().proportions([1.0, 0.0, 1.0]))), Err(RenderError::Number { .. })));
-    let tower = (0..40).fold(Sheet::new(ColumnWidth::Double, 1, ""), |s, _| s.panel("", "", good()));
+    let tower = (0..40).fold(Sheet::new(ColumnWidth::Wide, 1, ""), |s, _| s.panel("", "", good()));
     assert!(matches!(render(&tower), Err(RenderError::TooLarge)));
     let faulty = Sheet::new(ColumnWidth::Single, 1, "").title("*x");
     assert!(matches!(render(&faulty), Err(RenderError::Text(RichTextError::Italic { .. }))));
@@ -420,7 +420,7 @@ fn density_shading_never_changes_where_points_are() {
     let places = |density: bool| {
         let look = DotStyle { density, ..DotStyle::late() };
         let panel = PlanePanel::new(Axis::linear("", 0.0, 1.0), Axis::linear("", 0.0, 1.0)).dots(points.clone(), look);
-        let scene = layout::draw(&Sheet::new(ColumnWidth::Double, 1, "").panel("", "", panel)).unwrap();
+        let scene = layout::draw(&Sheet::new(ColumnWidth::Wide, 1, "").panel("", "", panel)).unwrap();
         let mut all: Vec<Position> = scene
             .items
             .into_iter()

@@ -17,7 +17,7 @@ use crate::record;
 use crate::render::{RenderError, markup, render};
 
 /// Draw a run: its states against time, a phase plane, its path in space, or with --section its crossings of a plane. The file's
-/// name says the format: .png (300 dpi), .svg or .pdf.
+/// name says the format: .png (600 dpi), .svg or .pdf.
 ///
 /// Axes and labels come from the system; the switching surface h = 0 is drawn where it depends on nothing but the states shown, coloured
 /// by what happens there where they are all the states. The same command makes the same bytes on any machine.
@@ -93,7 +93,7 @@ impl From<Kind> for plot::Kind {
 /// A format of pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Format {
-    /// Pixels, 300 dpi.
+    /// Pixels, 600 dpi.
     Png,
     /// Vectors, for pages.
     Svg,

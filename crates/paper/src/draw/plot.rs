@@ -143,7 +143,7 @@ pub fn sheet(run: &RunSpec, answer: &Answer, look: &Look, small_print: Vec<Strin
     let title = look.title.clone().unwrap_or_else(|| run.system.definition().title().to_owned());
     let said = if title.is_empty() { "a system of its own".to_owned() } else { title.clone() };
     let width = match look.kind {
-        Kind::Series | Kind::Space => ColumnWidth::Double,
+        Kind::Series | Kind::Space => ColumnWidth::Wide,
         Kind::Plane | Kind::Section => ColumnWidth::Single,
     };
     let mut sheet = Sheet::new(width, 1, format!("{}: {said}", describe(&run.system, look.kind, &shown)));

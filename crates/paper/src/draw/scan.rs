@@ -55,7 +55,7 @@ pub fn diagram(title: &str, over: &Scanned, ordinate: &str, points: Vec<[f64; 2]
     let x = over.covered();
     let y = Axis::covering(ordinate, points.iter().map(|p| p[1]));
     let panel = PlanePanel::new(x, y).dots(points, DotStyle { density: false, ..DotStyle::late() });
-    Sheet::new(ColumnWidth::Double, 1, "orbit diagram")
+    Sheet::new(ColumnWidth::Wide, 1, "orbit diagram")
         .title(markup::literal(title))
         .panel_aspect(0.55)
         .panel("", "", panel)
