@@ -8,10 +8,11 @@ use twofold::job::table::Table;
 use twofold::job::{AnyQuestion, JobError};
 use twofold::num::elementary::sqrt;
 use twofold::paper::audit::{self, Candidate, Cell, PRIORS};
+use twofold::paper::census;
 use twofold::paper::claims::claims;
 use twofold::paper::study::Computed;
 use twofold::paper::wording::number;
-use twofold::paper::{Figure, Picture, Study, View};
+use twofold::paper::{Figure, Picture, Reading, Study, Support, View};
 use twofold::record::Hash;
 use twofold::render::sheet::*;
 use twofold::render::style;
@@ -83,6 +84,19 @@ pub fn candidates_in(read: &dyn Fn(&str) -> Result<Vec<u8>, JobError>) -> Result
     }
 }
 
+/// How many runs of 9(i) support what the paper says of it.
+///
+/// # Errors
+///
+/// If the committed data are not the files that `make census` writes.
+pub fn support(panel: &str, reading: Reading) -> Result<Support, JobError> {
+    let known = audit::PANELS.iter().find(|p| p.name == panel && p.column.is_none());
+    let panel = known.ok_or_else(|| JobError::Other(format!("the audit has no runs of {panel} alone")))?;
+    let table = table_of(&committed("alpha9.csv")?)?;
+    let runs = panel.runs(&table, vec![("params.alpha", reading.caricature().alpha.into())]);
+    Ok(Support { support: census::bears_out(panel.said, &runs, &claims().rules), runs: runs.len() as u64 })
+}
+
 /// The printed and the reconstructed alpha and beta.
 const READINGS: [[f64; 2]; 2] = [[1e-3, 1e-5], [1e-1, 1e-5]];
 
@@ -149,7 +163,7 @@ fn draw(tables: &[Table]) -> Sheet {
             MarkerStyle { shape: MarkerShape::OpenDot, colour: style::VERMILLION, size: 5.0 },
         ),
     ];
-    let mut sheet = Sheet::new(ColumnWidth::Double, 2, "").panel_aspect(0.85);
+    let mut sheet = Sheet::new(ColumnWidth::Wide, 1, "").panel_aspect(0.6);
     for (words, at, marker) in marks {
         map = map.markers(at, marker);
         sheet = sheet.legend(LegendEntry::new(LegendKey::Marker(marker), words));

@@ -9,7 +9,7 @@ use twofold::job::{AnyQuestion, JobError};
 use twofold::paper::census::{self, Data, Found, Kind, Shorter};
 use twofold::paper::claims::claims;
 use twofold::paper::study::Computed;
-use twofold::paper::{Figure, Reading, Study};
+use twofold::paper::{Figure, Reading, Study, Support};
 use twofold::record::Hash;
 use twofold::render::sheet::*;
 use twofold::render::style;
@@ -99,6 +99,33 @@ pub fn found_in(reading: Reading, read: &dyn Fn(&str) -> Result<Vec<u8>, JobErro
         shorter,
     };
     Ok(Found::of(reading, &data, &claims().rules))
+}
+
+/// The place of a panel of figs 7 and 8, "7(i)", among the census'.
+fn place(panel: &str) -> Result<usize, JobError> {
+    let at = census::PANELS.iter().position(|p| p.name == panel);
+    at.ok_or_else(|| JobError::Other(format!("the census has no panel {panel}")))
+}
+
+/// The runs that repeat a panel of figs 7 and 8, "7(i)".
+///
+/// # Errors
+///
+/// If there is no such panel, or the committed data are not the files that `make census` writes.
+pub fn runs(panel: &str, reading: Reading) -> Result<Vec<census::Run>, JobError> {
+    let at = place(panel)?;
+    let table = rows_of(&committed(["fig7.csv", "fig8.csv"][at / 3])?)?.table();
+    Ok(census::PANELS[at].runs(&table, vec![("params.alpha", reading.caricature().alpha.into())]))
+}
+
+/// How many of these runs support what the paper says of the panel.
+///
+/// # Errors
+///
+/// As [`runs`].
+pub fn support(panel: &str, reading: Reading) -> Result<Support, JobError> {
+    let (said, runs) = (census::PANELS[place(panel)?].said, runs(panel, reading)?);
+    Ok(Support { support: census::bears_out(said, &runs, &claims().rules), runs: runs.len() as u64 })
 }
 
 fn tables(reading: Reading) -> Result<Vec<Table>, JobError> {
@@ -197,8 +224,8 @@ fn draw(tables: &[Table]) -> Sheet {
         format!("{} % [{}, {}]", percent(mean), percent(low), percent(high))
     };
     let runs: Vec<i64> = shares.integers("runs").to_vec();
-    let mut sheet = Sheet::new(ColumnWidth::Double, 2, "")
-        .panel_aspect(0.62)
+    let mut sheet = Sheet::new(ColumnWidth::Wide, 1, "")
+        .panel_aspect(0.5)
         .panel("(a)", "where runs of each panel end", bars(&names, &at_end, &claimed))
         .panel("(b)", "captured by a closed orbit", capture)
         .panel("(c)", "interval 100, by method and tolerance", bars(&ways_names, &ways_counts, &ways_totals))

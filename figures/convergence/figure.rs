@@ -109,8 +109,8 @@ fn draw(tables: &[Table]) -> Sheet {
         .step_by(PER_DECADE)
         .map(|r| format!("{} for *ε* = {}", number((value(&r[3]) * 1e3).round() / 1e3), number(value(&r[0]))))
         .collect();
-    Sheet::new(ColumnWidth::Double, 3, "")
-        .panel_aspect(1.1)
+    Sheet::new(ColumnWidth::Wide, 1, "")
+        .panel_aspect(0.5)
         .panel("(a)", "before the visit", approach)
         .panel("(b)", "crossings of *x* = 0 after it", crossings(&members, &after))
         .panel("(c)", "nearest member", nearest_member(&after, &distances))

@@ -185,7 +185,7 @@ fn draw(reading: Reading, answers: &[Arc<Answer>]) -> Sheet {
     let series = series(&growth);
     let outside: Vec<[f64; 2]> = outside(reading).iter().map(|&(eps, growth)| [eps, growth]).collect();
     let mut amplified =
-        PlanePanel::new(Axis::log("*ε*", 6e-6, 1.6e-2), Axis::log("growth of a disturbance", 1e-4, 1e30));
+        PlanePanel::new(Axis::log("*ε*", 6e-6, 1.6e-2), Axis::log("growth of a disturbance", 1e-4, 1e46));
     for (level, words, at, anchor) in [
         (1.0, "neither grows nor shrinks", 6.6e-6, Anchor::Left),
         (1e8, "10^{−8} becomes 1", 6.6e-6, Anchor::Left),
@@ -206,8 +206,8 @@ fn draw(reading: Reading, answers: &[Arc<Answer>]) -> Sheet {
         amplified = amplified.markers(outside, hollow).legend(LegendKey::Marker(hollow), "measured elsewhere");
     }
     let amplified = amplified.legend_at(Corner::UpperRight);
-    let sheet = Sheet::new(ColumnWidth::Double, 2, "")
-        .panel_aspect(0.95)
+    let sheet = Sheet::new(ColumnWidth::Wide, 1, "")
+        .panel_aspect(0.55)
         .panel("(a)", format!("passages through *y* = 0, *ε* = {}", number(EPS)), digits)
         .panel("(b)", "what the first visit makes of a disturbance", amplified);
     footer(rows, visits, &series).into_iter().fold(sheet, Sheet::footer)

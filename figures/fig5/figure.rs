@@ -14,7 +14,7 @@ pub fn figure() -> Figure {
         |_| {
             "One trajectory of the discontinuous system (5), by event-driven Filippov integration. Where it slides on x = 0 the \
              line is thick; it enters the two-fold in the attracting region and leaves through the repelling one, where \
-             the moment and the side of each exit (open dots) are drawn at random: the equations do not choose them. Beside, the passage nearer. Times of exit have mean 3 and the orbit lasts 400 in the printed \
+             the moment and the side of each exit (open dots) are drawn at random: the equations do not choose them. Below, the passage nearer. Times of exit have mean 3 and the orbit lasts 400 in the printed \
              reading, 0.5 and 80 in the reconstructed one."
                 .into()
         },

@@ -3,7 +3,9 @@
 use twofold::integrate::Schedule;
 use twofold::job::spec::*;
 use twofold::paper::verdict::{Claim, SectionClaim};
-use twofold::paper::{Figure, Panel, View};
+use twofold::paper::{Figure, Panel, Repeats, View};
+
+use super::census;
 
 /// The figure's specification.
 pub fn figure() -> Figure {
@@ -13,10 +15,11 @@ pub fn figure() -> Figure {
         View::Section { horizontal: 0, vertical: 2 },
         |_| {
             "Poincaré sections y = 0 of the smoothed system, integrated to t = 200000 in intervals of (i) 20, (ii) 40, \
-             (iii) 100 after each of which the integrator starts afresh. Early half faint, late half dark."
+             (iii) 100 after each of which the integrator starts afresh. Above the later half, as the paper shows it; below the early half."
                 .into()
         },
         |reading| {
+            let repeats = |panel| Repeats { panel, reading, count: census::support };
             let panel = |label, interval| {
                 Panel::new(
                     label,
@@ -33,9 +36,9 @@ pub fn figure() -> Figure {
                 )
             };
             vec![
-                panel("i", 20.0).claimed(Claim::Section(SectionClaim::Periodic)),
-                panel("ii", 40.0).claimed(Claim::Section(SectionClaim::Period(3))),
-                panel("iii", 100.0).claimed(Claim::Section(SectionClaim::Chaos)),
+                panel("i", 20.0).claimed(Claim::Section(SectionClaim::Periodic)).repeated(repeats("7(i)")),
+                panel("ii", 40.0).claimed(Claim::Section(SectionClaim::Period(3))).repeated(repeats("7(ii)")),
+                panel("iii", 100.0).claimed(Claim::Section(SectionClaim::Chaos)).repeated(repeats("7(iii)")),
             ]
         },
     )

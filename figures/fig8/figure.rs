@@ -3,7 +3,9 @@
 use twofold::integrate::Schedule;
 use twofold::job::spec::*;
 use twofold::paper::verdict::{Claim, SectionClaim};
-use twofold::paper::{Figure, Panel, View};
+use twofold::paper::{Figure, Panel, Repeats, View};
+
+use super::census;
 use twofold::system::Transition;
 
 /// The figure's specification.
@@ -14,10 +16,11 @@ pub fn figure() -> Figure {
         View::Section { horizontal: 0, vertical: 2 },
         |_| {
             "Poincaré sections y = 0 of the smoothed system with the transition function perturbed by σ√ε exp(−x²), \
-             (i) σ = 0.01, (ii) σ = 0.1, (iii) σ = 0.13; intervals of 100. Early half faint, late half dark."
+             (i) σ = 0.01, (ii) σ = 0.1, (iii) σ = 0.13; intervals of 100. Above the later half, as the paper shows it; below the early half."
                 .into()
         },
         |reading| {
+            let repeats = |panel| Repeats { panel, reading, count: census::support };
             let panel = |label, sigma| {
                 Panel::new(
                     label,
@@ -34,9 +37,9 @@ pub fn figure() -> Figure {
                 )
             };
             vec![
-                panel("i", 0.01).claimed(Claim::Section(SectionClaim::Chaos)),
-                panel("ii", 0.1).claimed(Claim::Section(SectionClaim::Periodic)),
-                panel("iii", 0.13).claimed(Claim::Section(SectionClaim::Periodic)),
+                panel("i", 0.01).claimed(Claim::Section(SectionClaim::Chaos)).repeated(repeats("8(i)")),
+                panel("ii", 0.1).claimed(Claim::Section(SectionClaim::Periodic)).repeated(repeats("8(ii)")),
+                panel("iii", 0.13).claimed(Claim::Section(SectionClaim::Periodic)).repeated(repeats("8(iii)")),
             ]
         },
     )

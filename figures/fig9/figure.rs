@@ -6,8 +6,10 @@
 use twofold::integrate::{Kick, KickLaw, Schedule};
 use twofold::job::spec::*;
 use twofold::paper::verdict::{Claim, SectionClaim};
-use twofold::paper::{Figure, Panel, View};
+use twofold::paper::{Figure, Panel, Repeats, View};
 use twofold::system::Relaxation;
+
+use super::audit;
 
 /// The figure's specification.
 pub fn figure() -> Figure {
@@ -17,7 +19,7 @@ pub fn figure() -> Figure {
         View::Section { horizontal: 0, vertical: 2 },
         |_| {
             "Poincaré sections y = 0: (i) with hysteresis, eq. (10) read literally, ε′ = 10 ε; (ii), (iii) with a random \
-             perturbation of length ε after each 0.3, two runs. Intervals of 100. Early half faint, late half dark."
+             perturbation of length ε after each 0.3, two runs. Intervals of 100. Above the later half, as the paper shows it; below the early half."
                 .into()
         },
         |reading| {
@@ -40,7 +42,8 @@ pub fn figure() -> Figure {
             let noise = |stream| Some(Kick { every: 0.3, size: eps, law: KickLaw::Sphere, seed: 2013, stream });
             vec![
                 panel("i", "hysteresis", SwitchSpec::hysteretic(eps, Relaxation::Literal), None)
-                    .claimed(Claim::Section(SectionClaim::Chaos)),
+                    .claimed(Claim::Section(SectionClaim::Chaos))
+                    .repeated(Repeats { panel: "9(i)", reading, count: audit::support }),
                 panel("ii", "noise, first run", SwitchSpec::tanh(eps), noise(1))
                     .claimed(Claim::Section(SectionClaim::PartlyWashedOut)),
                 panel("iii", "noise, second run", SwitchSpec::tanh(eps), noise(2))

@@ -229,8 +229,8 @@ fn draw_law(answers: &[Arc<Answer>]) -> Sheet {
     let (nearness, explained) = nearness_panel(growth, printed, &law);
     let (exponents, measured) = exponents_panel(others);
     let formula = LineStyle::new(style::SOFT_INK, style::CURVE_PT).dashed();
-    Sheet::new(ColumnWidth::Double, 3, "")
-        .panel_aspect(1.0)
+    Sheet::new(ColumnWidth::Wide, 2, "")
+        .panel_aspect(0.8)
         .panel("(a)", "growth of a disturbance", growth_panel(growth, &law))
         .panel("(b)", "its local exponents", slopes)
         .panel("(c)", "where the surface is left", selected)
@@ -262,7 +262,7 @@ fn growth_panel(rows: &[Row], law: &Predicted) -> PlanePanel {
         ("along it", style::BLUE, MarkerShape::Square, law.along()),
         ("carried in", style::GREEN, MarkerShape::Triangle, law.carried()),
     ];
-    let mut panel = PlanePanel::new(Axis::log("*ε*", 5e-8, 2e-2), Axis::log("growth", 1e-6, 1e38));
+    let mut panel = PlanePanel::new(Axis::log("*ε*", 5e-8, 2e-2), Axis::log("growth", 1e-6, 1e60));
     for (which, (words, colour, shape, power)) in series.into_iter().enumerate() {
         let points: Vec<[f64; 2]> = rows.iter().map(|r| [r.eps, r.growth[which]]).filter(|p| p[1] > 0.0).collect();
         if let Some(&[eps, at]) = points.last() {
@@ -278,7 +278,7 @@ fn growth_panel(rows: &[Row], law: &Predicted) -> PlanePanel {
 
 fn slopes_panel(rows: &[Row], law: &Predicted, tanh: f64) -> (PlanePanel, String) {
     let formula = LineStyle::new(style::SOFT_INK, style::CURVE_PT);
-    let mut panel = PlanePanel::new(Axis::log("*ε*", 5e-8, 2e-2), Axis::linear("−d ln growth/d ln *ε*", 3.2, 4.3));
+    let mut panel = PlanePanel::new(Axis::log("*ε*", 5e-8, 2e-2), Axis::linear("−d ln growth/d ln *ε*", 2.8, 4.3));
     let mut said = Vec::new();
     let series = [
         ("across", style::VERMILLION, MarkerShape::Dot, law.across()),
@@ -302,7 +302,7 @@ fn slopes_panel(rows: &[Row], law: &Predicted, tanh: f64) -> (PlanePanel, String
             measured.join(", ")
         ));
     }
-    (panel.legend_at(Corner::UpperRight), said.join(" "))
+    (panel.legend_at(Corner::LowerLeft), said.join(" "))
 }
 
 /// The eps from which predictions of z^2/eps start.
@@ -341,7 +341,7 @@ fn far_panel(ladder: &[Row], law: &Predicted, tanh: f64) -> (PlanePanel, String)
     let formula = LineStyle::new(style::SOFT_INK, style::CURVE_PT);
     let found = jumps(ladder);
     let mut panel =
-        PlanePanel::new(Axis::log("*ε*", 1.5e-7, 1.5e-2), Axis::linear("*y*, *z* of the far exit", -2.2, 2.8));
+        PlanePanel::new(Axis::log("*ε*", 1.5e-7, 1.5e-2), Axis::linear("*y*, *z* of the far exit", -2.2, 4.0));
     // Branch by branch.
     for (which, colour) in [(0, style::BLUE), (1, style::VERMILLION)] {
         let mut branch: Vec<[f64; 2]> = Vec::new();
@@ -374,7 +374,7 @@ fn far_panel(ladder: &[Row], law: &Predicted, tanh: f64) -> (PlanePanel, String)
     let at: Vec<String> = found.iter().map(|j| format!("{} and {}", short(j.0), short(j.1))).collect();
     let text = format!(
         "(d) First upward passage through *x* = 0 beyond {}: it depends on *ε* through the fractional part of ln(1/*ε*)/(2 ln *λ*), *λ* = {:.4}, up to a \
-         slow logarithm; there is no limit. Jumps between {}: factors {} (each to 6 %); predicted from one to the next: {} (vertical lines, from the first \
+         slow logarithm, so that by this formula there is no limit. Measured jumps between {}: factors {} (each to 6 %); predicted from one to the next: {} (vertical lines, from the first \
          jump on), in the limit *λ*^{{2}} = {:.1}.",
         number(FAR),
         law.turn,
@@ -403,7 +403,7 @@ fn nearness_panel(growth: &[Row], printed: &[Row], law: &Predicted) -> (PlanePan
     let mine: Vec<Row> = growth.iter().filter(|r| r.eps >= smallest && r.eps < 1e-2).copied().collect();
     let (a, reconstructed) = relative(&mine);
     let (b, others) = relative(printed);
-    let mut panel = PlanePanel::new(Axis::linear("10^{3} *ε*", -0.4, 10.6), Axis::linear("*C*(*ε*)/*C*(0)", -0.3, 1.6))
+    let mut panel = PlanePanel::new(Axis::linear("10^{3} *ε*", -0.4, 10.6), Axis::linear("*C*(*ε*)/*C*(0)", -0.3, 2.2))
         .line(vec![[-0.4, 0.0], [10.6, 0.0]], LineStyle::new(style::SOFT_INK, style::FRAME_PT).dotted());
     for (points, words, colour, shape) in [
         (reconstructed, "reconstructed", style::BLUE, MarkerShape::Square),
@@ -616,24 +616,24 @@ fn draw_selection(answers: &[Arc<Answer>]) -> Sheet {
         sides = sides.markers(shares, look);
     }
     let factors: Vec<String> = TRANSITIONS.iter().zip(&stretch).map(|(t, k)| format!("{} {k:.3}", t.1)).collect();
-    let sheet = TRANSITIONS.iter().fold(Sheet::new(ColumnWidth::Double, 3, ""), |sheet, (_, words, colour, shape)| {
-        sheet.legend(LegendEntry::new(LegendKey::Marker(marker(*shape, *colour, 4.0)), format!("{words} (a, b, d, e)")))
+    let sheet = TRANSITIONS.iter().fold(Sheet::new(ColumnWidth::Wide, 2, ""), |sheet, (_, words, colour, shape)| {
+        sheet.legend(LegendEntry::new(LegendKey::Marker(marker(*shape, *colour, 4.0)), format!("{words} (a–d)")))
     });
     sheet
-        .panel_aspect(1.0)
+        .panel_aspect(0.8)
         .panel("(a)", "four transition functions", compensated("growth across × *ε*^{1/2*μ*}", false))
         .panel("(b)", "their phases removed", compensated("growth across × (*ε*/*κ*)^{1/2*μ*}", true))
-        .panel("(c)", "member selected", places)
-        .panel("(d)", "the far exit", exits(false))
-        .panel("(e)", "their phases removed", exits(true))
+        .panel("(c)", "the far exit", exits(false))
+        .panel("(d)", "their phases removed", exits(true))
+        .panel("(e)", "member selected", places)
         .panel("(f)", "side selected", sides)
         .footer(format!(
-            "(a, b, d, e) Linearised about the canard, a transition function enters through its slope there alone: *ε*/*φ*′ takes the place of *ε*. *κ* is *φ*′ on \
+            "(a–d) Linearised about the canard, a transition function enters through its slope there alone: *ε*/*φ*′ takes the place of *ε*. *κ* is *φ*′ on \
              the canard divided by tanh’s: {}. What is left after that is the shape of the function.",
             factors.join(", ")
         ))
         .footer(format!(
-            "(c, f) The same start under other rules: smoothing (first passage through *x* = 0); hysteresis, eq. (10) with *ε*′ = {} *ε* in both readings of it, from {ORBITS} \
+            "(e, f) The same start under other rules: smoothing (first passage through *x* = 0); hysteresis, eq. (10) with *ε*′ = {} *ε* in both readings of it, from {ORBITS} \
              starts shifted by multiples of {} in *x*; tanh smoothing with {ORBITS} streams of kicks of length *ε* after every {}. Where |*x*| first exceeds 3*ε* after the \
              visit: median and range. Smoothing always selects the same side and a member that lies farther out by the root of a logarithm; the literal hysteresis and noise \
              select members at the singularity itself, to both sides; the single reading of eq. (10) is smoothing with *ε*′ in place of *ε*. Median (range) of −*z*/√*ε*: {}.",
@@ -672,7 +672,7 @@ pub fn figure() -> Figure {
                 "law-selection",
                 "What selects the member of the funnel",
                 "The law under four transition functions, as computed and with the phase removed: (a, b) growth of a disturbance across the layer, divided by its \
-                 predicted power; (d, e) the far exit. (c, f) Where and to which side the surface is left under smoothing, hysteresis and noise.",
+                 predicted power; (c, d) the far exit. (e, f) Where and to which side the surface is left under smoothing, hysteresis and noise.",
                 Study { questions: selection_questions, draw: draw_selection },
             ),
         ],

@@ -12,10 +12,10 @@ pub fn figure() -> Figure {
     Figure::in_both_readings(
         "lottery",
         "The solver lottery: fig. 7 under three methods",
-        View::Section { horizontal: 0, vertical: 2 },
+        View::LateSection { horizontal: 0, vertical: 2 },
         |_| {
             "Poincaré sections y = 0 of the smoothed system to t = 200000, one row per integration method, one column per \
-             restart interval (20, 40, 100), all at the same tolerance. Early half faint, late half dark."
+             restart interval (20, 40, 100), all at the same tolerance. The later half, as the paper shows it."
                 .into()
         },
         |reading| {

@@ -81,14 +81,17 @@ fn run(row: &[Entry]) -> (&str, &str, [f64; 5]) {
     (word(0), word(1), std::array::from_fn(|i| value(i + 2)))
 }
 
+/// Panels side by side.
+const COLUMNS: usize = 2;
+
 fn draw(tables: &[Table]) -> Sheet {
     let rows = tables[0].rows();
     let runs: Vec<_> = rows.iter().map(|row| run(row)).collect();
-    let mut sheet = Sheet::new(ColumnWidth::Double, 3, "").panel_aspect(0.72);
+    let mut sheet = Sheet::new(ColumnWidth::Wide, COLUMNS, "").panel_aspect(0.72);
     for (i, (problem, heading)) in PANELS.iter().enumerate() {
         let here: Vec<_> = runs.iter().filter(|r| r.0 == *problem).collect();
-        let x = if i >= PANELS.len() - 3 { "evaluations of *f*" } else { "" };
-        let y = if i % 3 == 0 { "error at the end" } else { "" };
+        let x = if i + COLUMNS >= PANELS.len() { "evaluations of *f*" } else { "" };
+        let y = if i % COLUMNS == 0 { "error at the end" } else { "" };
         let x = Axis::log_covering(x, here.iter().map(|r| r.2[2]));
         let y = Axis::log_covering(y, here.iter().map(|r| r.2[1]));
         let (left, right) = (x.lower, x.upper);

@@ -1,38 +1,56 @@
 //! From recordings to a drawing: which points, lines and surfaces, in which colours and ranges.
 
-use super::{Camera, Panel, Picture, View, wording};
+use super::verdict::PanelVerdict;
+use super::{Camera, Panel, Picture, Support, View, wording};
 use crate::draw::surface;
 use twofold_analyse::{Crossing, Motion, Sample};
 use twofold_integrate::filippov::{EventKind, Mode, Side};
+use twofold_job::JobError;
 use twofold_job::record::Hash;
 use twofold_job::recording::{Data, Future, Recording};
 use twofold_render::sheet::{
-    Axis, ColumnWidth, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle, PlanePanel, Sheet,
-    SpacePanel, range_of,
+    Anchor, Axis, ColumnWidth, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle, PlanePanel,
+    Sheet, SpacePanel, range_of,
 };
-use twofold_render::style;
+use twofold_render::{markup, style};
 use twofold_system::Compiled;
 
 /// The drawing of a picture of runs.
-pub fn sheet(picture: &Picture, recordings: &[Recording], spec: &Hash, data: &Hash) -> Sheet {
+///
+/// # Errors
+///
+/// If the runs that repeat a panel cannot be counted.
+pub fn sheet(
+    picture: &Picture,
+    recordings: &[Recording],
+    verdicts: &[PanelVerdict],
+    spec: &Hash,
+    data: &Hash,
+) -> Result<Sheet, JobError> {
     let runs: Vec<_> = picture.panels.iter().map(|p| &p.run).collect();
-    let mut sheet = dress(Sheet::new(ColumnWidth::Double, columns(picture), ""), picture, spec, data);
+    let mut sheet = dress(Sheet::new(ColumnWidth::Wide, columns(picture), ""), picture, spec, data);
     if picture.panels.iter().any(|p| matches!(p.run.system.compiled(), Some(Compiled::Wheel(_)))) {
-        sheet = sheet.subtitle("reconstruction: the paper gives the form of the equations, not their coefficients");
+        sheet = sheet.subtitle("our reconstruction: the paper gives the form of the equations, not their coefficients");
     }
     for line in wording::small_print(picture.reading, &runs) {
         sheet = sheet.footer(line);
     }
-    match picture.view {
+    let notes = verdict_notes(picture, verdicts)?;
+    // One panel's finding is said in the foot: it is too long to stand over the panel.
+    for verdict in verdicts {
+        let found = markup::literal(&verdict.found);
+        sheet = sheet.footer(if picture.panels.len() > 1 { format!("({}) {found}", verdict.panel) } else { found });
+    }
+    Ok(match picture.view {
         View::Section { horizontal, vertical } => {
-            section_panels(sheet, picture, recordings, [horizontal, vertical], Shown::Whole)
+            section_panels(sheet, picture, recordings, &notes, [horizontal, vertical], &[Half::Late, Half::Early])
         }
         View::LateSection { horizontal, vertical } => {
-            section_panels(sheet, picture, recordings, [horizontal, vertical], Shown::Late)
+            section_panels(sheet, picture, recordings, &notes, [horizontal, vertical], &[Half::Late])
         }
-        View::Space { camera } => space_panels(sheet, picture, recordings, &camera),
+        View::Space { camera } => space_panels(sheet, picture, recordings, &notes, &camera),
         View::Study(_) => sheet,
-    }
+    })
 }
 
 /// The drawing of a study: its own sheet, with the picture's heading and provenance.
@@ -80,47 +98,85 @@ fn label(picture: &Picture, panel: &Panel) -> String {
     if picture.panels.len() > 1 { format!("({})", panel.label) } else { String::new() }
 }
 
-/// How much of a section is drawn.
+/// Which half of a section is drawn.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Shown {
-    /// Both halves of the time.
-    Whole,
-    /// The later half.
+enum Half {
     Late,
+    Early,
 }
 
-/// Sections: the same axes in every panel, so that sizes can be compared.
+/// Sections: the later half of each, as the paper shows it, and below it the early half. The same axes in every panel, so that sizes can be
+/// compared.
 fn section_panels(
     mut sheet: Sheet,
     picture: &Picture,
     recordings: &[Recording],
+    notes: &[Vec<String>],
     axes: [usize; 2],
-    shown: Shown,
+    halves: &[Half],
 ) -> Sheet {
-    let half = 0.5 * picture.panels[0].run.t_end;
-    let all = || recordings.iter().flat_map(|r| crossings(&r.data)).filter(|c| shown == Shown::Whole || c.t > half);
-    let names = picture.panels[0].run.system.coordinates();
-    let axis = |i: usize| Axis::covering(format!("*{}*", greek(names[axes[i]])), all().map(|c| c.x[axes[i]]));
-    for (panel, recording) in picture.panels.iter().zip(recordings) {
-        let half = 0.5 * panel.run.t_end;
-        let points = |late: bool| {
-            crossings(&recording.data).iter().filter(|c| (c.t > half) == late).map(|c| axes.map(|i| c.x[i])).collect()
+    let late = |panel: &Panel, c: &Crossing| c.t > 0.5 * panel.run.t_end;
+    let half = |panel: &Panel, c: &Crossing| if late(panel, c) { Half::Late } else { Half::Early };
+    let seen = || {
+        let crossings = |(p, r): (&'_ Panel, &'_ Recording)| {
+            let kept = crossings(&r.data).iter().filter(|c| halves.contains(&half(p, c)));
+            kept.map(|c| axes.map(|i| c.x[i])).collect::<Vec<_>>()
         };
-        let mut chart = PlanePanel::new(axis(0), axis(1));
-        if shown == Shown::Whole {
-            chart = chart.dots(points(false), DotStyle::early());
+        picture.panels.iter().zip(recordings).flat_map(crossings)
+    };
+    let names = picture.panels[0].run.system.coordinates();
+    let axis = |i: usize| Axis::covering(format!("*{}*", greek(names[axes[i]])), seen().map(|p| p[i]));
+    let drawn: Vec<_> = picture.panels.iter().zip(recordings).zip(notes).collect();
+    let rows: Vec<_> =
+        drawn.chunks(sheet.columns).flat_map(|row| halves.iter().map(move |shown| (row, *shown))).collect();
+    for (r, (row, shown)) in rows.iter().enumerate() {
+        for (column, ((panel, recording), notes)) in row.iter().enumerate() {
+            let points = crossings(&recording.data).iter().filter(|c| half(panel, c) == *shown);
+            let points = points.map(|c| axes.map(|i| c.x[i])).collect();
+            let chart = PlanePanel::new(axis(0), axis(1)).labelled(r + 1 == rows.len(), column == 0);
+            sheet = match shown {
+                Half::Late => sheet
+                    .panel(label(picture, panel), panel.title.as_str(), chart.dots(points, DotStyle::late()))
+                    .notes(notes.iter().cloned()),
+                Half::Early => sheet.panel("", "", chart.dots(points, DotStyle::early())),
+            };
         }
-        sheet = sheet.panel(label(picture, panel), panel.title.as_str(), chart.dots(points(true), DotStyle::late()));
     }
-    let half = wording::number(half);
-    if shown == Shown::Whole {
-        sheet = sheet.legend(LegendEntry::new(LegendKey::Dots(DotStyle::early()), format!("*t* ≤ {half}")));
+    let middle = wording::number(0.5 * picture.panels[0].run.t_end);
+    let late = format!("*t* > {middle}, as in the paper");
+    sheet = sheet.legend(LegendEntry::new(LegendKey::Dots(DotStyle::late()), late));
+    if halves.contains(&Half::Early) {
+        let early = format!("*t* ≤ {middle}");
+        sheet = sheet.legend(LegendEntry::new(LegendKey::Dots(DotStyle::early()), early));
     }
-    sheet.legend(LegendEntry::new(LegendKey::Dots(DotStyle::late()), format!("*t* > {half}")))
+    sheet
+}
+
+/// What stands below the title of each panel: the paper's claim, whether the panel's run supports it, and how many runs do.
+fn verdict_notes(picture: &Picture, verdicts: &[PanelVerdict]) -> Result<Vec<Vec<String>>, JobError> {
+    let of = |panel: &Panel| -> Result<Vec<String>, JobError> {
+        let Some(verdict) = verdicts.iter().find(|v| v.panel == panel.label) else { return Ok(Vec::new()) };
+        let mut notes = vec![
+            format!("paper: {}", verdict.claim_text),
+            format!("this run {}", if verdict.agrees { "agrees" } else { "differs" }),
+        ];
+        if let Some(repeats) = &panel.repeats {
+            let Support { support, runs } = (repeats.count)(repeats.panel, repeats.reading)?;
+            notes.push(format!("{support} of {runs} runs agree"));
+        }
+        Ok(notes)
+    };
+    picture.panels.iter().map(of).collect()
 }
 
 /// Paths in space: the same box in every panel.
-fn space_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording], camera: &Camera) -> Sheet {
+fn space_panels(
+    mut sheet: Sheet,
+    picture: &Picture,
+    recordings: &[Recording],
+    notes: &[Vec<String>],
+    camera: &Camera,
+) -> Sheet {
     let curves: Vec<Vec<Curve>> = recordings.iter().map(|r| curves(&r.data)).collect();
     let ranges: [(f64, f64); 3] = std::array::from_fn(|i| {
         let (low, high) = range_of(curves.iter().flatten().flat_map(|c| &c.points).map(|x| x[i]));
@@ -134,7 +190,7 @@ fn space_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording], c
         Axis::linear(format!("*{}*", greek(names[order[k]])), low, high)
     };
     let turn = |x: [f64; 3]| order.map(|i| x[i]);
-    for ((panel, recording), curves) in picture.panels.iter().zip(recordings).zip(&curves) {
+    for (((panel, recording), curves), notes) in picture.panels.iter().zip(recordings).zip(&curves).zip(notes) {
         let mut patches = surface::patches(&panel.run.system, &ranges, SURFACE_CELLS);
         for corner in patches.iter_mut().flat_map(|p| p.corners.iter_mut()) {
             *corner = turn(*corner);
@@ -144,6 +200,13 @@ fn space_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording], c
         for curve in curves {
             chart = chart.line(curve.points.iter().map(|x| turn(*x)).collect(), curve.style);
         }
+        let connection = connection(&recording.data);
+        if let Some(connection) = &connection {
+            let points: Vec<[f64; 3]> = connection.points.iter().map(|x| turn(*x)).collect();
+            let ends = [points[0], points[points.len() - 1]];
+            chart = chart.line(points, CONNECTION).markers(ends.to_vec(), END);
+            chart = chart.note(ends[0], "*A*", Anchor::Above).note(ends[1], "*B*", Anchor::Above);
+        }
         let exits: Vec<[f64; 3]> = exits(&recording.data).into_iter().map(turn).collect();
         if !exits.is_empty() {
             chart = chart.markers(exits, EXIT);
@@ -152,12 +215,12 @@ fn space_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording], c
         if let Some(point) = singularity {
             chart = chart.markers(vec![turn(point)], SINGULARITY);
         }
-        sheet = sheet.panel(label(picture, panel), panel.title.as_str(), chart);
+        sheet = sheet.panel(label(picture, panel), panel.title.as_str(), chart).notes(notes.iter().cloned());
         // At the size of the whole the exits lie under the two-fold's dot.
         if let (Some(point), [_]) = (singularity, picture.panels.as_slice())
-            && let Some(chart) = passage(panel, recording, curves, point, [order[0], order[1]], &ranges)
+            && let Some(chart) =
+                passage(panel, recording, &connected(curves, connection), point, [order[0], order[1]], &ranges)
         {
-            sheet.columns = 2;
             sheet = sheet.panel("", "the passage, nearer, seen along the normal of the surface", chart);
         }
     }
@@ -166,8 +229,10 @@ fn space_panels(mut sheet: Sheet, picture: &Picture, recordings: &[Recording], c
         Some(Data::Motion(_)) => sheet
             .legend(LegendEntry::new(LegendKey::Line(SLIDING), "sliding"))
             .legend(LegendEntry::new(LegendKey::Marker(EXIT), "exit")),
-        Some(Data::Funnel { futures, .. }) => sheet
+        Some(data @ Data::Funnel { futures, .. }) => sheet
+            .footer(connection(data).map_or(String::new(), |c| c.words()))
             .footer(returns(futures))
+            .legend(LegendEntry::new(LegendKey::Line(CONNECTION), "from *A* to *B* through the singularity"))
             .legend(LegendEntry::new(LegendKey::Marker(EXIT), "exit"))
             .legend(LegendEntry::new(LegendKey::Line(APPROACH), "the one way in"))
             .legend(LegendEntry::new(LegendKey::Line(TO_PLUS), "ways out to *h* > 0"))
@@ -205,6 +270,7 @@ fn passage(
         Axis::linear(format!("*{}*", greek(names[axes[k]])), low, high)
     };
     let mut chart = PlanePanel::new(axis(0), axis(1)).equal();
+    chart.aspect = Some(PASSAGE_ASPECT);
     for patch in surface::patches(&panel.run.system, &window, PASSAGE_CELLS) {
         chart = chart.area(patch.corners.iter().map(|x| axes.map(|i| x[i])).collect(), patch.colour);
     }
@@ -219,22 +285,73 @@ fn passage(
     Some(chart.markers(inside, EXIT).markers(vec![centre], SINGULARITY))
 }
 
+/// Height of the nearer view divided by its width.
+const PASSAGE_ASPECT: f64 = 0.62;
 /// Cells of the switching surface along each side of the nearer view.
 const PASSAGE_CELLS: usize = 12;
 
 /// How many futures came back to the two-fold.
 fn returns(futures: &[Future]) -> String {
-    let comes_back = |f: &&Future| f.motion.events.iter().any(|e| matches!(e.kind, EventKind::TwoFoldReached { .. }));
     let longest = futures.iter().filter_map(|f| Some(f.motion.samples().last()?.1.t - f.motion.samples().next()?.1.t));
     format!(
-        "{} of {} futures come back to the two-fold within {} of leaving it",
-        futures.iter().filter(comes_back).count(),
+        "drawn: {} of {} futures come back to the two-fold within {} of leaving it",
+        futures.iter().filter(|f| comes_back(f)).count(),
         futures.len(),
         wording::number(longest.fold(0.0, f64::max).round())
     )
 }
 
+/// A trajectory between two points of the set, through the singularity (section 3 of the paper).
+struct Connection {
+    points: Vec<[f64; 3]>,
+    /// Times from the first point to the two-fold, and from there to the last one.
+    times: [f64; 2],
+}
+
+impl Connection {
+    fn words(&self) -> String {
+        let [to, from] = self.times.map(|t| wording::number((10.0 * t).round() / 10.0));
+        format!(
+            "*A* and *B* lie on two futures. From *A* the singularity is reached after {to}, from there *B* after {from}"
+        )
+    }
+}
+
+/// From a point of one future back to the two-fold, and on to a point of another one, on the other side; none if no future comes back.
+/// The points are the farthest from the two-fold of the last flight in and of the way out.
+fn connection(data: &Data) -> Option<Connection> {
+    let Data::Funnel { approach, futures } = data else { return None };
+    let centre = approach.samples().last()?.1.x;
+    let distance = |s: &Sample| (0..3).map(|i| (s.x[i] - centre[i]) * (s.x[i] - centre[i])).sum::<f64>();
+    let farthest = |samples: &[Sample]| {
+        (0..samples.len()).max_by(|i, k| distance(&samples[*i]).total_cmp(&distance(&samples[*k])))
+    };
+    let back = futures.iter().find(|f| comes_back(f))?;
+    let other = futures.iter().rfind(|f| f.side != back.side && f.exit_time != back.exit_time)?;
+    let first = back.motion.pieces.iter().rposition(|(mode, samples)| !mode.slides() && samples.len() > 2)?;
+    let samples = |pieces: &[(Mode, Vec<Sample>)]| pieces.iter().flat_map(|(_, s)| s.iter().copied()).collect();
+    let way_in: Vec<Sample> = samples(&back.motion.pieces[first..]);
+    let way_out: Vec<Sample> = samples(&other.motion.pieces);
+    let from = farthest(&way_in)?;
+    let to = farthest(&way_out)?;
+    let points = way_in[from..].iter().chain(&way_out[..=to]).map(|s| s.x).collect();
+    let times = [way_in.last()?.t - way_in[from].t, way_out[to].t - way_out[0].t];
+    Some(Connection { points, times })
+}
+
+/// Curves, and on top of them a connection.
+fn connected(curves: &[Curve], connection: Option<Connection>) -> Vec<Curve> {
+    let connection = connection.map(|c| Curve { points: c.points, style: CONNECTION });
+    curves.iter().cloned().chain(connection).collect()
+}
+
+/// Whether a future reaches the two-fold again.
+fn comes_back(future: &Future) -> bool {
+    future.motion.events.iter().any(|e| matches!(e.kind, EventKind::TwoFoldReached { .. }))
+}
+
 /// A curve in space.
+#[derive(Clone)]
 struct Curve {
     points: Vec<[f64; 3]>,
     style: LineStyle,
@@ -249,7 +366,7 @@ fn curves(data: &Data) -> Vec<Curve> {
     };
     match data {
         Data::Section(_) => Vec::new(),
-        Data::Path(samples) => vec![Curve { points: points(samples), style: LineStyle::new(style::INK, PATH_PT) }],
+        Data::Path(samples) => vec![Curve { points: points(samples), style: PATH }],
         Data::Motion(m) => motion(m, FLIGHT, SLIDING),
         Data::Funnel { approach, futures } => {
             let mut all = Vec::new();
@@ -289,18 +406,22 @@ fn region_legend(sheet: Sheet) -> Sheet {
 
 /// Cells of the switching surface along each side.
 const SURFACE_CELLS: usize = 60;
-/// Width of a long path, in points: thinner than a curve, so that windings stay apart.
-const PATH_PT: f64 = 0.5;
+/// A long path: thinner and lighter than a curve, so that its windings stay apart.
+const PATH: LineStyle = LineStyle::new(style::SOFT_INK, 0.25);
 /// Free flight of a Filippov motion.
 const FLIGHT: LineStyle = LineStyle::new(style::INK, 0.6);
 /// Sliding, drawn apart from flight by width and colour.
 const SLIDING: LineStyle = LineStyle::new(style::GREEN, 1.6);
 /// The motion up to a set-valued point.
-const APPROACH: LineStyle = LineStyle::new(style::INK, 1.4);
+const APPROACH: LineStyle = LineStyle::new(style::INK, 0.8).dashed();
+/// A trajectory that connects two points.
+const CONNECTION: LineStyle = LineStyle::new(style::INK, 1.4);
+/// The points that it connects.
+const END: MarkerStyle = MarkerStyle::new(MarkerShape::OpenDot, style::INK);
 /// Futures on the side h > 0.
-const TO_PLUS: LineStyle = LineStyle::new(style::BLUE, 0.5);
+const TO_PLUS: LineStyle = LineStyle::new(style::BLUE, 0.35);
 /// Futures on the side h < 0.
-const TO_MINUS: LineStyle = LineStyle::new(style::VERMILLION, 0.5);
+const TO_MINUS: LineStyle = LineStyle::new(style::VERMILLION, 0.35);
 /// The end of repelling sliding.
 const EXIT: MarkerStyle = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::GREEN, size: 3.6 };
 /// The two-fold.

@@ -41,6 +41,7 @@ use serde::{Deserialize, Serialize};
 
 pub use study::Study;
 use twofold_integrate::filippov::ExitRule;
+use twofold_job::JobError;
 use twofold_job::spec::{Method, RunSpec, SwitchSpec};
 use twofold_system::Caricature;
 use verdict::Claim;
@@ -86,12 +87,34 @@ pub struct Panel {
     pub run: RunSpec,
     /// What the paper says of it.
     pub claim: Option<Claim>,
+    /// Runs that repeat the panel's from starts that a reader could not tell apart.
+    pub repeats: Option<Repeats>,
+}
+
+/// The runs that repeat a panel, counted when the panel is drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct Repeats {
+    /// The panel, "7(i)".
+    pub panel: &'static str,
+    /// The reading.
+    pub reading: Reading,
+    /// Counts the runs.
+    pub count: fn(&str, Reading) -> Result<Support, JobError>,
+}
+
+/// How many of the runs that repeat a panel support what the paper says of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Support {
+    /// Runs that support it.
+    pub support: u64,
+    /// All of them.
+    pub runs: u64,
 }
 
 /// How the panels of a picture are drawn.
 #[derive(Clone, Copy, Debug)]
 pub enum View {
-    /// A Poincare section in the plane of two coordinates: early half faint, late half dark.
+    /// A Poincare section in the plane of two coordinates: the later half, and the early half below it.
     Section {
         /// Index of the horizontal coordinate.
         horizontal: usize,
@@ -202,12 +225,17 @@ impl Figure {
 impl Panel {
     /// A panel.
     pub fn new(label: &str, title: impl Into<String>, run: RunSpec) -> Self {
-        Panel { label: label.to_owned(), title: title.into(), run, claim: None }
+        Panel { label: label.to_owned(), title: title.into(), run, claim: None, repeats: None }
     }
 
     /// The panel with what the paper says of it.
     pub fn claimed(self, claim: Claim) -> Self {
         Panel { claim: Some(claim), ..self }
+    }
+
+    /// The panel with the runs that repeat it.
+    pub fn repeated(self, repeats: Repeats) -> Self {
+        Panel { repeats: Some(repeats), ..self }
     }
 }
 
@@ -268,6 +296,10 @@ impl Picture {
             self.view = View::LateSection { horizontal, vertical };
             suffix += "-late";
             self.alterations.push("the later half alone".to_owned());
+        }
+        // Other runs have not been repeated.
+        if !suffix.is_empty() && suffix != "-late" {
+            self.panels.iter_mut().for_each(|panel| panel.repeats = None);
         }
         self.name += &suffix;
     }

@@ -227,7 +227,7 @@ pub fn compute_with_tables(
                 });
                 recordings.push(recording);
             }
-            drawing::sheet(picture, &recordings, &spec, &data)
+            drawing::sheet(picture, &recordings, &verdicts, &spec, &data).map_err(failed("drawing"))?
         }
     };
     let rendered = render(&drawn).map_err(|source| PipelineError::Render { picture: picture.name.clone(), source })?;

@@ -51,7 +51,8 @@ impl Question for Drawn<'_> {
     fn json(&self) -> Value {
         let Picture { name, reading, title, caption, view, panels, alterations } = self.0;
         let asked: Vec<_> = parts(self.0).into_iter().map(|(part, q)| (part, question_hash(&*q))).collect();
-        let said: Vec<_> = panels.iter().map(|p| (&p.title, &p.claim)).collect();
+        let said: Vec<_> =
+            panels.iter().map(|p| (&p.title, &p.claim, p.repeats.map(|r| (r.panel, r.reading)))).collect();
         let view = match view {
             // Which function draws: how far it lies from another one, since a program is loaded now here, now there.
             View::Study(study) => {

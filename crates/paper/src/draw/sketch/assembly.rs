@@ -1,4 +1,4 @@
-//! Fig. 1: the wheel assembly seen from above, drawn to scale from the model's geometry.
+//! Fig. 1: the wheel assembly in space and from above, drawn to scale from the model's geometry.
 //!
 //! Coordinates: origin at the axle of the disc, first axis along the wheel's line, second from the axle to the line. The wheel stands
 //! at (r, d); its axle points along (sin gamma, cos gamma), it rolls along (cos gamma, -sin gamma), as in eq. (2).
@@ -7,7 +7,9 @@ use super::{lines_of, lines_table};
 use twofold_job::table::Table;
 use twofold_num::elementary::{cos, sin};
 use twofold_render::Sheet;
-use twofold_render::sheet::{Anchor, ColumnWidth, LineStyle, MarkerShape, MarkerStyle, PlanePanel};
+use twofold_render::sheet::{
+    Anchor, Axis, ColumnWidth, LineStyle, MarkerShape, MarkerStyle, Patch, PlanePanel, SpacePanel,
+};
 use twofold_render::style;
 use twofold_system::Wheel;
 
@@ -70,11 +72,81 @@ fn arc(centre: [f64; 2], radius: f64, from: f64, to: f64) -> Vec<[f64; 2]> {
 
 /// The drawing.
 pub fn draw(tables: &[Table]) -> Sheet {
+    let lines = tables.first().map(lines_of::<2>).unwrap_or_default();
+    Sheet::new(ColumnWidth::Single, 1, "")
+        .subtitle("our reconstruction, to scale")
+        .panel("(a)", "obliquely", oblique(&lines))
+        .panel("(b)", "from above", from_above(&lines))
+}
+
+/// Height of the wheel's hub above the disc: the tyre stands on it.
+const HUB: f64 = TYRE[0];
+
+/// The assembly in space: the disc below, the wheel upright on it, and at the height of its hub the housing with the line along which it moves.
+fn oblique(lines: &[Line]) -> SpacePanel {
+    let thin = LineStyle::new(style::SOFT_INK, 0.6);
+    let ink = LineStyle::new(style::INK, 0.9);
+    let axis = |reach: f64| Axis::linear("", -reach, reach);
+    let mut panel = SpacePanel::new(axis(1.9), axis(1.9), Axis::linear("", 0.0, 2.2 * HUB))
+        .proportions([3.8, 3.8, 2.2 * HUB])
+        .camera(-70.0, 32.0)
+        .unboxed();
+    for (name, points) in lines {
+        // What lies on the disc, and what at the height of the hub.
+        let height = if matches!(name.as_str(), "disc" | "disc-turns" | "slip" | "rolling") { 0.0 } else { HUB };
+        let lifted: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1], height]).collect();
+        let last = lifted[lifted.len() - 1];
+        panel = match name.as_str() {
+            "disc" => panel
+                .surface(vec![Patch { corners: lifted.clone(), colour: style::CROSSING }])
+                .line(lifted, ink)
+                .note([0.0, -1.2, 0.0], "disc", Anchor::Centre),
+            "housing" => panel.line(lifted, thin.dashed()).note([-1.1, -0.75, HUB], "housing", Anchor::Centre),
+            "track" => panel.line(lifted, thin.dotted()),
+            "distance" => panel
+                .line(vec![[0.0, 0.0, 0.0], [0.0, 0.0, HUB]], ink)
+                .note([0.0, 0.5 * last[1], HUB], "*d* ", Anchor::Right)
+                .line(lifted, thin),
+            "tyre" => {
+                let at = |i: usize| [points[i][0], points[i][1]];
+                let (near, far) = (wheel_side([at(0), at(1)]), wheel_side([at(3), at(2)]));
+                let tread = near.windows(2).zip(far.windows(2)).map(|(a, b)| vec![a[0], a[1], b[1], b[0]]);
+                let grey = |corners| Patch { corners, colour: style::INK.lighten(0.35) };
+                let wheel = tread.chain([near.clone(), far.clone()]).map(grey).collect();
+                panel.surface(wheel).line(far, ink).line(near, ink)
+            }
+            "spring" => panel.line(lifted, LineStyle::new(style::BLUE, 0.9)),
+            "slip" => {
+                panel.arrow(lifted, LineStyle::new(style::VERMILLION, 1.1)).note(last, " slip *h*", Anchor::Below)
+            }
+            "rolling" => panel.arrow(lifted, ink).note(last, " *V*", Anchor::Left),
+            "speed" => panel.arrow(lifted, LineStyle::new(style::BLUE, 1.1)).note(last, "*v*", Anchor::Above),
+            "disc-turns" => panel.arrow(lifted, ink).note(last, "*ω*_{0}", Anchor::Below),
+            "housing-turns" => panel.arrow(lifted, thin).note(last, " *ω*", Anchor::Left),
+            "angle" => panel,
+            _ => panel.line(lifted, ink),
+        };
+    }
+    panel
+}
+
+/// The outline of one side of the wheel, upright over the ends of that side's print on the disc.
+fn wheel_side([from, to]: [[f64; 2]; 2]) -> Vec<[f64; 3]> {
+    let circle = arc([0.0, 0.0], 1.0, 0.0, 360.0);
+    let point = |[along, up]: [f64; 2]| {
+        let share = 0.5 * (1.0 + along);
+        [from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1]), HUB * (1.0 + up)]
+    };
+    circle.into_iter().map(point).collect()
+}
+
+/// The assembly in its plane.
+fn from_above(lines: &[Line]) -> PlanePanel {
     let thin = LineStyle::new(style::SOFT_INK, 0.6);
     let ink = LineStyle::new(style::INK, 0.9);
     let mut panel = PlanePanel::sketch((-2.15, 2.15), (-2.0, 2.0));
     panel.aspect = Some(0.8);
-    for (name, points) in tables.first().map(lines_of::<2>).unwrap_or_default() {
+    for (name, points) in lines.iter().cloned() {
         let last = points[points.len() - 1];
         panel = match name.as_str() {
             "disc" => panel.area(points.clone(), style::CROSSING).line(points, ink),
@@ -106,10 +178,9 @@ pub fn draw(tables: &[Table]) -> Sheet {
             _ => panel.line(points, ink),
         };
     }
-    panel = panel
+    panel
         .markers(vec![[0.0, 0.0]], MarkerStyle::new(MarkerShape::OpenDot, style::INK))
         .note([0.06, -0.10], "axle of the disc", Anchor::Left)
         .note([0.0, -1.35], "disc, turning at *ω*_{0}", Anchor::Centre)
-        .note([-0.75, -0.55], "housing (dashed)", Anchor::Centre);
-    Sheet::new(ColumnWidth::Single, 1, "").subtitle("reconstruction, seen from above, to scale").panel("", "", panel)
+        .note([-0.75, -0.55], "housing (dashed)", Anchor::Centre)
 }

@@ -18,6 +18,8 @@ use twofold_system::Caricature;
 
 /// Half the width of the part of the surface that is shown.
 const REACH: f64 = 1.0;
+/// How far above and below the surface: flights between points so near are low.
+const HEIGHT: f64 = 0.1;
 
 /// The normal form (4): the caricature without re-injection.
 pub fn system(v: f64, w: f64) -> Caricature {
@@ -80,15 +82,17 @@ pub fn tables(v: f64, w: f64) -> Result<Vec<Table>, JobError> {
 pub fn draw(tables: &[Table], v: f64, w: f64) -> Sheet {
     let turn = |x: [f64; 3]| [x[1], x[2], x[0]];
     let axis = |name: &str, reach: f64| Axis::linear(name, -reach, reach);
-    let mut chart = SpacePanel::new(axis("*y*", REACH), axis("*z*", REACH), axis("*x*", 0.3)).camera(-60.0, 26.0);
-    let ranges = [(-0.3, 0.3), (-REACH, REACH), (-REACH, REACH)];
+    let mut chart = SpacePanel::new(axis("*y*", REACH), axis("*z*", REACH), axis("*x*", HEIGHT))
+        .camera(-60.0, 26.0)
+        .proportions([1.0, 1.0, 0.55]);
+    let ranges = [(-HEIGHT, HEIGHT), (-REACH, REACH), (-REACH, REACH)];
     let spec = system(v, w).into();
     let mut patches = surface::patches(&spec, &ranges, 20);
     for corner in patches.iter_mut().flat_map(|p| p.corners.iter_mut()) {
         *corner = turn(*corner);
     }
     chart = chart.surface(patches);
-    let flight = LineStyle::new(style::INK, 0.9);
+    let flight = LineStyle::new(style::INK, 1.1);
     let sliding = LineStyle::new(style::GREEN, 1.1);
     for (name, points) in tables.first().map(lines_of::<3>).unwrap_or_default() {
         let points: Vec<[f64; 3]> = points.into_iter().map(turn).collect();
@@ -107,7 +111,7 @@ pub fn draw(tables: &[Table], v: f64, w: f64) -> Sheet {
     }
     chart = chart.markers(vec![[0.0, 0.0, 0.0]], MarkerStyle::new(MarkerShape::Dot, style::MAGENTA));
     let area = |colour, text: &str| LegendEntry::new(LegendKey::Area(colour, style::SURFACE_OPACITY), text);
-    Sheet::new(ColumnWidth::Double, 1, "")
+    Sheet::new(ColumnWidth::Wide, 1, "")
         .subtitle("normal form (4)")
         .panel("", "", chart)
         .legend(area(style::ATTRACTING, "sticking attracts"))
