@@ -68,6 +68,8 @@ census: ## go on with the census, the audit and the basins (hours; Ctrl-C keeps 
 	@$(SWEEP) --t-end 1e4 --method dopri5 --over start.x=-60..60:25 --over start.y=0 --over start.z=-60..60:25 --out figures/basin/printed.csv
 	@$(SWEEP) --t-end 1e4 --method dopri5 --reading reconstructed --over start.x=-3..3:25 --over start.y=0 --over start.z=-3..3:25 --out figures/basin/reconstructed.csv
 	@$(SWEEP) --t-end 2e5 $(READINGS) $(INTERVALS) $(STARTS) --random 300 --out $(C)/fig7.csv
+	@$(SWEEP) --t-end 2e5 --system figures/control/shifted.toml $(INTERVALS) $(STARTS) --random 30 --out figures/control/shifted.csv
+	@$(SWEEP) --t-end 2e5 --reading reconstructed --eps 0.1 $(INTERVALS) $(STARTS) --random 30 --out figures/control/wide.csv
 	@$(SWEEP) --t-end 2e5 $(READINGS) $(SIGMAS) $(STARTS) --random 300 --out $(C)/fig8.csv
 	@$(SWEEP) $(PRINTED) $(METHODS) $(STARTS) --random 100 --out $(C)/methods-printed.csv
 	@$(SWEEP) $(RECONSTRUCTED) $(METHODS) $(STARTS) --random 24 --out $(C)/methods.csv

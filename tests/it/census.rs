@@ -97,7 +97,7 @@ fn make_census_goes_on_with_what_is_committed() {
         found.push(name.to_owned());
     }
     found.sort();
-    let mut committed: Vec<String> = ["census", "audit", "basin"]
+    let mut committed: Vec<String> = ["census", "audit", "basin", "control"]
         .iter()
         .flat_map(|figure| fs::read_dir(root.join("figures").join(figure)).unwrap())
         .map(|entry| entry.unwrap().path().strip_prefix(root).unwrap().display().to_string())

@@ -2,6 +2,8 @@
 #![allow(clippy::disallowed_methods)] // exact solutions are compared to tolerances, not hashed
 
 use nalgebra::{SVector, vector};
+
+use crate::claims::Reads;
 use twofold::integrate::filippov::two_fold::SlidingAtTwoFold;
 use twofold::integrate::filippov::{
     EventKind, ExitRule, FilippovError, FilippovOptions, FunnelGrid, Mode, Side, SlidingLaw, Trajectory, connect,
@@ -51,8 +53,10 @@ fn wrong_side<P: PiecewiseSmooth<N>, const N: usize>(system: &P, run: &Trajector
 
 #[test]
 fn sliding_time_to_the_two_fold_of_the_normal_form() {
+    let mut reads = Reads::by("filippov::sliding_time_to_the_two_fold_of_the_normal_form");
     // dt/ds = y + z, (y, z)' = A (y, z): T = -(1, 1) A^-1 (y, z) with A = [[w, 1], [1, v]].
     let n = invisible(-1.2, -1.4);
+    let mut longest = 0.0_f64;
     for (y, z) in [(0.3, 0.8), (1.0, 0.05), (0.02, 0.5), (3.0, 4.0)] {
         let det = 1.2 * 1.4 - 1.0;
         let exact = -((-1.2 * y - z) + (-y - 1.4 * z)) / det;
@@ -62,7 +66,9 @@ fn sliding_time_to_the_two_fold_of_the_normal_form() {
         assert!((end.t - exact).abs() < 1e-11 * exact, "{y} {z}: {} {exact} {:e}", end.t, end.t - exact);
         assert!(end.x.amax() < 1e-14);
         assert!(drift(&n, &out) <= 1e-12);
+        longest = longest.max(end.t);
     }
+    reads.read("3.4", "longest time of sliding into the origin", longest);
 }
 
 #[test]
@@ -649,6 +655,7 @@ fn every_point_of_the_repelling_region_has_a_past_at_the_two_fold() {
 
 #[test]
 fn points_of_the_chaotic_set_are_connected_through_the_singularity() {
+    let mut reads = Reads::by("filippov::points_of_the_chaotic_set_are_connected_through_the_singularity");
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     // Points of one orbit, taken from its free flight after the first visit.
     let mut orbit = Trajectory::new(2);
@@ -679,6 +686,8 @@ fn points_of_the_chaotic_set_are_connected_through_the_singularity() {
             run(&c, from, t, &FilippovOptions::default(), ExitRule::AtOnce { side }, &mut Trajectory::new(1)).unwrap();
         assert!((end.x - b).amax() < 1e-7, "{:e}", (end.x - b).amax());
     }
+    let share = f64::from(connected) / f64::from(tried);
+    reads.read("3.7", "share of pairs of points of the set that are connected", share);
     assert_eq!(connected, tried, "any two points of the set are connected");
 }
 

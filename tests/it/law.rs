@@ -1,6 +1,7 @@
 //! The law of the passage, against numbers computed outside this project in 113 and 300 bits, and against its own formulas.
 #![allow(clippy::disallowed_methods)] // std functions give expected values, compared with tolerances
 
+use crate::claims::Reads;
 use twofold::analyse::passage::{PassageAnswer, PassageQuestion, Predicted, passage};
 use twofold::analyse::reference::{ExtendedCrossing, SectionPlane, reference};
 use twofold::num::{Arithmetic, DoubleDouble, Scalar};
@@ -42,9 +43,11 @@ fn growth_and_place_are_those_found_elsewhere() {
 
 #[test]
 fn powers_are_the_predicted_ones() {
+    let mut reads = Reads::by("law::powers_are_the_predicted_ones");
     let law = Predicted::of(-1.2, -1.4);
     // phi' of (1 + tanh u)/2 where phi is as on the canard.
     let slope = 2.0 * law.phi * (1.0 - law.phi);
+    let mut powers = [f64::NAN; 2];
     let rows = [1e-4, 1e-5, 1e-6].map(|eps| (eps, growing(eps, 1e-6)));
     for w in rows.windows(2) {
         let ([(above, a), (below, b)], decades) = (w, 10.0_f64.ln()) else { unreachable!() };
@@ -65,7 +68,10 @@ fn powers_are_the_predicted_ones() {
         let rises = (depth(b, *below).powi(2) - depth(a, *above).powi(2)) / decades;
         close(rises / law.selection(slope, z2), 1.0, 0.02, "slope of z^2/eps");
         assert!((rises / law.selection(slope, f64::INFINITY) - 1.0).abs() > 0.04, "the logarithm matters");
+        powers = [-across, -along];
     }
+    reads.read("1.2", "power of eps with which a disturbance across the layer grows", powers[0]);
+    reads.read("2.5", "power of eps with which a disturbance along the layer grows", powers[1]);
 }
 
 #[test]

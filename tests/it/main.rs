@@ -14,6 +14,7 @@ mod census;
 mod claims;
 mod commands;
 mod conformance;
+mod control;
 mod convergence;
 mod crossings;
 mod delay;

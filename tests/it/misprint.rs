@@ -1,5 +1,6 @@
 //! Eq. (5) prints f- = (-z, ...), eq. (4) prints (z, ...). Only +z makes the origin the two-fold that the paper describes.
 
+use crate::claims::Reads;
 use nalgebra::vector;
 use twofold::integrate::{Schedule, StepCap, Tolerance};
 use twofold::job::recording::Data;
@@ -57,11 +58,15 @@ fn the_sign_of_equation_4_returns_for_ever() {
 
 #[test]
 fn only_the_sign_of_equation_4_gives_a_two_fold_invisible_from_both_sides() {
+    let mut reads = Reads::by("misprint::only_the_sign_of_equation_4_gives_a_two_fold_invisible_from_both_sides");
     let fold = |sign| {
         let mut system = Reading::Printed.caricature();
         system.first_component_of_minus = sign;
         two_fold(&system, &vector![0.01, 0.01, 0.01]).unwrap().visibility()
     };
+    let (above, below) = fold(MinusSign::Equation4);
+    let invisible = [above, below].iter().filter(|v| **v == Visibility::Invisible).count();
+    reads.read("3.3", "invisible folds with the sign of eq. (4)", invisible as f64);
     assert_eq!(fold(MinusSign::Equation4), (Visibility::Invisible, Visibility::Invisible));
     assert_eq!(fold(MinusSign::PrintedInEquation5), (Visibility::Invisible, Visibility::Visible));
 }

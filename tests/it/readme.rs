@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use crate::claims::Reads;
 use twofold::paper::{audit, census, figures, verdict_table};
 use twofold::record::Manifest;
 
@@ -137,6 +138,7 @@ fn the_commands_and_tests_behind_the_numbers_exist() {
 
 #[test]
 fn futures_come_back_as_often_as_the_findings_say() {
+    let mut reads = Reads::by("readme::futures_come_back_as_often_as_the_findings_say");
     use twofold::integrate::filippov::EventKind;
     use twofold::integrate::filippov::ExitRule;
     use twofold::integrate::{Schedule, StepCap, Tolerance};
@@ -166,6 +168,14 @@ fn futures_come_back_as_often_as_the_findings_say() {
         let comes_back = |f: &&twofold::job::recording::Future| {
             f.motion.events.iter().any(|e| matches!(e.kind, EventKind::TwoFoldReached { .. }))
         };
-        assert_eq!((futures.iter().filter(comes_back).count(), futures.len()), (back, 40), "{}", reading.word());
+        let found = futures.iter().filter(comes_back).count();
+        let word = reading.word();
+        let quantity = format!("share of the first visit's futures that come back within 300, {word}");
+        reads.read("3.6", &quantity, found as f64 / futures.len() as f64);
+        assert_eq!((found, futures.len()), (back, 40), "{word}");
+        // Fig. 4 says so on its face.
+        let fig4 = figures::fig4::figure().pictures.into_iter().find(|p| p.reading == Some(reading)).unwrap();
+        let said = format!("{back} of 40 futures come back within 300;");
+        assert!(fig4.panels[0].title.starts_with(&said), "{}", fig4.panels[0].title);
     }
 }

@@ -1,6 +1,7 @@
 //! The reconstructed wheel at full length, against the statistics measured outside this project. It is chaotic: statistics are
 //! compared, never points.
 
+use crate::claims::Reads;
 use twofold::integrate::{Schedule, StepCap, Tolerance};
 use twofold::job::recording::Data;
 use twofold::job::simulate::simulate;
@@ -10,6 +11,7 @@ use twofold::system::filippov::two_fold;
 
 #[test]
 fn returns_to_the_singularity_and_stays_bounded() {
+    let mut reads = Reads::by("wheel::returns_to_the_singularity_and_stays_bounded");
     let wheel = Wheel::default();
     let fold = two_fold(&wheel, &nalgebra::vector![0.69, -0.57, -0.87]).unwrap().point;
     let spec = RunSpec {
@@ -62,6 +64,7 @@ fn returns_to_the_singularity_and_stays_bounded() {
         }
     }
     println!("{returns} returns, closest {closest:e}");
+    reads.read("2.3", "returns of the wheel to its two-fold in 200 units of time", f64::from(returns));
     // About 178 in 200 time units, closest about 1e-4. It is chaotic: 15 % is two standard errors of such a count.
     assert!((151..=205).contains(&returns), "{returns} returns");
     assert!(closest < 1e-3, "{closest}");

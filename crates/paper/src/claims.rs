@@ -42,7 +42,7 @@ pub struct Rules {
 }
 
 /// A sentence of the paper.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sentence {
     /// Section or figure, and a number.
@@ -53,12 +53,26 @@ pub struct Sentence {
     pub true_if: String,
     /// How it is measured.
     pub measure: String,
-    /// Files that measure it.
+    /// Quantities that decide it.
     #[serde(default)]
-    pub tested: Vec<String>,
+    pub reads: Vec<Quantity>,
     /// Why it is not measured.
     #[serde(default)]
     pub untested: Option<String>,
+}
+
+/// A quantity that decides a sentence.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Quantity {
+    /// Its name.
+    pub quantity: String,
+    /// The sentence is true if it lies between these, both included.
+    pub true_within: [f64; 2],
+    /// Whether it does.
+    pub holds: bool,
+    /// The function of the integration tests that measures it, "module::function".
+    pub test: String,
 }
 
 /// The file's content.
@@ -72,22 +86,22 @@ pub fn claims() -> &'static Claims {
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
-    use std::path::Path;
 
     use super::*;
     use twofold_system::Transition;
 
     #[test]
-    fn every_sentence_is_tested_somewhere_or_says_why_not() {
+    fn every_sentence_is_measured_or_says_why_not() {
         let claims = claims();
         let ids: BTreeSet<&str> = claims.sentence.iter().map(|s| s.id.as_str()).collect();
         assert_eq!(ids.len(), claims.sentence.len(), "an id occurs twice");
         for s in &claims.sentence {
-            assert!(s.tested.is_empty() == s.untested.is_some(), "{}: tested or untested, one of the two", s.id);
+            assert!(s.reads.is_empty() == s.untested.is_some(), "{}: measured or untested, one of the two", s.id);
             assert!(!s.quote.is_empty() && !s.true_if.is_empty() && !s.measure.is_empty(), "{}", s.id);
-            for file in &s.tested {
-                let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(file);
-                assert!(path.is_file(), "{}: there is no {file}", s.id);
+            let names: BTreeSet<&str> = s.reads.iter().map(|r| r.quantity.as_str()).collect();
+            assert_eq!(names.len(), s.reads.len(), "{}: a quantity occurs twice", s.id);
+            for Quantity { quantity, true_within: [low, high], .. } in &s.reads {
+                assert!(!quantity.is_empty() && low <= high, "{}: {quantity}", s.id);
             }
         }
         for panel in ["7.1", "7.2", "7.3", "7.4", "8.1", "8.2", "8.3", "8.4", "9.1", "9.2", "6.1", "6.2", "6.3"] {
