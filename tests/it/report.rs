@@ -18,6 +18,9 @@ fn twofold(arguments: &[&str]) -> Output {
     Command::cargo_bin("twofold").unwrap().args(arguments).output().unwrap()
 }
 
+/// The pages of odds.
+const ODDS: &str = concat!(include_str!("../../docs/census.md"), "\n\n", include_str!("../../docs/parameters.md"));
+
 /// A copy of the made figures and references for them.
 struct Bench {
     folder: tempfile::TempDir,
@@ -65,6 +68,7 @@ impl Bench {
                     "\n\n",
                     include_str!("../../docs/theorems.md")
                 ),
+                odds: ODDS,
             },
         )
     }
@@ -307,6 +311,12 @@ fn a_referee_finds_findings_rules_making_and_citation() {
     );
     assert!(text("findings").contains(&said), "{said} is not in: {}", text("findings"));
     assert!(text("findings").contains("Each visit to the singularity costs digits."));
+    let odds = document.descendants().find(|n| n.attribute("aria-labelledby") == Some("odds")).unwrap();
+    let tables: Vec<_> =
+        odds.descendants().filter(|n| n.has_tag_name(("http://www.w3.org/1999/xhtml", "table"))).collect();
+    let rows = ODDS.lines().filter(|l| l.starts_with('|') && !l.starts_with("|---"));
+    let shown = odds.descendants().filter(|n| n.has_tag_name(("http://www.w3.org/1999/xhtml", "tr"))).count();
+    assert!(tables.len() >= 2 && shown == rows.count(), "{} tables with {shown} rows", tables.len());
     let thresholds = verdict["evidence"]["section"]["thresholds"].as_object().unwrap();
     for (name, value) in thresholds {
         assert!(

@@ -12,6 +12,9 @@ use crate::report::{Links, MadeFile, Program, Report, archive, assemble, names, 
 
 const FINDINGS: &str =
     concat!(include_str!("../../../docs/findings.md"), "\n\n", include_str!("../../../docs/theorems.md"));
+/// The pages of odds that the report repeats.
+const ODDS: &str =
+    concat!(include_str!("../../../docs/census.md"), "\n\n", include_str!("../../../docs/parameters.md"));
 
 /// Write a self-contained page about the figures in a folder, and beside it report.json, verdicts.json and RO-Crate metadata.
 ///
@@ -42,8 +45,11 @@ fn report(arguments: &Arguments) -> Result<Exit, CliError> {
     let known = figures::all();
     let (made, _) = visit_tree(folder, &|_| true, &|path, place| MadeFile::read(path, place, &known))
         .map_err(|e| CliError::Usage(format!("{e}; run `make figures` first, or name another --figures")))?;
-    let report =
-        assemble(&made, &references(arguments.expected.as_deref())?, &Program { figures: &known, findings: FINDINGS });
+    let report = assemble(
+        &made,
+        &references(arguments.expected.as_deref())?,
+        &Program { figures: &known, findings: FINDINGS, odds: ODDS },
+    );
     if report.figures.is_empty() {
         return Err(CliError::Usage(format!(
             "{}: no figure's pictures are in this folder; run `make figures` first, or name another --figures",

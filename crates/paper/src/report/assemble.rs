@@ -85,6 +85,8 @@ pub struct Program<'a> {
     pub figures: &'a [Figure],
     /// Its pages of findings and theorems, which the report repeats.
     pub findings: &'a str,
+    /// Its docs/census.md and docs/parameters.md, whose odds the page repeats.
+    pub odds: &'a str,
 }
 
 /// Puts the report together: `made` are the files of the figures' folder, `committed` those of the references' folder
@@ -117,6 +119,7 @@ pub fn assemble(made: &[MadeFile], committed: &[FileBytes], program: &Program<'_
         making,
         problems,
         findings: prose::of_the_project(program.findings),
+        odds: prose::of_the_odds(program.odds),
     }
 }
 

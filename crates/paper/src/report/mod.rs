@@ -8,7 +8,7 @@
 //! use twofold_paper::report::{Links, MadeFile, Program, assemble, page};
 //! // No record vouches for this file, so it counts for nothing.
 //! let file = MadeFile::of("own/table.csv".into(), b"t,x\n".to_vec());
-//! let report = assemble(&[file], &[], &Program { figures: &[], findings: "" });
+//! let report = assemble(&[file], &[], &Program { figures: &[], findings: "", odds: "" });
 //! assert_eq!((report.summary.pictures, report.summary.panels), (0, 0));
 //! assert!(page(&report, Links::Beside).starts_with(b"<!DOCTYPE html>"));
 //! ```

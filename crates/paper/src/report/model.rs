@@ -37,6 +37,9 @@ pub struct Report {
     /// What docs/findings.md says was found, as HTML; for the page alone.
     #[serde(skip)]
     pub findings: Vec<String>,
+    /// What docs/census.md and docs/parameters.md say of the odds, as HTML; for the page alone.
+    #[serde(skip)]
+    pub odds: Vec<String>,
 }
 
 /// The file in the folder of the figures that says how they were made. It is the one file there that holds times, and no figure depends on it.

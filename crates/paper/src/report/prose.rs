@@ -82,6 +82,43 @@ pub fn of_the_project(findings: &str) -> Vec<String> {
     blocks
 }
 
+/// What docs/census.md and docs/parameters.md say: their sections with paragraphs and tables, as HTML blocks.
+pub fn of_the_odds(page: &str) -> Vec<String> {
+    let mut heading = String::new();
+    let mut tables = 0;
+    let mut blocks = Vec::new();
+    for block in page.split("\n\n").map(str::trim) {
+        if let Some(text) = block.strip_prefix("## ").or_else(|| block.strip_prefix("# ")) {
+            heading = inline(text);
+            blocks.push(format!("<h3>{heading}</h3>"));
+        } else if block.starts_with("| ") {
+            tables += 1;
+            blocks.push(table(block, &heading, tables));
+        } else if !heading.is_empty() && !block.is_empty() && !block.starts_with("<!--") && !block.starts_with("![") {
+            blocks.push(format!("<p>{}</p>", inline(block)));
+        }
+    }
+    blocks
+}
+
+/// A table of Markdown; its caption is the section's heading.
+fn table(markdown: &str, caption: &str, number: usize) -> String {
+    let row = |line: &str, [open, close]: [&str; 2]| {
+        let line = line.trim();
+        let line = line.strip_prefix('|').unwrap_or(line);
+        let cells = line.strip_suffix('|').unwrap_or(line).split('|');
+        format!("<tr>{}</tr>", cells.map(|cell| format!("{open}{}{close}", inline(cell.trim()))).collect::<String>())
+    };
+    let mut lines = markdown.lines();
+    let head = row(lines.next().unwrap_or_default(), ["<th scope=\"col\">", "</th>"]);
+    let body: Vec<String> = lines.skip(1).map(|line| row(line, ["<td>", "</td>"])).collect();
+    format!(
+        "<section class=\"scroll\" tabindex=\"0\" aria-labelledby=\"odds-{number}-caption\">\n<table id=\"odds-{number}\">\n\
+         <caption id=\"odds-{number}-caption\">{caption}</caption>\n<thead>{head}</thead>\n<tbody>\n{}\n</tbody>\n</table>\n</section>",
+        body.join("\n")
+    )
+}
+
 /// Markdown's emphasis, code and links inside a paragraph. A link's target is a place in the repository: only its text is kept.
 fn inline(markdown: &str) -> String {
     let mut out = String::new();
@@ -149,5 +186,19 @@ mod tests {
         assert!(blocks.iter().any(|b| b.contains("<strong>Each visit to the singularity costs digits.</strong>")));
         assert!(blocks.last().unwrap().contains("<li>"));
         assert!(blocks.iter().all(|b| !b.contains("](") && !b.contains("**")), "{blocks:#?}");
+    }
+
+    #[test]
+    fn the_page_has_the_tables_of_odds_and_of_the_misprint() {
+        let page =
+            concat!(include_str!("../../../../docs/census.md"), "\n\n", include_str!("../../../../docs/parameters.md"));
+        let blocks = of_the_odds(page);
+        let tables: Vec<&String> = blocks.iter().filter(|b| b.contains("<table")).collect();
+        assert!(tables.len() >= 2, "{blocks:#?}");
+        // Every row of a table of the page is one here.
+        let rows = page.lines().filter(|l| l.starts_with('|') && !l.starts_with("|---")).count();
+        assert_eq!(tables.iter().map(|t| t.matches("<tr>").count()).sum::<usize>(), rows);
+        assert!(tables[0].contains("<td>7(ii)</td><td>period three</td>"), "{}", tables[0]);
+        assert!(blocks.iter().all(|b| !b.contains("](") && !b.contains("**") && !b.contains("|---")), "{blocks:#?}");
     }
 }

@@ -30,6 +30,19 @@ pub(super) fn findings(html: &mut String, report: &Report) {
     put!(html, "</div>\n</section>");
 }
 
+/// How likely each outcome is, and which parameters fit.
+pub(super) fn odds(html: &mut String, report: &Report) {
+    if report.odds.is_empty() {
+        return;
+    }
+    put!(html, "<section aria-labelledby=\"odds\">\n<h2 id=\"odds\">Odds</h2>\n<div class=\"prose\">");
+    put!(html, "<p>Of the published figures of this version.</p>");
+    for block in &report.odds {
+        put!(html, "{block}");
+    }
+    put!(html, "</div>\n</section>");
+}
+
 /// The rules by which verdicts are reached, and every threshold.
 pub(super) fn rules(html: &mut String, report: &Report) {
     put!(

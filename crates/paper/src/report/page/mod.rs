@@ -1,7 +1,7 @@
 //! The report as one page: HTML that is also well-formed XML, with style, script and pictures inside. It asks the network for nothing,
 //! and says so to the browser (Content-Security-Policy).
 //!
-//! From top to bottom: the summary and the claims; findings; the figures; all verdicts; rules; how it was made and how to cite.
+//! From top to bottom: the summary and the claims; findings; odds; the figures; all verdicts; rules; how it was made and how to cite.
 
 /// Appends formatted text; writing to a String cannot fail.
 macro_rules! put {
@@ -50,6 +50,7 @@ pub fn page(report: &Report, links: Links) -> Vec<u8> {
     head(&mut html, report);
     summary::summary(&mut html, report);
     about::findings(&mut html, report);
+    about::odds(&mut html, report);
     for figure in &report.figures {
         figure::figure(&mut html, figure, links);
     }
@@ -95,6 +96,9 @@ fn head(html: &mut String, report: &Report) {
         escape(a.title)
     );
     put!(html, "<nav aria-label=\"Contents\">\n<ul>\n<li><a href=\"#findings\">Findings</a></li>");
+    if !report.odds.is_empty() {
+        put!(html, "<li><a href=\"#odds\">Odds</a></li>");
+    }
     for figure in &report.figures {
         put!(html, "<li><a href=\"#{}\">{}</a></li>", figure_id(figure), escape(&figure_name(&figure.id)));
     }
