@@ -8,7 +8,7 @@ use nalgebra::{SVector, vector};
 use twofold::analyse::divider::Shared;
 use twofold::analyse::{Crossing, Direction};
 use twofold::integrate::filippov::{
-    EventKind, ExitRule, FilippovObserver, Mode, ModeEvent, Settings, Side, Trajectory, run,
+    EventKind, ExitRule, FilippovObserver, FilippovOptions, Mode, ModeEvent, Side, Trajectory, run,
 };
 use twofold::integrate::{Flow, Step, Tolerance};
 use twofold::job::recording::Data;
@@ -121,7 +121,7 @@ fn visits<P: PiecewiseSmooth<3> + Clone>(system: &P, start: SVector<f64, 3>, wan
 where
     for<'a> twofold::integrate::filippov::SlidingFlow<'a, P, 3>: VectorField<4>,
 {
-    let settings = Settings { tolerance: Tolerance { rtol: 1e-10, atol: 1e-10 }, ..Settings::default() };
+    let settings = FilippovOptions { tolerance: Tolerance { rtol: 1e-10, atol: 1e-10 }, ..FilippovOptions::default() };
     let mut seen = Visits { wanted, seen: 0 };
     let exit = ExitRule::AfterTime { time: 0.3, side: Side::Plus };
     let _ = run(system, start, 300.0, &settings, exit, &mut seen).unwrap();
@@ -151,7 +151,7 @@ fn one_state_has_several_futures() {
     let system = Reading::Reconstructed.caricature();
     let after = |side| {
         let rule = ExitRule::AtOnce { side };
-        run(&system, SVector::zeros(), 1.0, &Settings::default(), rule, &mut Trajectory::new(1)).unwrap().x
+        run(&system, SVector::zeros(), 1.0, &FilippovOptions::default(), rule, &mut Trajectory::new(1)).unwrap().x
     };
     reads.read(
         "1.1",
@@ -245,7 +245,7 @@ fn sliding_passes_from_attracting_to_repelling() {
         let start = vector![0.0, random.uniform_in(0.01, 1.0), random.uniform_in(0.01, 1.0)];
         let rule = ExitRule::AfterTime { time: 1e9, side: Side::Plus };
         let mut out = Trajectory::new(1);
-        let _ = run(&normal_form, start, 20.0, &Settings::default(), rule, &mut out).unwrap();
+        let _ = run(&normal_form, start, 20.0, &FilippovOptions::default(), rule, &mut out).unwrap();
         let modes: Vec<Mode> = out.pieces.iter().map(|p| p.mode).collect();
         let reached = out.events.iter().any(|e| matches!(e.kind, EventKind::TwoFoldReached { .. }));
         passed += usize::from(reached && modes.starts_with(&[Mode::SlidingAttracting, Mode::SlidingRepelling]));
