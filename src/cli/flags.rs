@@ -35,13 +35,13 @@ pub struct RunFlags {
     /// What stands in for the discontinuity [default: smoothed].
     #[arg(long, value_enum, help_heading = "System")]
     pub switch: Option<Switch>,
-    /// Take alpha and beta from a reading of the paper [default: printed].
+    /// Parameters of the caricature: alpha = 1e-3 as the paper prints it, or 1e-1 as its figures suggest; beta = 1e-5 [default: printed].
     #[arg(long, value_enum, help_heading = "System")]
     pub reading: Option<Reading>,
-    /// Strength of the caricature's drift [default: the reading's].
+    /// The caricature's alpha, the strength of its drift [default: the reading's].
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub alpha: Option<f64>,
-    /// Strength of the caricature's attraction [default: the reading's].
+    /// The caricature's beta, the strength of its attraction [default: the reading's].
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub beta: Option<f64>,
     /// The caricature's v+ [default: -1.2].
@@ -56,10 +56,10 @@ pub struct RunFlags {
     /// Where the orbit was before the start of a run with a delayed switch [default: constant].
     #[arg(long, value_enum, help_heading = "System")]
     pub history: Option<History>,
-    /// Stiffness parameter [default: 0.001; with --switch delayed none, which is the sharp rule].
+    /// Width of the layer of a smoothed switch, or half the band of a hysteretic one [default: 0.001; with --switch delayed none, which is the sharp rule].
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub eps: Option<f64>,
-    /// How the smoothed switch goes over from one side to the other [default: tanh].
+    /// Transition function of the smoothed switch [default: tanh].
     #[arg(long, value_enum, help_heading = "System")]
     pub transition: Option<Transition>,
     /// Size of the tanh transition's perturbation (fig. 8) [default: none].
@@ -68,7 +68,7 @@ pub struct RunFlags {
     /// Relaxation time of the hysteretic switch [default: 10 eps].
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub eps_prime: Option<f64>,
-    /// Reading of eq. (10) [default: literal].
+    /// How the two divisions by eps-prime in eq. (10) are read: both, as printed, or one [default: literal].
     #[arg(long, value_enum, help_heading = "System")]
     pub hysteresis: Option<Relaxation>,
     /// Initial state, one number for each of the system's [default: the one that the system suggests].
@@ -89,7 +89,7 @@ pub struct RunFlags {
     /// Longest step [default: a tenth of the time between restarts or kicks, NDSolve's].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub max_step: Option<f64>,
-    /// Most steps before the run is given up [default: 400000000].
+    /// Number of steps after which the run is given up [default: 400000000].
     #[arg(long, allow_negative_numbers = true, help_heading = "Method")]
     pub max_steps: Option<u64>,
     /// Bits of taylor-extended's numbers: 106 or 192 [default: 106].
@@ -107,7 +107,7 @@ pub struct RunFlags {
     /// Size of a kick [default: eps].
     #[arg(long, allow_hyphen_values = true, help_heading = "Schedule")]
     pub kick_size: Option<f64>,
-    /// Law of a kick [default: sphere].
+    /// Distribution of a kick [default: sphere].
     #[arg(long, value_enum, help_heading = "Schedule")]
     pub kick_law: Option<KickLaw>,
     /// How repelling sliding ends (with --switch filippov): at-once:SIDE, after-time:T:SIDE, after-arc:L:SIDE, with SIDE plus or
@@ -133,16 +133,16 @@ pub struct RunFlags {
     /// Seed of the random numbers of kicks and random exits [default: 2013].
     #[arg(long, allow_negative_numbers = true, help_heading = "Random numbers")]
     pub seed: Option<u64>,
-    /// Stream of the random numbers: one per run [default: 0].
+    /// Stream of the random numbers: runs with other streams have independent numbers [default: 0].
     #[arg(long, allow_negative_numbers = true, help_heading = "Random numbers")]
     pub stream: Option<u64>,
     /// Record crossings of a plane instead of the path, such as y=0.
     #[arg(long, value_name = "COORDINATE=VALUE", help_heading = "Recording")]
     pub section: Option<String>,
-    /// Largest distance between the path's polyline and the dense output [default: 0.001; of a picture 0.0001].
+    /// Largest distance between the recorded polyline and the path [default: 0.001; of a picture 0.0001].
     #[arg(long, allow_hyphen_values = true, help_heading = "Recording")]
     pub chord: Option<f64>,
-    /// Record the state at the multiples of this time, on the dense output, instead of the path that follows it.
+    /// Record the state at the multiples of this time, instead of points that follow the path.
     #[arg(long, value_name = "DT", allow_hyphen_values = true, help_heading = "Recording")]
     pub every: Option<f64>,
     /// Take the whole run from a file made with --print-spec, or from standard input (-); other flags of the run are then refused.

@@ -151,6 +151,27 @@ impl<const N: usize> Extent<N> {
 /// The closed orbit that crosses `plane` `returns` times per turn in its direction, by Newton's method from `guess` (its component
 /// `plane.axis` is set to `plane.value`). `M` is `N` (`N` + 1): `closed_orbit::<3, 12, _>(...)`.
 ///
+/// ```
+/// use nalgebra::{SVector, vector};
+/// use twofold_analyse::floquet::{Error, FloquetOptions, ReturnPlane, closed_orbit};
+/// use twofold_num::Elementary;
+/// use twofold_system::VectorField;
+///
+/// /// r' = r (1 - r^2), one radian per unit time: the unit circle attracts.
+/// struct Circle;
+/// impl VectorField<2> for Circle {
+///     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+///         let inward = S::one() - x[0] * x[0] - x[1] * x[1];
+///         vector![x[0] * inward - x[1], x[1] * inward + x[0]]
+///     }
+/// }
+///
+/// let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
+/// let orbit = closed_orbit::<2, 6, _>(&Circle, plane, 1, vector![1.2, 0.0], &FloquetOptions::default())?;
+/// assert!((orbit.period - 2.0 * std::f64::consts::PI).abs() < 1e-8);
+/// # Ok::<(), Error>(())
+/// ```
+///
 /// # Errors
 /// See [`enum@Error`].
 pub fn closed_orbit<const N: usize, const M: usize, F>(

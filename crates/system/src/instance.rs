@@ -123,6 +123,14 @@ impl System {
     }
 
     /// The built-in system of this name (see [`library`]).
+    ///
+    /// ```
+    /// use twofold_system::System;
+    /// let chua = System::builtin("chua").expect("it ships").with("alpha", 8.8)?;
+    /// assert_eq!(chua.coordinates(), ["x", "y", "z"]);
+    /// assert!(System::builtin("cua").is_none());
+    /// # Ok::<(), twofold_system::ParameterError>(())
+    /// ```
     pub fn builtin(name: &str) -> Option<Self> {
         library::definition(name).cloned().map(Self::new)
     }

@@ -1,0 +1,71 @@
+#!/usr/bin/env python3
+"""Measures of the project's words, as the table of notes/words.md: `python3 scripts/words.py`."""
+
+import pathlib
+import re
+import subprocess
+
+ROOT = pathlib.Path(__file__).parent.parent
+KINDS = ["Tutorial", "How-to", "Reference", "Explanation"]
+
+
+def words(text):
+    """Words of a text; the marks of tables are none."""
+    return sum(any(c.isalnum() for c in word) for word in text.split())
+
+
+def pages():
+    """(kind, text) of each page that docs/SUMMARY.md lists."""
+    kind = "Explanation"
+    for line in (ROOT / "docs/SUMMARY.md").read_text().splitlines():
+        if line.startswith("# ") and line[2:] in KINDS:
+            kind = line[2:]
+        elif link := re.search(r"\]\((.*\.md)\)", line):
+            yield kind, (ROOT / "docs" / link[1]).read_text()
+
+
+def public_items():
+    """Public items of the library, those with documentation, and those with an example; likewise modules."""
+    items = documented = shown = modules = modules_shown = 0
+    for file in [*ROOT.glob("crates/**/*.rs"), *ROOT.glob("src/**/*.rs")]:
+        text = file.read_text().split("#[cfg(test)]")[0]
+        head = "".join(line for line in text.splitlines(True) if line.startswith("//!"))
+        modules += bool(head)
+        modules_shown += "```" in head
+        doc = example = False
+        for line in map(str.strip, text.splitlines()):
+            if line.startswith("///"):
+                doc, example = True, example or "```" in line
+            elif not line.startswith("#["):
+                if re.match(r"pub (const |unsafe )*(fn|struct|enum|trait|type|const|static)\b", line):
+                    items, documented, shown = items + 1, documented + doc, shown + example
+                doc = example = False
+    return items, documented, shown, modules, modules_shown
+
+
+def subjects():
+    """Share of the last 100 commits with a subject of at most 72 characters."""
+    log = subprocess.run(["git", "log", "-100", "--no-merges", "--format=%s"], cwd=ROOT, capture_output=True, text=True)
+    lines = log.stdout.splitlines()
+    return f"{sum(len(line) <= 72 for line in lines)} of {len(lines)}"
+
+
+def main():
+    readme = (ROOT / "README.md").read_text()
+    rows = [("README: lines, words", f"{len(readme.splitlines())}, {words(readme)}")]
+    for kind in KINDS:
+        texts = [text for k, text in pages() if k == kind]
+        counts = [words(text) for text in texts]
+        rows.append((f"docs, {kind}: pages, words, longest page", f"{len(texts)}, {sum(counts)}, {max(counts)}"))
+    notes = [path.read_text() for path in (ROOT / "notes").glob("*.md")]
+    rows.append(("notes: pages, words", f"{len(notes)}, {sum(map(words, notes))}"))
+    items, documented, shown, modules, modules_shown = public_items()
+    rows.append(("public items: all, documented, with an example of their own", f"{items}, {documented}, {shown}"))
+    rows.append(("modules with documentation: all, with an example", f"{modules}, {modules_shown}"))
+    rows.append(("last 100 commits with a subject of at most 72 characters", subjects()))
+    print("| measure | value |\n|---|---|")
+    for row in rows:
+        print("| {} | {} |".format(*row))
+
+
+main()
