@@ -219,6 +219,8 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
             if cut && !M::CUTS_EXACTLY && ((due - from) / (to - from)).to_f64() < KEPT {
                 self.again += 1;
                 self.begin(LONGER * (due - from).to_f64())?;
+                // What follows this step is not short because this one is.
+                self.end = None;
                 continue;
             }
             if self.queue.is_empty() {
