@@ -1,5 +1,8 @@
 //! The delayed switch against programs that share nothing with this one but the equations.
 
+#[path = "../../examples/delay_growth.rs"]
+mod delay_growth;
+
 use std::process::Command;
 
 use twofold::analyse::{Crossing, Direction};
@@ -156,6 +159,24 @@ fn the_chatters_mean_tends_to_filippovs_motion() {
         x[1] - limit[1]
     });
     assert!(apart[3] < 5e-3 && apart.windows(2).all(|e| (e[0] / e[1] - 2.0).abs() < 0.2), "{apart:?}");
+}
+
+/// Growth in a passage: across delay^-1, along and carried in delay^0, up to what the phases of a few starts scatter over one decade. The example has
+/// three decades.
+#[test]
+fn growth_in_a_passage_is_of_order_one_in_inner_units() {
+    let found: Vec<_> =
+        [1e-2, 3e-3, 1e-3].map(|d| (d, delay_growth::growth(d, &delay_growth::STARTS[..3]).unwrap())).into();
+    let [across, along, carried_in] = delay_growth::exponents(&found).map(|(slope, _)| slope);
+    assert!((across + 1.0).abs() < 0.3 && along.abs() < 0.1 && carried_in.abs() < 0.3, "{across} {along} {carried_in}");
+    for (delay, growth) in &found {
+        for g in growth {
+            let inner =
+                [g.across * delay, g.along, g.carried_in, (g.exit[1] * g.exit[1] + g.exit[2] * g.exit[2]).sqrt()];
+            let bounds = [(0.1, 0.5), (2.0, 3.5), (10.0, 40.0), (3.0, 30.0)];
+            assert!(inner.iter().zip(bounds).all(|(v, (low, high))| (low..high).contains(v)), "{delay}: {g:?}");
+        }
+    }
 }
 
 /// What is wrong is said before anything is computed, with exit code 2.

@@ -32,6 +32,7 @@
 pub mod attractor;
 pub mod branch;
 pub mod counts;
+pub mod delay;
 pub mod digits;
 pub mod divider;
 pub mod filippov_return;
