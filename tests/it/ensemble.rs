@@ -4,12 +4,18 @@ use nalgebra::{SVector, vector};
 use twofold::analyse::SectionRecorder;
 use twofold::integrate::ensemble::{End, EnsembleRun, InstructionSet, SectionPlane, ensemble, ensemble_with};
 use twofold::integrate::{
-    Dopri5, DriveOptions, Flow, Ignore, Kick, KickLaw, Observer, Schedule, Step, StepCap, StopReason, Tolerance, drive,
+    Dopri5, DriveOptions, Flow, Guarded, Ignore, Kick, KickLaw, Observer, Schedule, Step, StepCap, StopReason,
+    Tolerance, drive,
 };
 use twofold::system::{Caricature, Smoothed, Transition};
 
 const TOLERANCE: Tolerance = Tolerance { rtol: 1.0536712e-8, atol: 1.0536712e-8 };
 const PLANE: SectionPlane = SectionPlane { coordinate: 1, value: 0.0 };
+
+/// The method whose bits lanes have.
+fn alone<const N: usize>(tolerance: Tolerance) -> Guarded<Dopri5<N>, N> {
+    Guarded::new(Dopri5::new(tolerance), tolerance)
+}
 
 /// Runs that are computed with two registers at a time, and with four, whatever the instruction set.
 const FEW: usize = 19;
@@ -42,7 +48,7 @@ fn runs() -> Vec<EnsembleRun<3>> {
 }
 
 fn alone<O: Observer<3>>(run: &EnsembleRun<3>, mut observer: O) -> End<O, 3> {
-    let mut stepper = Dopri5::new(TOLERANCE);
+    let mut stepper = alone(TOLERANCE);
     let summary = drive(&field(), run.start, &run.options, &mut stepper, &mut observer, &());
     End { summary, observer }
 }
@@ -156,7 +162,7 @@ fn failures_are_those_of_a_run_alone() {
     let expected: Vec<_> = runs
         .iter()
         .map(|run| {
-            let mut stepper = Dopri5::new(TOLERANCE);
+            let mut stepper = alone(TOLERANCE);
             word(&drive(&Exploding, run.start, &run.options, &mut stepper, &mut Ignore, &()))
         })
         .collect();
@@ -190,10 +196,8 @@ fn a_trial_that_has_no_value_is_repeated_as_in_a_run_alone() {
         Ok(end) => format!("{:?} {:?} {:?}", end.x.map(f64::to_bits), end.t.to_bits(), end.statistics),
         Err(failure) => format!("{failure:?}"),
     };
-    let alone: Vec<_> = runs
-        .iter()
-        .map(|run| drive(&Edge, run.start, &run.options, &mut Dopri5::new(coarse), &mut Ignore, &()))
-        .collect();
+    let alone: Vec<_> =
+        runs.iter().map(|run| drive(&Edge, run.start, &run.options, &mut alone(coarse), &mut Ignore, &())).collect();
     let expected: Vec<_> = alone.iter().map(word).collect();
     assert!(expected.iter().any(|e| e.starts_with("NotFinite")), "{expected:?}");
     assert!(alone.iter().flatten().any(|end| end.statistics.rejected > 0), "{expected:?}");
