@@ -136,10 +136,10 @@ pub fn store(bytes: &[u8]) -> String {
     format!("{} {} {}", said(&found), said(&sealed), said(&tables))
 }
 
-/// A theorem's certificate.
+/// A theorem's certificate, without the orbits that the checker computes itself (`make forge` tries those).
 pub fn certificate(bytes: &[u8]) -> String {
     match text(bytes) {
-        Some(text) => said(&twofold::verify::verify(text)),
+        Some(text) => said(&twofold::verify::Checker::of_reader().verify(text)),
         None => "no text".into(),
     }
 }

@@ -405,7 +405,7 @@ fn filippov_in_space() {
     go("few events", &caricature, START, 60.0, random(1), &FilippovOptions { max_events: 4, ..usual });
     go("few steps", &caricature, START, 60.0, random(1), &FilippovOptions { max_steps: 40, ..usual });
     go("on the surface", &caricature, [0.0, 0.3, 0.5], 3.0, random(1), &usual);
-    go("in the repelling region", &caricature, [1e-14, -0.3, -0.5], 3.0, random(1), &usual);
+    go("in the repelling region", &caricature, [0.0, -0.3, -0.5], 3.0, random(1), &usual);
     go("no number", &caricature, [f64::NAN, 0.3, 0.5], 3.0, random(1), &usual);
     go("backwards", &caricature, START, 0.0, random(1), &usual);
     let wheel = builtin("wheel", &[]);
@@ -950,7 +950,7 @@ const FILIPPOV_IN_SPACE: &str = "
     no number: 0 steps, 0 passages, 0252a9679cef34b2
     backwards: 0 steps, 0 passages, ea65d9cc573a36e0
     wheel: 2067 steps, 0 passages, dc245e7c0b8f4c17
-    all: 7c5b4bfcb8e59a44
+    all: 7a6bae01ba672623
 ";
 const FILIPPOV_FAMILIES: &str = "
     funnel: dc7169ef040209e9
@@ -976,10 +976,10 @@ const FILIPPOV_IN_THE_PLANE: &str = "
     stick-slip: 65 steps, 0 passages, 7077b8b1f6f79b2b
     relay-linear: 151 steps, 0 passages, 8247df057320869f
     relay-linear: 16 steps, 0 passages, 1897892b30f5c24f
-    relay-parabolic: 361 steps, 0 passages, dddd9778e3944f5b
-    relay-parabolic: 252 steps, 0 passages, 0eaace289cf11265
-    relay-parabolic: 91 steps, 0 passages, 451cfde5b07675fd
-    relay-parabolic: 77 steps, 0 passages, 751ade2104dff35b
+    relay-parabolic: 362 steps, 0 passages, cc367f3703130770
+    relay-parabolic: 61 steps, 0 passages, d3ffe9d71cd37cca
+    relay-parabolic: 117 steps, 0 passages, 0c02ee901678169c
+    relay-parabolic: 93 steps, 0 passages, 18c5fd9d2f82f14a
     relay-parabolic: 4 steps, 0 passages, bc4c10f401c59638
     relay-parabolic: 3 steps, 0 passages, c0ad80198935b69c
     fused-focus: 24 steps, 0 passages, f6bee66e3d9ccf84
@@ -988,14 +988,14 @@ const FILIPPOV_IN_THE_PLANE: &str = "
     relay-square: 19 steps, 0 passages, 73277e61a3b18b49
     relay-square: 14 steps, 0 passages, 5657d0cb76404774
     relay-square: 14 steps, 0 passages, 5657d0cb76404774
-    relay-square: 21 steps, 0 passages, 99e671fa22de8c25
-    relay-square: 21 steps, 0 passages, 99e671fa22de8c25
-    relay-square: 32 steps, 0 passages, c32617c52bea2ce0
-    relay-square: 32 steps, 0 passages, c32617c52bea2ce0
+    relay-square: 20 steps, 0 passages, dc1ebda309d0380c
+    relay-square: 20 steps, 0 passages, dc1ebda309d0380c
+    relay-square: 32 steps, 0 passages, 5358e5e0964b10db
+    relay-square: 32 steps, 0 passages, 5358e5e0964b10db
     two-blocks: 472 steps, 0 passages, 1329b16e8dc5d64e
     two-blocks: 472 steps, 0 passages, 1329b16e8dc5d64e
-    two-blocks: 23 steps, 0 passages, 124bf75d86cfd788
-    two-blocks: 23 steps, 0 passages, 124bf75d86cfd788
+    two-blocks: 238 steps, 0 passages, ea248c305c341968
+    two-blocks: 238 steps, 0 passages, ea248c305c341968
     two-blocks: 363 steps, 0 passages, cb98bb4d8ad9f9e4
     two-blocks: 363 steps, 0 passages, cb98bb4d8ad9f9e4
 ";

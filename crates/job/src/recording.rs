@@ -490,10 +490,15 @@ mod tests {
             assert!(!recording.data.is_empty());
             let answer = recording.to_answer(&run);
             assert_eq!(recording.data.len(), answer.tables[0].len());
-            assert_eq!(Recording::of_answer(&run, &answer).unwrap(), recording, "{:?}", run.switch);
+            // Of a piece between two samples tables know only that it was there.
+            let mut seen = recording.clone();
+            if let Data::Motion(motion) = &mut seen.data {
+                motion.pieces.retain(|(_, samples)| !samples.is_empty());
+            }
+            assert_eq!(Recording::of_answer(&run, &answer).unwrap(), seen, "{:?}", run.switch);
             // And through the bytes that a store keeps.
             let tables = crate::encode::from_bits(&crate::encode::bits(&answer.tables)).unwrap();
-            assert_eq!(Recording::of_answer(&run, &Answer { tables, ..answer }).unwrap(), recording);
+            assert_eq!(Recording::of_answer(&run, &Answer { tables, ..answer }).unwrap(), seen);
         }
     }
 

@@ -279,6 +279,11 @@ pub struct Checker {
 }
 
 impl Checker {
+    /// One that looks at all that needs no orbit and then refuses: for those who try readers with a great many texts.
+    pub fn of_reader() -> Self {
+        Self { known: Known::of_reader() }
+    }
+
     /// Verifies a certificate.
     ///
     /// # Errors

@@ -64,6 +64,8 @@ pub(super) struct Closed {
 /// Orbits that were computed, by their starts: a checker that is asked for many certificates computes each once.
 #[derive(Default)]
 pub(super) struct Known {
+    /// No orbits are computed.
+    reads_only: bool,
     orbits: RefCell<HashMap<String, Rc<Vec<Crossing>>>>,
     passages: RefCell<HashMap<String, Passage>>,
 }
@@ -72,6 +74,16 @@ pub(super) struct Known {
 pub(super) type Passage = ([Range; 2], [[Range; 2]; 2]);
 
 impl Known {
+    /// Nothing, and nothing that takes long will be computed.
+    pub fn of_reader() -> Self {
+        Self { reads_only: true, ..Self::default() }
+    }
+
+    /// Refuses what a reader does not do.
+    fn may_compute(&self) -> Check<()> {
+        if self.reads_only { Err("orbits are enclosed: this checker only reads".into()) } else { Ok(()) }
+    }
+
     /// The first `count` crossings of y = 0 by all orbits from a patch.
     pub fn crossings(
         &self,
@@ -84,6 +96,7 @@ impl Known {
         if let Some(found) = self.orbits.borrow().get(&key) {
             return Ok(found.clone());
         }
+        self.may_compute()?;
         let mut flow = Flow::new(field, settings, Y);
         let mut set = patch.set()?;
         let mut rows = Vec::new();
@@ -149,6 +162,7 @@ impl Known {
         if let Some(found) = self.passages.borrow().get(&key) {
             return Ok(found.clone());
         }
+        self.may_compute()?;
         let found = inner_passage(field, ratio, s0, x0, largest)?;
         self.passages.borrow_mut().insert(key, found.clone());
         Ok(found)
