@@ -253,7 +253,8 @@ fn passage(
 ) -> Option<PlanePanel> {
     let exits: Vec<[f64; 2]> = exits(&recording.data).into_iter().map(|x| axes.map(|i| x[i])).collect();
     let centre = axes.map(|i| centre[i]);
-    let distance = |p: &[f64; 2]| (p[0] - centre[0]).abs().max((p[1] - centre[1]).abs());
+    // In heights of the view, which is wider than high.
+    let distance = |p: &[f64; 2]| (PASSAGE_ASPECT * (p[0] - centre[0]).abs()).max((p[1] - centre[1]).abs());
     let mut distances: Vec<f64> = exits.iter().map(distance).collect();
     distances.sort_by(f64::total_cmp);
     let reach = 2.0 * distances.get(distances.len() / 2)?;
@@ -262,6 +263,7 @@ fn passage(
     }
     let mut window = *ranges;
     for (k, i) in axes.into_iter().enumerate() {
+        let reach = if k == 0 { reach / PASSAGE_ASPECT } else { reach };
         window[i] = (centre[k] - reach, centre[k] + reach);
     }
     let names = panel.run.system.coordinates();
