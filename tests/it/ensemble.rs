@@ -13,7 +13,7 @@ const TOLERANCE: Tolerance = Tolerance { rtol: 1.0536712e-8, atol: 1.0536712e-8 
 const PLANE: SectionPlane = SectionPlane { coordinate: 1, value: 0.0 };
 
 /// The method whose bits lanes have.
-fn alone<const N: usize>(tolerance: Tolerance) -> Guarded<Dopri5<N>, N> {
+fn method<const N: usize>(tolerance: Tolerance) -> Guarded<Dopri5<N>, N> {
     Guarded::new(Dopri5::new(tolerance), tolerance)
 }
 
@@ -48,7 +48,7 @@ fn runs() -> Vec<EnsembleRun<3>> {
 }
 
 fn alone<O: Observer<3>>(run: &EnsembleRun<3>, mut observer: O) -> End<O, 3> {
-    let mut stepper = alone(TOLERANCE);
+    let mut stepper = method(TOLERANCE);
     let summary = drive(&field(), run.start, &run.options, &mut stepper, &mut observer, &());
     End { summary, observer }
 }
@@ -162,7 +162,7 @@ fn failures_are_those_of_a_run_alone() {
     let expected: Vec<_> = runs
         .iter()
         .map(|run| {
-            let mut stepper = alone(TOLERANCE);
+            let mut stepper = method(TOLERANCE);
             word(&drive(&Exploding, run.start, &run.options, &mut stepper, &mut Ignore, &()))
         })
         .collect();
@@ -197,7 +197,7 @@ fn a_trial_that_has_no_value_is_repeated_as_in_a_run_alone() {
         Err(failure) => format!("{failure:?}"),
     };
     let alone: Vec<_> =
-        runs.iter().map(|run| drive(&Edge, run.start, &run.options, &mut alone(coarse), &mut Ignore, &())).collect();
+        runs.iter().map(|run| drive(&Edge, run.start, &run.options, &mut method(coarse), &mut Ignore, &())).collect();
     let expected: Vec<_> = alone.iter().map(word).collect();
     assert!(expected.iter().any(|e| e.starts_with("NotFinite")), "{expected:?}");
     assert!(alone.iter().flatten().any(|end| end.statistics.rejected > 0), "{expected:?}");
