@@ -93,6 +93,10 @@ census: ## go on with the census, the audit and the basins (hours; Ctrl-C keeps 
 	@$(SWEEP) --t-end 2e5 --method dopri5 $(CELLS) $(SIGMAS) $(STARTS) --random 6 --out $(A)/fig8.csv
 	@$(SWEEP) --t-end 2e5 --method dopri5 $(HYSTERETIC) $(CELLS) $(STARTS) --random 2 --out $(A)/fig9.csv
 
+.PHONY: delay-growth
+delay-growth: ## how a disturbance grows in a passage of the two-fold when the switch acts late (a minute)
+	@$(CARGO) run --release --locked --quiet --example delay_growth
+
 .PHONY: returns
 returns: ## how many orbits that leave the repelling sliding region come back to the two-fold (minutes)
 	@$(CARGO) run --release --locked --quiet --example returns
