@@ -129,7 +129,7 @@ fn text_for_people_says_the_same_and_steers_no_terminal() {
 
 /// Published pictures of fig. 6, the quickest figure: `change` of each of its readings' pictures.
 #[test]
-fn published_pictures_are_checked_rung_by_rung() {
+fn published_pictures_are_checked_criterion_by_criterion() {
     let folder = tempfile::tempdir().unwrap();
     let made = folder.path().join("made");
     let output = Command::cargo_bin("twofold")
@@ -141,9 +141,9 @@ fn published_pictures_are_checked_rung_by_rung() {
     let published = folder.path().join("published");
     let name = "fig6-printed.png";
     let original = fs::read(made.join("fig6").join(name)).unwrap();
-    let put = |rung: &str, bytes: &[u8]| {
-        fs::create_dir_all(published.join(rung)).unwrap();
-        fs::write(published.join(rung).join(name), bytes).unwrap();
+    let put = |criterion: &str, bytes: &[u8]| {
+        fs::create_dir_all(published.join(criterion)).unwrap();
+        fs::write(published.join(criterion).join(name), bytes).unwrap();
     };
     let altered = |change: &dyn Fn(usize, usize, &mut [u8])| {
         let mut pixels = decode_png(&original).unwrap();

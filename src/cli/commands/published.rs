@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::cli::progress::Progress;
 use crate::cli::speak::print_json;
 use crate::cli::{CliError, Exit, in_pool, print};
-use crate::compare::{Comparison, Limits, Rung, SizesDiffer, compare};
+use crate::compare::{Comparison, Criterion, Limits, SizesDiffer, compare};
 use crate::job::Executor;
 use crate::paper::Figure;
 use crate::paper::pipeline::{Computed, compute, pixel_hash, questions};
@@ -21,15 +21,16 @@ struct Finding {
     name: String,
     /// Whether it was compared at all.
     checked: bool,
-    /// The strictest rung that holds.
-    rung: Option<Rung>,
+    /// The strictest criterion that is met; called a rung in JSON.
+    #[serde(rename = "rung")]
+    criterion: Option<Criterion>,
     /// In words.
     found: String,
     /// How the two differ, where that could be measured.
     comparison: Option<Comparison>,
 }
 
-/// Computes every figure of which the folder holds a picture, and says for each picture which rung of the ladder holds.
+/// Computes every figure of which the folder holds a picture, and says for each picture which criterion is met.
 pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool, json: bool) -> Result<Exit, CliError> {
     let tree = read_tree(folder, &|path| path.ends_with(".png"))?;
     let published = tree.files;
@@ -58,7 +59,7 @@ pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool, jso
     let passed_over = |name: &str, why: &str| Finding {
         name: name.to_owned(),
         checked: false,
-        rung: None,
+        criterion: None,
         found: why.to_owned(),
         comparison: None,
     };
@@ -80,7 +81,7 @@ pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool, jso
         say(passed_over(link, "a link to nothing, passed over"))?;
     }
     let checked = findings.iter().filter(|f| f.checked).count();
-    let failures = findings.iter().filter(|f| f.checked && f.rung.is_none()).count();
+    let failures = findings.iter().filter(|f| f.checked && f.criterion.is_none()).count();
     if json {
         print_json(&serde_json::json!({
             "format": "twofold-check-published",
@@ -98,13 +99,18 @@ pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool, jso
     Ok(if failures == 0 { Exit::Fine } else { Exit::CheckFailed })
 }
 
-/// The strictest rung that holds, and a sentence.
+/// The strictest criterion that is met, and a sentence.
 fn held(file: &FileBytes, computed: &Computed, limits: &Limits) -> Finding {
     let ours = &computed.record.hashes;
-    let finding =
-        |rung, found: String, comparison| Finding { name: file.path.clone(), checked: true, rung, found, comparison };
+    let finding = |criterion, found: String, comparison| Finding {
+        name: file.path.clone(),
+        checked: true,
+        criterion,
+        found,
+        comparison,
+    };
     if Hash::of(&file.bytes) == ours.png {
-        return finding(Some(Rung::File), "holds exactly (file: SHA-256 equal)".into(), None);
+        return finding(Some(Criterion::SameFile), "holds exactly (file: SHA-256 equal)".into(), None);
     }
     // The size is in the first bytes: a file that claims another is not decoded.
     let expected = (computed.rendered.pixels.width, computed.rendered.pixels.height);
@@ -117,16 +123,16 @@ fn held(file: &FileBytes, computed: &Computed, limits: &Limits) -> Finding {
     };
     if pixel_hash(&theirs) == ours.pixels {
         let text = "holds exactly in its pixels (SHA-256 equal); the file's encoding or metadata differ";
-        return finding(Some(Rung::Pixels), text.into(), None);
+        return finding(Some(Criterion::Pixels), text.into(), None);
     }
     let comparison = match compare(&computed.rendered.pixels, &theirs) {
         Ok(comparison) => comparison,
         Err(sizes) => return finding(None, cannot_be_compared(&sizes), None),
     };
-    match limits.rung(&comparison) {
-        Some(rung) => {
-            let text = format!("holds within tolerance ({}); {}", limits.describe(rung), say(&comparison));
-            finding(Some(rung), text, Some(comparison))
+    match limits.strictest(&comparison) {
+        Some(criterion) => {
+            let text = format!("holds within tolerance ({}); {}", limits.describe(criterion), say(&comparison));
+            finding(Some(criterion), text, Some(comparison))
         }
         None => finding(None, format!("DIFFERS: no criterion is met; {}", say(&comparison)), Some(comparison)),
     }

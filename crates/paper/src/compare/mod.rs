@@ -238,12 +238,13 @@ pub fn difference_image(expected: &Pixels, actual: &Pixels) -> Result<Pixels, Si
     Ok(Pixels { width: expected.width, height: expected.height, rgba })
 }
 
-/// A rung of the tolerance ladder, the strictest first.
+/// A criterion by which two pictures agree, the strictest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Rung {
+pub enum Criterion {
     /// The file is byte for byte the same.
-    File,
+    #[serde(rename = "file")]
+    SameFile,
     /// Every pixel is the same; only the file's encoding or its metadata differ.
     Pixels,
     /// Few pixels differ and none by much: another rasteriser's rounding.
@@ -254,11 +255,11 @@ pub enum Rung {
     Ssim,
 }
 
-/// The limits of the ladder's inexact rungs. Each bounds the whole picture and its worst place.
+/// The limits of the inexact criteria. Each bounds the whole picture and its worst place.
 ///
 /// Measured on two pictures of dense sections: a palette of 64 colours, jitter of up to 6 levels on all edges and JPEG of quality 95 hold by changed
 /// pixels or RMS; JPEG of quality 85 and scaling to nine tenths and back by SSIM at the least; JPEG of quality 75, half size and back, a shift
-/// by one pixel, and a black dot of three by three pixels on white (RMS 0.5, SSIM 0.99995 over the whole picture) hold nowhere. What the ladder
+/// by one pixel, and a black dot of three by three pixels on white (RMS 0.5, SSIM 0.99995 over the whole picture) hold nowhere. What they
 /// cannot see is a dot of that size in the middle of a grey cloud of dots: only the hashes do.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Limits {
@@ -291,31 +292,31 @@ impl Default for Limits {
 
 impl Limits {
     /// The limits in words.
-    pub fn describe(&self, rung: Rung) -> String {
-        match rung {
-            Rung::File => "file: SHA-256 equal".into(),
-            Rung::Pixels => "pixels: SHA-256 of the decoded pixels equal".into(),
-            Rung::ChangedPixels => format!(
+    pub fn describe(&self, criterion: Criterion) -> String {
+        match criterion {
+            Criterion::SameFile => "file: SHA-256 equal".into(),
+            Criterion::Pixels => "pixels: SHA-256 of the decoded pixels equal".into(),
+            Criterion::ChangedPixels => format!(
                 "changed pixels: at most {} % changed, none by more than {} levels of 255",
                 100.0 * self.changed_share,
                 self.largest_difference
             ),
-            Rung::Rms => format!(
+            Criterion::Rms => format!(
                 "RMS: at most {} levels of 255, at most {} in any block of {BLOCK} by {BLOCK} pixels",
                 self.rms, self.worst_block_rms
             ),
-            Rung::Ssim => format!("SSIM: at least {}, at least {} in any window", self.ssim, self.worst_ssim),
+            Criterion::Ssim => format!("SSIM: at least {}, at least {} in any window", self.ssim, self.worst_ssim),
         }
     }
 
-    /// The strictest inexact rung that holds, if any does. Exact rungs are decided by hashes.
-    pub fn rung(&self, c: &Comparison) -> Option<Rung> {
+    /// The strictest inexact criterion that is met, if any is. Exact ones are decided by hashes.
+    pub fn strictest(&self, c: &Comparison) -> Option<Criterion> {
         if c.changed_share <= self.changed_share && c.largest_difference <= self.largest_difference {
-            Some(Rung::ChangedPixels)
+            Some(Criterion::ChangedPixels)
         } else if c.rms <= self.rms && c.worst_block_rms <= self.worst_block_rms {
-            Some(Rung::Rms)
+            Some(Criterion::Rms)
         } else if c.ssim >= self.ssim && c.worst_ssim >= self.worst_ssim {
-            Some(Rung::Ssim)
+            Some(Criterion::Ssim)
         } else {
             None
         }
@@ -409,23 +410,27 @@ mod tests {
         let limits = Limits::default();
         assert!(c.rms > limits.rms && c.ssim > limits.ssim && c.changed_share < limits.changed_share);
         assert!(c.worst_ssim < 0.1 && c.worst_block_rms > 50.0);
-        assert_eq!(limits.rung(&c), None);
+        assert_eq!(limits.strictest(&c), None);
     }
 
     #[test]
-    fn the_ladder_goes_from_strict_to_loose() {
+    fn criteria_go_from_strict_to_loose() {
         let limits = Limits::default();
         let same = compare(&noise(40, 30, 1), &noise(40, 30, 1)).unwrap();
-        assert_eq!(limits.rung(&same), Some(Rung::ChangedPixels));
+        assert_eq!(limits.strictest(&same), Some(Criterion::ChangedPixels));
         let many = Comparison { changed_share: 0.5, rms: 1.0, worst_block_rms: 3.0, largest_difference: 9, ..same };
-        assert_eq!(limits.rung(&many), Some(Rung::Rms));
+        assert_eq!(limits.strictest(&many), Some(Criterion::Rms));
         let lossy = Comparison { rms: 3.0, ssim: 0.99, worst_ssim: 0.8, ..many };
-        assert_eq!(limits.rung(&lossy), Some(Rung::Ssim));
-        assert_eq!(limits.rung(&Comparison { worst_ssim: 0.1, ..lossy }), None);
+        assert_eq!(limits.strictest(&lossy), Some(Criterion::Ssim));
+        assert_eq!(limits.strictest(&Comparison { worst_ssim: 0.1, ..lossy }), None);
         // A number that is not one holds nowhere.
         let nan = Comparison { changed_share: f64::NAN, rms: f64::NAN, ssim: f64::NAN, ..same };
-        assert_eq!(limits.rung(&nan), None);
-        assert!(Rung::File < Rung::Pixels && Rung::Pixels < Rung::ChangedPixels && Rung::Rms < Rung::Ssim);
+        assert_eq!(limits.strictest(&nan), None);
+        assert!(
+            Criterion::SameFile < Criterion::Pixels
+                && Criterion::Pixels < Criterion::ChangedPixels
+                && Criterion::Rms < Criterion::Ssim
+        );
     }
 
     #[test]
@@ -529,21 +534,21 @@ mod tests {
     fn limits_are_said_in_words() {
         let limits = Limits::default();
         assert_eq!(
-            limits.describe(Rung::ChangedPixels),
+            limits.describe(Criterion::ChangedPixels),
             "changed pixels: at most 1 % changed, none by more than 32 levels of 255"
         );
-        assert_eq!(limits.describe(Rung::Ssim), "SSIM: at least 0.98, at least 0.5 in any window");
+        assert_eq!(limits.describe(Criterion::Ssim), "SSIM: at least 0.98, at least 0.5 in any window");
         // At the limit is inside it.
         let c = compare(&grey(2, 2, |_| 0), &grey(2, 2, |_| 0)).unwrap();
         let just = Comparison { changed_share: 0.01, largest_difference: 32, ..c };
-        assert_eq!(limits.rung(&just), Some(Rung::ChangedPixels));
+        assert_eq!(limits.strictest(&just), Some(Criterion::ChangedPixels));
         assert_eq!(
-            limits.rung(&Comparison { largest_difference: 33, rms: 2.0, worst_block_rms: 8.0, ..just }),
-            Some(Rung::Rms)
+            limits.strictest(&Comparison { largest_difference: 33, rms: 2.0, worst_block_rms: 8.0, ..just }),
+            Some(Criterion::Rms)
         );
         let blurred = Comparison { largest_difference: 33, rms: 2.1, ssim: 0.98, worst_ssim: 0.5, ..just };
-        assert_eq!(limits.rung(&blurred), Some(Rung::Ssim));
-        assert_eq!(limits.rung(&Comparison { ssim: 0.97, ..blurred }), None);
+        assert_eq!(limits.strictest(&blurred), Some(Criterion::Ssim));
+        assert_eq!(limits.strictest(&Comparison { ssim: 0.97, ..blurred }), None);
     }
 
     /// Few changed pixels are drawn wide, many are not: one in a thousand is the border.
