@@ -102,7 +102,7 @@ fn the_controls_are_the_runs_of_fig_7_with_one_change() {
             let run = rows.sweep().question(row as u64).unwrap().0.run;
             let expected = RunSpec {
                 system: system.clone(),
-                switch: switch.clone(),
+                switch,
                 start: run.start.clone(),
                 schedule: Schedule { restart_every: panel.run.schedule.restart_every, kick: None },
                 ..panel.run.clone()

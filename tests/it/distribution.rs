@@ -165,7 +165,7 @@ fn the_package_holds_what_it_embeds() {
     ] {
         let packed = packed(package);
         for source in packed.iter().filter(|f| f.ends_with(".rs") && !f.starts_with("examples/")) {
-            let code = text(&Path::new(folder).join(source).display().to_string());
+            let code = text(Path::new(folder).join(source));
             // Tests are run where all files are.
             let code = code.split("#[cfg(test)]").next().unwrap();
             for found in embeds.captures_iter(code) {
