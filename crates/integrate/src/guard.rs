@@ -2,7 +2,7 @@
 //!
 //! A method looks at an equation at few places in a step. A transition function, an exponential or a resonance that rises and falls between them, where all that
 //! the method sees is flat, leaves no trace in its error estimate. [`Guarded`] looks at each accepted step's continuous extension: it bounds how
-//! far the arguments of all operations that can be flat far away and steep near by ([`Gate`]) leave the chords between their values at the step's ends. Nearly
+//! far the arguments of all operations that can be flat far away and steep near by (gates) leave the chords between their values at the step's ends. Nearly
 //! always that shows that none of them comes near its steep part, that it hardly moves, or that it goes through once, and the step stands. Otherwise the step is searched by bisection, and where the
 //! right-hand side along the continuous extension is found outside what the method saw (its values at the step's ends and the extension's own derivative: the
 //! defect, Enright 1989) by more than the tolerance allows, the step is taken back. The method then ends a step where the structure begins and goes through it with
