@@ -41,12 +41,12 @@ fn golden_quick_figures_have_the_committed_hashes() {
 /// The long figures, shortened to t = 300: a digest of what is asked, found and drawn. A picture that changes on purpose gets its new line here; the
 /// test prints it.
 const SHORTENED: [(&str, &str); 6] = [
-    ("fig7-printed-shortened", "6c24739219839d530ec0b140ec117faadc37d1823665dbcad89aedf80201ed11"),
-    ("fig7-reconstructed-shortened", "2594875d17c6a59f1d4162369110d4700a7708f1d23f1b8493def48711cdc7c0"),
-    ("fig8-printed-shortened", "fab77af605355f6c0b0f9c75adf7172a7c187a29c63ff319731eee414be8df53"),
-    ("fig8-reconstructed-shortened", "4c145c6bced8d49b282b14dc1c8912c672d5225b300fde87727bd36e1dd194d8"),
-    ("fig9-printed-shortened", "b3975cb3c6db89dca80720edbffa8d44f540be0169f197d75bf4634b5f128aa2"),
-    ("fig9-reconstructed-shortened", "795b54e95d35a9faf8f16b2a2363e13b3c546aa35f4cd2e06a7cc73918e2ace0"),
+    ("fig7-printed-shortened", "66795433ca72c2ae52df41c16e109e8de44729cf6c61e472e5e9c3d16e6eefa0"),
+    ("fig7-reconstructed-shortened", "1f0a79ee7e2e24df15230b5a5c64b79fe30be226890b05fe47747319ab0d1fcc"),
+    ("fig8-printed-shortened", "b948bffb9b36e59f3929608bdd79d912c638bf56412d39ffef39e22a690654c7"),
+    ("fig8-reconstructed-shortened", "d3c9398d90342a794d868c4c5835178cad1c2bc390238f9aa3a6c003685a4749"),
+    ("fig9-printed-shortened", "d0d2c8d8891e896943dabc706a4838cd1ac98e07559bd08e3172eaec3aabe639"),
+    ("fig9-reconstructed-shortened", "df554d4f444ef2d4ea2409e47fa1d6461f1516142300aa2c0f1a61724986391b"),
 ];
 
 #[test]

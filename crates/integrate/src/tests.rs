@@ -950,7 +950,7 @@ const FILIPPOV_IN_SPACE: &str = "
     no number: 0 steps, 0 passages, 0252a9679cef34b2
     backwards: 0 steps, 0 passages, ea65d9cc573a36e0
     wheel: 2067 steps, 0 passages, dc245e7c0b8f4c17
-    all: 7a6bae01ba672623
+    all: 7c5b4bfcb8e59a44
 ";
 const FILIPPOV_FAMILIES: &str = "
     funnel: dc7169ef040209e9
