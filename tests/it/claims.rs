@@ -15,7 +15,7 @@ use twofold::integrate::{Flow, Step, Tolerance};
 use twofold::job::recording::Data;
 use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
-use twofold::job::{Desk, PathComparison};
+use twofold::job::{Executor, PathComparison};
 use twofold::num::random::RandomStream;
 use twofold::paper::census::{Kind, PANELS, bears_out, tally};
 use twofold::paper::claims::{Quantity, claims};
@@ -385,17 +385,18 @@ fn visits_by_the_end_of_figure_6() {
 #[test]
 fn panels_of_figure_6_share_few_places() {
     let mut reads = Reads::by("claims::panels_of_figure_6_share_few_places");
-    let desk = Desk::quiet();
+    let executor = Executor::quiet();
     for reading in Reading::ALL {
         let runs = ["i", "ii", "iii", "iv"].map(|label| panel("fig6", reading, label));
         let mut largest = 0.0_f64;
         for (k, a) in runs.iter().enumerate() {
             for b in &runs[k + 1..] {
-                let shared: Shared = desk.ask(&PathComparison(a.clone(), b.clone())).unwrap().fact("shared").unwrap();
+                let shared: Shared =
+                    executor.ask(&PathComparison(a.clone(), b.clone())).unwrap().fact("shared").unwrap();
                 largest = largest.max(shared.overlap);
             }
         }
-        let shared = desk.ask(&PathComparison(runs[2].clone(), runs[3].clone())).unwrap();
+        let shared = executor.ask(&PathComparison(runs[2].clone(), runs[3].clone())).unwrap();
         let shared: Shared = shared.fact("shared").unwrap();
         reads.read("6.1", &of(reading, "largest share of places that two panels have in common"), largest);
         reads.read("6.3", &of(reading, "share of places that 6(iii) and 6(iv) have in common"), shared.overlap);

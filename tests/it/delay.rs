@@ -11,7 +11,7 @@ use twofold::integrate::{Kick, KickLaw, Schedule, StepCap, Tolerance};
 use twofold::job::recording::Data;
 use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
-use twofold::job::{Desk, Run};
+use twofold::job::{Executor, Run};
 use twofold::system::{Caricature, Transition};
 
 fn spec(alpha: f64, switch: SwitchSpec, method: Method, tolerance: f64, t_end: f64) -> RunSpec {
@@ -113,12 +113,12 @@ fn the_smooth_rule_agrees_with_scipy() {
 #[test]
 fn an_answer_is_its_questions() {
     let run = spec(1e-1, SwitchSpec::delayed(1e-2), Method::Dopri5, 1e-9, 12.0);
-    let answer = Desk::quiet().ask(&Run(run.clone())).unwrap();
+    let answer = Executor::quiet().ask(&Run(run.clone())).unwrap();
     assert_eq!(answer.fact::<String>("history").unwrap(), "constant");
     let json = serde_json::to_value(&run).unwrap();
     assert_eq!(json["switch"], serde_json::json!({ "delayed": { "delay": 1e-2, "history": "constant" } }));
     let again: RunSpec = serde_json::from_value(json).unwrap();
-    assert_eq!(*Desk::quiet().ask(&Run(again)).unwrap(), *answer);
+    assert_eq!(*Executor::quiet().ask(&Run(again)).unwrap(), *answer);
     // A question without a delay has no word of one.
     let smoothed = serde_json::to_string(&spec(1e-1, SwitchSpec::tanh(1e-3), Method::Dopri5, 1e-9, 12.0)).unwrap();
     assert!(!smoothed.contains("delay") && !smoothed.contains("history"));

@@ -1,7 +1,7 @@
 //! Steps that jump over what a method cannot see are taken back: pulses and layers that are far thinner than the steps around them.
 
 use nalgebra::{SVector, vector};
-use twofold::integrate::{Course, Failure, Ignore, Method, Stepper, Tolerance, WithStepper, drive};
+use twofold::integrate::{DriveOptions, Failure, Ignore, Method, Stepper, Tolerance, WithStepper, drive};
 use twofold::num::Elementary;
 use twofold::system::VectorField;
 
@@ -14,7 +14,7 @@ struct To<'a, F, const N: usize>(&'a F, SVector<f64, N>, f64);
 impl<F: VectorField<N>, const N: usize> WithStepper<N> for To<'_, F, N> {
     type Answer = Result<(SVector<f64, N>, u64), Failure>;
     fn with<M: Stepper<N>>(self, mut stepper: M) -> Self::Answer {
-        let end = drive(self.0, self.1, &Course::to(self.2), &mut stepper, &mut Ignore, &())?;
+        let end = drive(self.0, self.1, &DriveOptions::to(self.2), &mut stepper, &mut Ignore, &())?;
         Ok((end.x, end.statistics.steps))
     }
 }

@@ -6,7 +6,7 @@
 use nalgebra::SVector;
 
 use twofold_integrate::delay::{DelayError, Delayed, DelayedSwitch, History, Own, Sides};
-use twofold_integrate::roots::Passages;
+use twofold_integrate::roots::CrossingFinder;
 use twofold_integrate::{Failure, Method, Stepper, Tolerance, WithStepper};
 use twofold_system::filippov::{gradient, lie_derivatives};
 use twofold_system::{PiecewiseSmooth, System};
@@ -102,7 +102,7 @@ impl<P: PiecewiseSmooth<3>> WithStepper<3> for Follow<'_, P> {
         let Self { system, question, x0, kick } = self;
         let LatePassageQuestion { delay, two_fold, beyond, by, .. } = *question;
         let point = SVector::from(two_fold);
-        let (mut passages, mut passed) = (Passages::default(), false);
+        let (mut passages, mut passed) = (CrossingFinder::default(), false);
         stepper.restart(&Own, 0.0, x0, by, f64::INFINITY)?;
         loop {
             let step = stepper.step(&Own)?;

@@ -57,9 +57,6 @@ pub struct DriveOptions {
     pub kicked_states: usize,
 }
 
-#[doc(hidden)]
-pub use DriveOptions as Course;
-
 impl DriveOptions {
     /// Straight to `t_end`: no restarts, no kicks, steps as long and as many as the method wants.
     pub fn to(t_end: f64) -> Self {

@@ -47,8 +47,6 @@ pub mod taylor;
 mod tests;
 
 pub use dopri5::Dopri5;
-#[doc(hidden)]
-pub use driver::DriveOptions as Course;
 pub use driver::{DriveOptions, Ignore, Observer, Summary, Watch, drive};
 pub use guard::Guarded;
 pub use layered::Layered;

@@ -88,9 +88,6 @@ pub struct CrossingFinder {
     side: f64,
 }
 
-#[doc(hidden)]
-pub use {Crossing as Passage, CrossingFinder as Passages};
-
 impl CrossingFinder {
     /// Of an orbit that was last on the positive side, or on the other.
     pub fn starting(positive: bool) -> Self {

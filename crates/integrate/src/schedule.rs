@@ -80,11 +80,6 @@ pub(super) struct Segment {
 }
 
 impl Schedule {
-    /// How many segments cover (0, t_end].
-    pub fn count(&self, t_end: f64) -> u64 {
-        self.segments(0.0, t_end).count() as u64
-    }
-
     /// The segments that cover (t_start, t_end]. Times are multiples of the intervals, not running sums.
     pub(super) fn segments(&self, t_start: f64, t_end: f64) -> impl Iterator<Item = Segment> + use<> {
         let restart = self.restart_every;
@@ -206,7 +201,6 @@ mod tests {
                         let found: Vec<Segment> = schedule.segments(0.0, t_end).collect();
                         let what = format!("unit {unit}, restart {restart}, kick {kick}, length {length}: {found:?}");
                         assert_eq!(found.len(), wanted.len(), "{what}");
-                        assert_eq!(schedule.count(t_end), wanted.len() as u64, "{what}");
                         for (segment, (n, kick)) in found.iter().zip(wanted) {
                             assert!((segment.end - f64::from(n) * unit).abs() <= 1e-9 * segment.end.max(1.0), "{what}");
                             assert_eq!(segment.kick, kick, "{what}");

@@ -68,8 +68,6 @@ pub use answer::{Answer, Stop};
 pub use classification::Classification;
 pub use comparison::PathComparison;
 pub use digits::MethodDigits;
-#[doc(hidden)]
-pub use executor::Executor as Desk;
 pub use executor::{Executor, JobWatch, Progress};
 pub use exponent::LargestExponent;
 pub use horizon::Horizon;

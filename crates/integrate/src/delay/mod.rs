@@ -20,7 +20,7 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use super::method::{Method, WithStepper};
-use super::roots::{Passage, Passages};
+use super::roots::{Crossing, CrossingFinder};
 use super::step::{Failure, Statistics, Step, Tolerance};
 use super::taylor::Precision;
 use super::{Dopri5, Guarded, Radau5, Taylor};
@@ -167,7 +167,7 @@ impl<'a, P> Sides<'a, P> {
     }
 
     /// Where the orbit passes the surface in `step`.
-    fn passages<const N: usize>(&self, passages: &mut Passages, step: &Step<'_, N>) -> Vec<Passage>
+    fn passages<const N: usize>(&self, passages: &mut CrossingFinder, step: &Step<'_, N>) -> Vec<Crossing>
     where
         P: PiecewiseSmooth<N>,
     {

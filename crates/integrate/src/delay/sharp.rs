@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use nalgebra::SVector;
 
 use super::{Backwards, Cuttable, DelayError, Delayed, DelayedSwitch, History, ONE_TIME, Sides, is_due};
-use crate::roots::Passages;
+use crate::roots::CrossingFinder;
 use crate::step::{Failure, Statistics, Step, Stepper};
 use crate::taylor::Precision;
 use twofold_num::{Arithmetic, Scalar};
@@ -100,7 +100,7 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
             let method = &mut self.methods[usize::from(positive)];
             let failed = |failure: Failure| none(from.0.to_f64(), format!("cannot be followed ({failure})"));
             method.begin(&field, from, delay, f64::INFINITY, false).map_err(failed)?;
-            let mut passages = Passages::starting(positive);
+            let mut passages = CrossingFinder::starting(positive);
             let next = loop {
                 let method = &mut self.methods[usize::from(positive)];
                 method.advance(&field).map_err(failed)?;
@@ -209,7 +209,7 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
         let delay = M::Number::from_f64(self.delay);
         loop {
             self.methods[i].advance(self.sides.field(self.plus))?;
-            let mut passages = Passages::starting(self.positive);
+            let mut passages = CrossingFinder::starting(self.positive);
             let found = self.sides.passages(&mut passages, &self.methods[i].last());
             let Some(first) = found.first() else { return Ok(()) };
             let (from, (to, _)) = (self.methods[i].start(), self.methods[i].reached());

@@ -4,9 +4,9 @@ use nalgebra::{SMatrix, SVector};
 
 use super::past::{Look, Past};
 use super::{Backwards, DelayError, Delayed, DelayedSwitch, History, ONE_TIME, Sides, is_due};
-use crate::driver::{Course, Observer, drive};
+use crate::driver::{DriveOptions, Observer, drive};
 use crate::guard::Redoable;
-use crate::roots::Passages;
+use crate::roots::CrossingFinder;
 use crate::step::{Driven, DrivenStepper, Failure, Flow, Statistics, Step, Stepper, Tolerance};
 use crate::{Dopri5, Guarded};
 use twofold_system::{Blended, PiecewiseSmooth, Smoothed, Transition, VectorField, jacobian};
@@ -23,7 +23,7 @@ pub(super) struct Smooth<'a, P, M, const N: usize> {
     /// Where steps end, in order: jumps of derivatives that arrive, and passages of the delayed orbit through the layer.
     ends: Vec<f64>,
     /// On which side of the surface the orbit was last.
-    passages: Passages,
+    passages: CrossingFinder,
     reached: (f64, SVector<f64, N>),
     t_end: f64,
     max_step: f64,
@@ -85,7 +85,7 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M, const N: usize> Smooth<'a, P, M, N> {
             method,
             past: Past::constant(*x0),
             ends: Vec::new(),
-            passages: Passages::starting(sides.h(x0) > 0.0),
+            passages: CrossingFinder::starting(sides.h(x0) > 0.0),
             reached: (0.0, *x0),
             t_end: 0.0,
             max_step: f64::INFINITY,
@@ -111,7 +111,8 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M, const N: usize> Smooth<'a, P, M, N> {
             ends.extend(in_layer(sides, *eps, &mut passages, step));
         };
         let mut back = Each(&mut back);
-        let end = drive(&Backwards(&smoothed), self.reached.1, &Course::to(self.delay), &mut dopri5, &mut back, &());
+        let end =
+            drive(&Backwards(&smoothed), self.reached.1, &DriveOptions::to(self.delay), &mut dopri5, &mut back, &());
         if let Err(failure) = end {
             return Err(DelayError::NoHistory { t: -self.delay, what: format!("cannot be followed ({failure})") });
         }
@@ -142,7 +143,7 @@ impl<const N: usize> Observer<N> for Each<'_, N> {
 fn in_layer<P: PiecewiseSmooth<N>, const N: usize>(
     sides: &Sides<'_, P>,
     eps: f64,
-    passages: &mut Passages,
+    passages: &mut CrossingFinder,
     step: &Step<'_, N>,
 ) -> Vec<f64> {
     let mut times: Vec<f64> = sides.passages(passages, step).iter().map(|p| step.time(p.theta)).collect();
@@ -209,7 +210,7 @@ impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N> + Redoable<N>, const N: usize> S
             for k in 1..=SEEN + 1 {
                 self.end_at(t + f64::from(k) * self.delay);
             }
-            self.passages = Passages::starting(self.sides.h(&x) > 0.0);
+            self.passages = CrossingFinder::starting(self.sides.h(&x) > 0.0);
         }
         (self.reached, self.t_end, self.max_step, self.end) = ((t, x), t_end, max_step, None);
         Ok(())

@@ -1,13 +1,13 @@
 use nalgebra::{SVector, vector};
 
 use super::*;
-use crate::{Course, Flow, Kick, KickLaw, Observer, Schedule, StepCap, Stepper, Summary, drive};
+use crate::{DriveOptions, Flow, Kick, KickLaw, Observer, Schedule, StepCap, Stepper, Summary, drive};
 use twofold_system::{Bound, Caricature, Definition};
 
 /// Takes every step's end, and the passages through x\[coordinate\] = 0 with their senses.
 struct Seen<const N: usize> {
     coordinate: usize,
-    passages: Passages,
+    passages: CrossingFinder,
     crossings: Vec<(f64, SVector<f64, N>, bool)>,
     ends: Vec<(f64, SVector<f64, N>)>,
 }
@@ -25,7 +25,7 @@ impl<const N: usize> Observer<N> for Seen<N> {
 }
 
 struct Run<const N: usize> {
-    course: Course,
+    course: DriveOptions,
     coordinate: usize,
     x0: SVector<f64, N>,
 }
@@ -35,7 +35,7 @@ impl<const N: usize> WithStepper<N> for Run<N> {
     fn with<M: Stepper<N>>(self, mut stepper: M) -> Self::Answer {
         let mut seen = Seen {
             coordinate: self.coordinate,
-            passages: Passages::default(),
+            passages: CrossingFinder::default(),
             crossings: Vec::new(),
             ends: Vec::new(),
         };
@@ -60,7 +60,7 @@ struct How {
     history: History,
     method: Method,
     tolerance: f64,
-    course: Course,
+    course: DriveOptions,
     coordinate: usize,
 }
 
@@ -72,7 +72,7 @@ impl How {
             history: History::Constant,
             method: Method::Dopri5,
             tolerance: 1e-10,
-            course: Course::to(t_end),
+            course: DriveOptions::to(t_end),
             coordinate: 0,
         }
     }
@@ -165,7 +165,7 @@ fn a_start_on_the_surface_counts_as_not_above() {
 #[test]
 fn a_kick_moves_the_switch_one_delay_later_and_a_restart_does_nothing() {
     let kick = |size: f64| Kick { every: 1.0, size, law: KickLaw::Sphere, seed: 3, stream: 0 };
-    let course = |schedule| Course { schedule, kicked_states: 1, ..Course::to(1.75) };
+    let course = |schedule| DriveOptions { schedule, kicked_states: 1, ..DriveOptions::to(1.75) };
     let run =
         |schedule| How { course: course(schedule), ..How::sharp(0.5, 1.75) }.run(&relay(1.0, 1.0), [2.0]).unwrap();
     let (_, plain) = run(Schedule::default());
@@ -248,7 +248,7 @@ const SMOOTH: How = How {
     history: History::Constant,
     method: Method::Dopri5,
     tolerance: 1e-10,
-    course: Course {
+    course: DriveOptions {
         t_end: 12.0,
         schedule: Schedule { restart_every: None, kick: None },
         step_cap: StepCap::None,
@@ -280,7 +280,7 @@ fn the_smooth_rule_keeps_the_methods_order() {
     let oscillating = system("states = ['x', 'v']\nh = 'x'\nplus = ['v', '-1 - x']\nminus = ['v', '1 - x']");
     let end = |method: Method, steps: u32, tolerance: f64| {
         let cap = 0.7 / f64::from(steps);
-        let course = Course { step_cap: StepCap::Absolute(cap), kicked_states: 2, ..Course::to(7.0) };
+        let course = DriveOptions { step_cap: StepCap::Absolute(cap), kicked_states: 2, ..DriveOptions::to(7.0) };
         let how = How { delay: 0.7, smooth: Some((Transition::Tanh, 1.0)), method, tolerance, course, ..SMOOTH };
         how.run(&oscillating, [0.9, 0.2]).unwrap().1.x
     };
@@ -348,7 +348,7 @@ fn without_delay_the_rules_are_those_without_it() {
         eps: 0.05,
     };
     let mut dopri5 = Dopri5::new(tolerance(1e-11));
-    let limit = drive(&field, START.into(), &Course::to(3.0), &mut dopri5, &mut crate::Ignore, &()).unwrap().x;
+    let limit = drive(&field, START.into(), &DriveOptions::to(3.0), &mut dopri5, &mut crate::Ignore, &()).unwrap().x;
     let errors = [4e-3, 2e-3, 1e-3].map(|delay| (smooth(delay) - limit).norm());
     assert!(errors[2] < 0.01 && errors.windows(2).all(|e| (e[0] / e[1] - 2.0).abs() < 0.5), "{errors:?}");
 }
