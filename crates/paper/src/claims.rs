@@ -15,6 +15,8 @@ use serde::{Deserialize, Serialize};
 pub struct Claims {
     /// The rules, fixed before the census.
     pub rules: Rules,
+    /// The rules of sentence 4.8, fixed before its runs.
+    pub similarity: Similarity,
     /// The sentences, in the paper's order.
     pub sentence: Vec<Sentence>,
 }
@@ -39,6 +41,40 @@ pub struct Rules {
     pub significance: f64,
     /// Confidence at which a noisy section must differ from noise-free ones, and still tell islands from sea.
     pub washed_out_confidence: f64,
+}
+
+/// How runs of a delayed switch are compared with those of other rules: what each number means stands in the file.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Similarity {
+    /// Runs of each rule in each reading.
+    pub runs: u64,
+    /// Cells along each side of the window in which a section's points are counted.
+    pub cells: usize,
+    /// Half the side of that window.
+    pub window: Window,
+    /// Starts in attracting sliding have y and z between these.
+    pub inside: [f64; 2],
+    /// Orbits from such starts in one run.
+    pub passages: usize,
+    /// A run with fewer lengths of chatter has none.
+    pub fewest: usize,
+    /// An exit lies farther from the two-fold than so many inner scales.
+    pub beyond: f64,
+    /// Quantile of distances between runs of one rule.
+    pub yardstick: f64,
+    /// Seed of the random shifts of starts.
+    pub seed: u64,
+}
+
+/// Half the side of the window, in each reading.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Window {
+    /// In the printed reading.
+    pub printed: f64,
+    /// In the reconstructed reading.
+    pub reconstructed: f64,
 }
 
 /// A sentence of the paper.
@@ -109,6 +145,7 @@ mod tests {
         }
         let rules = &claims.rules;
         assert!(rules.shown_from < rules.end && 3.0 * rules.shift * rules.shift < 1e-18);
+        assert!(claims.similarity.runs >= 100 && claims.similarity.yardstick < 1.0);
     }
 
     /// Sentences 4.5 and 8.5: fig. 8's transition function tends to the unit step (not to sign(x)), but it is further from it than
