@@ -29,6 +29,7 @@ pub mod claims;
 pub mod compare;
 pub mod draw;
 pub mod drawing;
+pub mod effects;
 pub mod pipeline;
 pub mod report;
 pub mod standing;
