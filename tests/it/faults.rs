@@ -652,6 +652,21 @@ fn what_was_found_can_be_read_by_programs() {
     assert_eq!((&report["summary"]["pictures"], &report["problems"]), (&1.into(), &Value::Array(vec![])), "{report}");
 }
 
+/// Help and version are output as any other: a full device is exit code 2.
+#[test]
+#[cfg(target_os = "linux")]
+fn help_that_cannot_be_written_is_an_error() {
+    for argument in ["help", "--version"] {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let program = env!("CARGO_BIN_EXE_twofold");
+        let output =
+            std::process::Command::new(program).arg(argument).stdout(full).stderr(std::process::Stdio::piped()).output();
+        let output = output.unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(2) && said.starts_with("error: "), "{argument}: {said}");
+    }
+}
+
 #[test]
 fn help_fits_a_terminal_and_has_its_companions() {
     let text = |arguments: &[&str]| {

@@ -210,3 +210,16 @@ fn published_pictures_are_checked_criterion_by_criterion() {
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("fig7-printed.png"));
 }
+
+/// A committed picture under another committed picture's name is not what its name says.
+#[test]
+fn a_picture_under_anothers_name_is_named() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("figures");
+    let folder = tempfile::tempdir().unwrap();
+    for (name, code, state) in [("fig3.png", 0, "same"), ("mine.png", 0, "same"), ("fig1.png", 1, "misnamed")] {
+        let file = folder.path().join(name);
+        fs::copy(root.join("fig3/fig3.png"), &file).unwrap();
+        let (found, said) = inspect(&file, &root);
+        assert_eq!((found, said["committed"]["state"].as_str()), (code, Some(state)), "{name}: {said}");
+    }
+}

@@ -51,6 +51,8 @@ enum Committed {
     SamePixels { picture: String },
     /// It bears this picture's name and is not it.
     Different { picture: String },
+    /// It is a committed picture, but the file's name is that of another.
+    Misnamed { picture: String, name: String },
     /// No manifest knows it.
     Unlisted,
     /// There are no manifests to ask.
@@ -74,7 +76,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         return Err(CliError::Usage(format!("{}: {error}", arguments.file.display())));
     }
     let manifests = manifests(&arguments.expected)?;
-    let inspection = inspect(&bytes, read, &manifests);
+    let inspection = inspect(&bytes, read, &manifests, arguments.file.file_stem().and_then(|s| s.to_str()));
     if arguments.json {
         print_json(&inspection)?;
     } else {
@@ -96,7 +98,12 @@ fn manifests(folder: &Path) -> Result<Vec<Manifest>, CliError> {
     Ok(all)
 }
 
-fn inspect(bytes: &[u8], read: Result<Provenance, ProvenanceError>, manifests: &[Manifest]) -> Inspection {
+fn inspect(
+    bytes: &[u8],
+    read: Result<Provenance, ProvenanceError>,
+    manifests: &[Manifest],
+    stem: Option<&str>,
+) -> Inspection {
     let sha256 = Hash::of(bytes);
     let (seal, provenance) = match &read {
         Ok(p) if p.intact => (Seal::Intact, p.entries.clone()),
@@ -111,8 +118,17 @@ fn inspect(bytes: &[u8], read: Result<Provenance, ProvenanceError>, manifests: &
         Err(_) => Format::Svg,
     };
     let named = provenance.iter().find(|(k, _)| k == "Picture").map(|(_, v)| v.as_str());
-    let committed = committed(bytes, &sha256, format, named, manifests);
-    let contradicted = matches!(committed, Committed::Different { .. } | Committed::SamePixels { .. });
+    let committed = match committed(bytes, &sha256, format, named, manifests) {
+        Committed::Same { picture } => {
+            let mut names = manifests.iter().flat_map(|m| &m.pictures).map(|p| &p.name);
+            match names.find(|name| stem == Some(name.as_str()) && **name != picture).cloned() {
+                Some(name) => Committed::Misnamed { picture, name },
+                None => Committed::Same { picture },
+            }
+        }
+        other => other,
+    };
+    let contradicted = !matches!(committed, Committed::Same { .. } | Committed::Unlisted | Committed::NoManifests);
     Inspection {
         format: match format {
             Format::Png => "PNG",
@@ -169,6 +185,9 @@ fn describe(i: &Inspection, file: &Path, expected: &Path) -> String {
         }
         Committed::Different { picture } => {
             format!("Reference: it has the name of {picture} and is NOT the committed file")
+        }
+        Committed::Misnamed { picture, name } => {
+            format!("Reference: it is the committed {picture}, byte for byte, and its name is that of {name}")
         }
         Committed::Unlisted => {
             "Reference: no committed manifest lists it (an altered picture, or another version's)".into()

@@ -97,9 +97,16 @@ pub fn main() -> ExitCode {
 
 /// Prints what clap has to say: help and version on standard output, errors on standard error.
 pub(super) fn usage(error: &clap::Error) -> Exit {
-    // A stream that nobody reads loses the text, and nothing else.
-    let _ = error.print();
-    if error.use_stderr() { Exit::Usage } else { Exit::Fine }
+    // A stream that nobody reads loses the text, and nothing else; help that cannot be written is an error as any output is.
+    let printed = error.print().and_then(|()| std::io::Write::flush(&mut std::io::stdout()));
+    match printed {
+        _ if error.use_stderr() => Exit::Usage,
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            complain(&format!("error: {e}"));
+            Exit::Usage
+        }
+        _ => Exit::Fine,
+    }
 }
 
 /// The figures of these names, or all.
