@@ -49,6 +49,10 @@ pub struct Rules {
 pub struct Similarity {
     /// Runs of each rule in each reading.
     pub runs: u64,
+    /// A closed orbit must have captured a run by this time; its section counts from here on.
+    pub shown_from: f64,
+    /// The end of its section.
+    pub end: f64,
     /// Cells along each side of the window in which a section's points are counted.
     pub cells: usize,
     /// Half the side of that window.
