@@ -418,7 +418,7 @@ enum Misuse {
     #[error("a closed orbit is looked for through a plane: give one by --section, such as {example}=0")]
     NoPlane { example: String },
     #[error(
-        "the motion of a discontinuous system has no tangent flow where its future is a set: give --switch smoothed, with a small --eps"
+        "no tangent flow is followed through crossings of a discontinuity, and there is none where the future is a set: give --switch smoothed, with a small --eps"
     )]
     NoTangentFlow,
     #[error("--switch delayed needs its delay: give one by --delay, such as --delay 0.001")]

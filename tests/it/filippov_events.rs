@@ -223,3 +223,86 @@ fn units_change_nothing() {
     }
     assert!(tried >= 8, "{tried}");
 }
+
+/// A shipped system's file in other units: its states times `unit`, its switching functions times `factor`.
+fn file_in_units(name: &str, unit: f64, factor: f64) -> String {
+    let definition = System::builtin(name).unwrap().definition().to_toml();
+    let mut file: toml::Table = toml::from_str(&definition).unwrap();
+    let states: Vec<String> =
+        System::builtin(name).unwrap().definition().states().iter().map(|s| s.name.clone()).collect();
+    let lets = file.entry("let").or_insert_with(|| toml::Table::new().into()).as_table_mut().unwrap();
+    for state in &states {
+        lets.insert(state.clone(), format!("scaled_{state}/{unit:e}").into());
+    }
+    let scale = |value: &toml::Value, by: f64| format!("{by:e}*({})", value.as_str().unwrap()).into();
+    let rescale = |table: &mut toml::Table| {
+        table["h"] = scale(&table["h"], factor);
+        for side in ["plus", "minus"] {
+            let fields = table[side].as_array().unwrap();
+            table[side] = fields.iter().map(|f| scale(f, unit)).collect::<Vec<toml::Value>>().into();
+        }
+    };
+    rescale(&mut file);
+    if let Some(second) = file.get_mut("second") {
+        rescale(second.as_table_mut().unwrap());
+    }
+    let start =
+        System::builtin(name).unwrap().definition().start().unwrap().iter().map(|x| x * unit).collect::<Vec<_>>();
+    file["start"] = start.into();
+    file["states"] = states.iter().map(|s| format!("scaled_{s}")).collect::<Vec<_>>().into();
+    file.remove("axes");
+    serde_json::to_string(&file).unwrap()
+}
+
+/// The systems with two surfaces, and the buck converter, whose clock restarts, with a smoothed switch.
+#[test]
+fn units_change_nothing_of_two_surfaces_and_of_a_clock() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("scaled.json");
+    let end = |name: &str, unit: f64, factor: f64| -> Vec<f64> {
+        std::fs::write(&file, file_in_units(name, unit, factor)).unwrap();
+        let (eps, atol) = (format!("{:e}", 1e-2 * factor), format!("{:e}", 1e-10 * unit));
+        let switch: &[&str] =
+            if name == "buck" { &["--eps", &eps, "--t-end", "2"] } else { &["--switch", "filippov", "--t-end", "6"] };
+        let run = std::process::Command::new(env!("CARGO_BIN_EXE_twofold"))
+            .args([
+                "run", "--quiet", "--method", "dopri5", "--rtol", "1e-10", "--atol", &atol, "--out", "-", "--system",
+            ])
+            .arg(&file)
+            .args(switch)
+            .output()
+            .unwrap();
+        assert!(run.status.success(), "{name}, {unit:e}, {factor:e}: {}", String::from_utf8_lossy(&run.stderr));
+        let text = String::from_utf8(run.stdout).unwrap();
+        let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+        let row: Vec<&str> = text.lines().rfind(|l| !l.starts_with('#')).unwrap().split(',').collect();
+        let states = names.iter().zip(row).filter(|(name, _)| name.starts_with("scaled_"));
+        states.map(|(_, v)| v.parse::<f64>().unwrap() / unit).collect()
+    };
+    let mut names: Vec<&str> = twofold::system::library::names().collect();
+    names.retain(|name| *name == "buck" || System::builtin(name).unwrap().definition().second().is_some());
+    assert_eq!(names.len(), 3, "{names:?}");
+    for name in names {
+        let expected = end(name, 1.0, 1.0);
+        for (unit, factor) in [(1e-12, 1.0), (1e12, 1.0), (1.0, 1e-12), (1.0, 1e12), (1e-9, 1e9)] {
+            let found = end(name, unit, factor);
+            for (a, b) in expected.iter().zip(&found) {
+                assert!(
+                    (a - b).abs() < 1e-6 * (1.0 + a.abs()),
+                    "{name}, {unit:e}, {factor:e}: {found:?}, {expected:?}"
+                );
+            }
+        }
+    }
+}
+
+/// The end of a field's domain that a flight comes to is named, with time and state.
+#[test]
+fn a_flight_that_leaves_the_domain_says_which_expression_ends_where() {
+    for (plus, what) in [(["1 + 0*sqrt(y)", "-1"], "sqrt(y)"), (["1", "-1 + ln(y)/1000"], "ln(y)")] {
+        let error =
+            go::<_, 2, 3>(&planar("x", plus, ["1", "-1"]), vector![1.0, 1.0], 3.0, &settings(1e-9)).0.unwrap_err();
+        let said = error.to_string();
+        assert!(said.contains(what) && said.contains("t = ") && said.contains("state ["), "{said}");
+    }
+}

@@ -111,7 +111,8 @@ impl System {
     }
 
     fn made(definition: Arc<Definition>, values: Vec<Decimal>) -> Self {
-        let tape = definition.tape(&values);
+        let names = definition.states().iter().map(|s| s.name.clone());
+        let tape = definition.tape(&values).with_names(names);
         let n = definition.dimension();
         let functions = Functions {
             switching: Program::new(&tape.select([0])),
@@ -414,5 +415,8 @@ impl<const N: usize> PiecewiseSmooth<N> for Bound<N> {
     #[inline]
     fn minus<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
         run(&self.functions.minus, x)
+    }
+    fn names(&self) -> Vec<String> {
+        (0..N).map(|i| self.functions.tape.name(i)).collect()
     }
 }

@@ -98,6 +98,10 @@ pub trait PiecewiseSmooth<const N: usize>: Sync {
     fn plus<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
     /// The vector field f- that holds where h < 0; smooth and defined on both sides.
     fn minus<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
+    /// The states' names, which messages use; none if nobody gave them.
+    fn names(&self) -> Vec<String> {
+        Vec::new()
+    }
 }
 
 /// The point x as independent variables for differentiation.

@@ -13,7 +13,7 @@ use super::{
 use crate::driver::Watch;
 use crate::roots::{Enclosed, Start, Zero, brent, first_zero, first_zero_along};
 use crate::step::{Failure, Flow, Interpolant, Statistics, Step, StopReason, Tolerance, finite};
-use twofold_num::{Arithmetic, Dual, Interval};
+use twofold_num::{Arithmetic, Dual, Interval, Tape};
 use twofold_system::filippov::{TwoFold, gradient, lie_derivatives, two_fold};
 use twofold_system::{PiecewiseSmooth, VectorField, variables};
 
@@ -771,6 +771,13 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         State::Free { side, start }
     }
 
+    /// A failure in flight with what the field of `side` shows of its cause.
+    fn diagnosed(&self, failure: Failure, side: Side) -> FilippovError {
+        let system = Sided { system: self.system, depth: None };
+        let tape = Tape::clone(&FreeFlow { system, side }.tape());
+        failure.diagnosed(&tape.with_names(self.system.names())).into()
+    }
+
     /// Free flight until the surface or the end.
     fn fly(&mut self, side: Side, start: FlightStart) -> Result<State<N>, FilippovError> {
         let system = self.system;
@@ -778,7 +785,11 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let mut method = Automatic::<N>::new(self.accumulation.tolerance(self.settings.tolerance));
         let (t_start, mut start) = (self.t, start);
         if let Err(failure) = method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step) {
-            return if self.stay_inside() { Ok(State::Free { side, start }) } else { Err(failure.into()) };
+            return if self.stay_inside() {
+                Ok(State::Free { side, start })
+            } else {
+                Err(self.diagnosed(failure, side))
+            };
         }
         let landed = loop {
             let step = match method.step(&flow) {
@@ -786,10 +797,11 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 // Trial points beyond the surface, where the motion does not go, may be where the field has no value.
                 Err(Failure::NotFinite { .. } | Failure::StepUnderflow { .. }) if self.stay_inside() => {
                     flow.system.depth = self.depth;
-                    method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step)?;
+                    let restarted = method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step);
+                    restarted.map_err(|failure| self.diagnosed(failure, side))?;
                     continue;
                 }
-                Err(failure) => return Err(failure.into()),
+                Err(failure) => return Err(self.diagnosed(failure, side)),
             };
             let height = |theta: f64| side.sign() * self.system.switching(&step.at(theta));
             let length = step.length();
