@@ -12,6 +12,9 @@ mod own_system;
 #[allow(dead_code)]
 #[path = "../../examples/returns.rs"]
 mod returns;
+#[allow(dead_code)]
+#[path = "../../examples/visits.rs"]
+pub mod visits;
 
 use twofold::integrate::filippov::EventKind;
 use twofold::job::Executor;

@@ -9,6 +9,7 @@ mod audit;
 mod binary;
 mod book;
 mod browser;
+mod capture;
 mod cases;
 mod census;
 mod claims;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::claims::Reads;
-use twofold::paper::{audit, census, figures, verdict_table};
+use twofold::paper::{capture, census, figures, verdict_table};
 use twofold::record::Manifest;
 
 fn text(path: &str) -> String {
@@ -68,9 +68,14 @@ fn unwrapped(text: &str) -> Vec<String> {
 fn findings() -> String {
     let findings = without(&text("docs/findings.md"), verdict_table::BEGIN, verdict_table::END);
     let census = without(&text("docs/census.md"), census::BEGIN, census::END);
-    let parameters = without(&text("docs/parameters.md"), audit::BEGIN, audit::END);
-    unwrapped(&[findings, text("docs/theorems.md"), text("docs/differences.md"), census, parameters].join("\n\n"))
-        .join("\n")
+    let [mut captures, mut parameters] = ["docs/capture.md", "docs/parameters.md"].map(text);
+    for page in [&mut captures, &mut parameters] {
+        while page.contains(capture::BEGIN) {
+            *page = without(page, capture::BEGIN, capture::END);
+        }
+    }
+    let pages = [findings, text("docs/theorems.md"), text("docs/differences.md"), census, captures, parameters];
+    unwrapped(&pages.join("\n\n")).join("\n")
 }
 
 #[test]

@@ -19,7 +19,13 @@ fn twofold(arguments: &[&str]) -> Output {
 }
 
 /// The pages of odds.
-const ODDS: &str = concat!(include_str!("../../docs/census.md"), "\n\n", include_str!("../../docs/parameters.md"));
+const ODDS: &str = concat!(
+    include_str!("../../docs/census.md"),
+    "\n\n",
+    include_str!("../../docs/capture.md"),
+    "\n\n",
+    include_str!("../../docs/parameters.md")
+);
 
 /// A copy of the made figures and references for them.
 struct Bench {

@@ -221,57 +221,6 @@ pub fn candidate_table(candidates: &[Candidate]) -> Table {
     table
 }
 
-/// Stands before the text about the parameter map in docs/parameters.md.
-pub const BEGIN: &str = "<!-- audit: what figures/audit says; tests/it/census.rs compares it; do not edit -->";
-/// Stands after it.
-pub const END: &str = "<!-- end of audit -->";
-
-/// The text about the candidates in docs/parameters.md: `equal` with as many runs of each panel for all of them, `whole` with all runs of the printed and the
-/// reconstructed numbers.
-pub fn text(equal: &[Candidate], whole: &[Candidate]) -> String {
-    use std::fmt::Write as _;
-    let number = |v: f64| match v {
-        _ if (0.095..9.5).contains(&v) => format!("{v:.1}"),
-        _ if (9.5..9999.5).contains(&v) => format!("{v:.0}"),
-        _ => format!("{v:.0e}"),
-    };
-    let ratio = |c: &Candidate| {
-        let [low, high] = c.factor_interval.map(number);
-        format!("{} [{low}, {high}]", number(c.bayes_factor))
-    };
-    let mut text = String::from(
-        "| α | β | runs a panel | ratio to printed | posterior, printed 50 % before | posterior, printed 99 % before |\n|---|---|---|---|---|---|",
-    );
-    for c in equal {
-        let posterior = c.posterior.map(|p| census::percent(p.mean, p.interval));
-        let runs = match [c.cell.runs.iter().min(), c.cell.runs.iter().max()].map(|n| n.copied().unwrap_or(0)) {
-            [fewest, most] if fewest == most => fewest.to_string(),
-            [fewest, most] => format!("{fewest} to {most}"),
-        };
-        // Writing to a String cannot fail.
-        let _ = write!(
-            text,
-            "\n| {:e} | {:e} | {runs} | {} | {} | {} |",
-            c.cell.alpha,
-            c.cell.beta,
-            ratio(c),
-            posterior[0],
-            posterior[1]
-        );
-    }
-    for c in whole.iter().skip(1) {
-        let runs = |f: fn(std::slice::Iter<'_, u64>) -> Option<&u64>| f(c.cell.runs.iter()).copied().unwrap_or(0);
-        let _ = write!(
-            text,
-            "\n\nFrom all {} to {} runs a panel of the printed and the reconstructed numbers their ratio is {}.",
-            runs(|n| n.min()),
-            runs(|n| n.max()),
-            ratio(c)
-        );
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::claims::claims;

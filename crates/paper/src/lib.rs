@@ -23,6 +23,7 @@ use {
 };
 
 pub mod audit;
+pub mod capture;
 pub mod census;
 pub mod claim;
 pub mod claims;

@@ -13,8 +13,13 @@ use crate::report::{Links, MadeFile, Program, Report, archive, assemble, names, 
 const FINDINGS: &str =
     concat!(include_str!("../../../docs/findings.md"), "\n\n", include_str!("../../../docs/theorems.md"));
 /// The pages of odds that the report repeats.
-const ODDS: &str =
-    concat!(include_str!("../../../docs/census.md"), "\n\n", include_str!("../../../docs/parameters.md"));
+const ODDS: &str = concat!(
+    include_str!("../../../docs/census.md"),
+    "\n\n",
+    include_str!("../../../docs/capture.md"),
+    "\n\n",
+    include_str!("../../../docs/parameters.md")
+);
 
 /// Write a self-contained page about the figures in a folder, and beside it report.json, verdicts.json and RO-Crate metadata.
 ///
