@@ -21,6 +21,21 @@ pub const FILES: [(&str, &str); 16] = [
     ("two-blocks", include_str!("two-blocks.toml")),
 ];
 
+/// Name and text of every general system (folder `general`).
+pub const GENERAL: [(&str, &str); 8] = [
+    ("bouncing-ball", include_str!("general/bouncing-ball.toml")),
+    ("impact-oscillator", include_str!("general/impact-oscillator.toml")),
+    ("relay-hysteresis", include_str!("general/relay-hysteresis.toml")),
+    ("three-blocks", include_str!("general/three-blocks.toml")),
+    ("sliding-mode-control", include_str!("general/sliding-mode-control.toml")),
+    ("buck-ramp", include_str!("general/buck-ramp.toml")),
+    ("rimless-wheel", include_str!("general/rimless-wheel.toml")),
+    ("driven-by-data", include_str!("general/driven-by-data.toml")),
+];
+
+/// Tables that general systems read.
+pub const TABLES: [(&str, &str); 1] = [("inflow.csv", include_str!("general/inflow.csv"))];
+
 #[cfg(test)]
 mod tests {
     use super::*;

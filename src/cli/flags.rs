@@ -74,6 +74,9 @@ pub struct RunFlags {
     /// Initial state, one number for each of the system's [default: the one that the system suggests].
     #[arg(long, value_name = "X,Y,...", value_delimiter = ',', allow_hyphen_values = true, help_heading = "System")]
     pub start: Option<Vec<f64>>,
+    /// Time at which the run of a general system begins [default: 0].
+    #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
+    pub t_start: Option<f64>,
     /// Final time [default: 150; of an exponent 10000].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub t_end: Option<f64>,
@@ -254,7 +257,7 @@ const OF_EXTENDED: &str =
 const OF_KICKS: &str = "there are no kicks; leave it out, or give --kick-every";
 
 /// The table. Every flag of [`RunFlags`] but --spec stands in it once.
-const EFFECTS: [Effect; 39] = {
+const EFFECTS: [Effect; 40] = {
     const fn always(flag: &'static str, given: fn(&RunFlags) -> bool) -> Effect {
         Effect { flag, given, works: |_, _| true, why: "" }
     }
@@ -316,6 +319,12 @@ const EFFECTS: [Effect; 39] = {
             "it is a reading of the hysteretic switch; leave it out, or use --switch hysteretic",
         ),
         always("--start", |f| f.start.is_some()),
+        when(
+            "--t-start",
+            |f| f.t_start.is_some(),
+            |_, _| false,
+            "equations with h, plus and minus do not see the time, and their runs begin at 0; leave it out (general systems take it)",
+        ),
         when(
             "--t-end",
             |f| f.t_end.is_some(),
@@ -427,6 +436,10 @@ enum Misuse {
         "--switch delayed: the state is the whole past, of which neither closed orbits nor exponents are computed; follow a long run (twofold run, twofold sweep), or give another --switch"
     )]
     Past,
+    #[error(
+        "--system {system}: a general system (f, events, modes or tables) is followed by `twofold run` and drawn by `twofold plot`; this command needs one with h, plus and minus"
+    )]
+    General { system: String },
     #[error("--exit all follows many futures and records their paths; a sweep needs crossings: give another rule")]
     FunnelInSweep,
     #[error("{file} is not a spec of one run: {reason}; make one with `--only PANEL --reading READING --print-spec`")]
@@ -542,13 +555,26 @@ impl RunFlags {
         Ok(spec)
     }
 
+    /// Every flag that is given, --spec among them.
+    pub fn given(&self) -> Vec<&'static str> {
+        let spec = self.spec.as_ref().map(|_| "--spec");
+        spec.into_iter().chain(EFFECTS.iter().filter(|e| (e.given)(self)).map(|e| e.flag)).collect()
+    }
+
     /// The first flag that is given, --spec among them.
     pub fn first_given(&self) -> Option<&'static str> {
         let spec = self.spec.as_ref().map(|_| "--spec");
         spec.or_else(|| EFFECTS.iter().find(|e| (e.given)(self)).map(|e| e.flag))
     }
 
-    fn unchecked(&self, command: Use) -> Result<RunSpec, Misuse> {
+    fn unchecked(&self, command: Use) -> Result<RunSpec, CliError> {
+        if super::general::model(self)?.is_some() {
+            return Err(Misuse::General { system: self.system_name().to_owned() }.into());
+        }
+        Ok(self.described(command)?)
+    }
+
+    fn described(&self, command: Use) -> Result<RunSpec, Misuse> {
         let system = self.described_system()?;
         let eps = self.eps.unwrap_or(1e-3);
         let transition = match (self.transition.unwrap_or(Transition::Tanh), self.sigma) {
@@ -726,6 +752,7 @@ impl RunFlags {
 fn from_file(name: &str) -> Result<System, Misuse> {
     let path = Path::new(name);
     let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    // A general system's file comes here if it cannot be read as one.
     let is_file = json || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) || path.is_file();
     if !is_file {
         let known: Vec<&str> = library::names().collect();
@@ -769,7 +796,7 @@ mod tests {
 
     /// Every flag with a value that no default has and that every run allows on which the flag has an effect; several, if
     /// none differs from every default.
-    const SAMPLES: [(&str, &[&str]); 39] = [
+    const SAMPLES: [(&str, &[&str]); 40] = [
         ("--system", &["wheel", "two-fold"]),
         ("--set", &["alpha=0.3", "omega0=1.1"]),
         ("--switch", &["smoothed", "hysteretic", "delayed", "filippov"]),
@@ -786,6 +813,7 @@ mod tests {
         ("--eps-prime", &["0.03"]),
         ("--hysteresis", &["single"]),
         ("--start", &["0.1,0.1,0.1"]),
+        ("--t-start", &["1"]),
         ("--t-end", &["7"]),
         ("--method", &["radau5", "taylor"]),
         ("--rtol", &["2e-9"]),

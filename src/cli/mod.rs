@@ -2,6 +2,7 @@
 //!
 //! - [`figure`]: the command line that every figure's binary shares. [`commands`]: that of `twofold`.
 //! - [`flags`]: the flags that describe a run, and the table of which of them has an effect when. [`words`]: values by name.
+//! - [`general`]: the same for general systems.
 //! - [`rows`]: rows of a sweep, kept as they finish. [`recompute`]: those that are committed beside a figure, computed anew.
 //! - [`exit`]: exit codes and errors. [`speak`]: the two streams. [`progress`]: bars. [`interrupt`]: Ctrl-C.
 //!
@@ -19,6 +20,7 @@ pub mod ending;
 pub mod exit;
 pub mod figure;
 pub mod flags;
+pub mod general;
 pub mod interrupt;
 pub mod progress;
 pub mod recompute;

@@ -47,6 +47,7 @@ pub mod digits;
 pub mod encode;
 pub mod executor;
 pub mod exponent;
+pub mod general;
 pub mod horizon;
 pub mod limit;
 pub mod orbit;

@@ -89,15 +89,20 @@ impl Bounds {
 /// A state: a name, or a table with more.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StateEntry {
+    /// Its name.
     pub name: String,
+    /// Its meaning and unit.
     pub about: About,
 }
 
 /// A parameter: a number, or a table with more.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterEntry {
+    /// Its value.
     pub value: Decimal,
+    /// Its meaning and unit.
     pub about: About,
+    /// What its values must be.
     pub bounds: Bounds,
 }
 

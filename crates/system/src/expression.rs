@@ -8,6 +8,16 @@
 //! atom     = number | name | "pi" | function "(" sum ")" | "(" sum ")"
 //! ```
 //!
+//! The expressions of a [general system](Expression::parse_general) also compare, choose and round:
+//!
+//! ```text
+//! either   = both { "or" both }                       where a general expression begins, also in parentheses
+//! both     = negation { "and" negation }
+//! negation = "not" negation | compare
+//! compare  = sum [ ("<" | "<=" | ">" | ">=") sum ]    true is 1 and false is 0 where a number is wanted
+//! atom     = ... | function "(" either { "," either } ")"
+//! ```
+//!
 //! **Order of operations decides bits**, so it is part of the format: exactly the operations that are written are done, in this
 //! order, each rounded once. Powers are products in the order of [`Elementary::power`], `abs(a)` is
 //! a times its sign, `tan(a)` is sin(a)/cos(a). Terms without state variables are computed once, in double precision.
@@ -78,7 +88,8 @@ impl Function {
         Self::ALL.iter().find(|(_, f)| *f == self).map_or("", |(n, _)| *n)
     }
 
-    fn apply<S: Elementary>(self, a: S) -> S {
+    /// Its value.
+    pub fn apply<S: Elementary>(self, a: S) -> S {
         match self {
             Function::Tanh => a.tanh(),
             Function::Exp => a.exp(),
@@ -93,6 +104,77 @@ impl Function {
             Function::Sign => a.sign(),
         }
     }
+}
+
+/// A function of general systems ([`Expression::parse_general`]).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum General {
+    /// The least of two or more.
+    Min,
+    /// The greatest of two or more.
+    Max,
+    /// `if(condition, a, b)`: a where the condition holds, else b.
+    If,
+    /// 1 from zero on, else 0.
+    Heaviside,
+    /// The greatest whole number that is not greater.
+    Floor,
+    /// `mod(a, b)` = a - b floor(a/b), from 0 to b.
+    Mod,
+    /// `clip(x, low, high)`: the number between the bounds that is nearest to x.
+    Clip,
+    /// `atan2(y, x)`: the angle of the point (x, y), from -pi to pi.
+    Atan2,
+    /// Hyperbolic sine.
+    Sinh,
+    /// Hyperbolic cosine.
+    Cosh,
+    /// Arc sine.
+    Asin,
+    /// Arc cosine.
+    Acos,
+    /// Logarithm to base 10.
+    Log10,
+    /// Natural logarithm, as [`Function::Ln`].
+    Log,
+}
+
+impl General {
+    /// Every function with its name and the numbers of arguments that it takes.
+    pub const ALL: [(&'static str, General, Range<usize>); 14] = [
+        ("min", General::Min, 2..64),
+        ("max", General::Max, 2..64),
+        ("if", General::If, 3..4),
+        ("heaviside", General::Heaviside, 1..2),
+        ("floor", General::Floor, 1..2),
+        ("mod", General::Mod, 2..3),
+        ("clip", General::Clip, 3..4),
+        ("atan2", General::Atan2, 2..3),
+        ("sinh", General::Sinh, 1..2),
+        ("cosh", General::Cosh, 1..2),
+        ("asin", General::Asin, 1..2),
+        ("acos", General::Acos, 1..2),
+        ("log10", General::Log10, 1..2),
+        ("log", General::Log, 1..2),
+    ];
+
+    fn entry(name: &str) -> Option<&'static (&'static str, General, Range<usize>)> {
+        Self::ALL.iter().find(|(n, ..)| *n == name)
+    }
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        Self::ALL.iter().find(|(_, f, _)| *f == self).map_or("", |(n, ..)| *n)
+    }
+}
+
+/// What expressions may say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Dialect {
+    /// Of h, f+ and f-.
+    Smooth,
+    /// Of general systems.
+    General,
 }
 
 const COMMA: &str = "a comma has no meaning here";
@@ -138,6 +220,11 @@ pub fn is_reserved(name: &str) -> bool {
     name == "pi" || Function::named(name).is_some()
 }
 
+/// Whether `name` means something in every expression of a general system.
+pub fn is_reserved_in_general(name: &str) -> bool {
+    is_reserved(name) || General::entry(name).is_some() || ["t", "and", "or", "not"].contains(&name)
+}
+
 /// Whether `name` is a letter followed by letters, digits and underscores.
 pub fn is_name(name: &str) -> bool {
     name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
@@ -166,6 +253,18 @@ pub enum Expression {
     Power(Box<Expression>, i32),
     /// A function's value.
     Call(Function, Box<Expression>),
+    /// A power whose exponent is no whole number (general systems only, as all that follow).
+    RealPower(Box<Expression>, Box<Expression>),
+    /// A function of general systems.
+    Apply(General, Vec<Expression>),
+    /// Whether the first is greater than the second. Equality is one point of a motion and decides nothing: `>=` reads as `>`.
+    Greater(Box<Expression>, Box<Expression>),
+    /// Whether both hold.
+    And(Box<Expression>, Box<Expression>),
+    /// Whether one holds.
+    Or(Box<Expression>, Box<Expression>),
+    /// Whether it does not hold.
+    Not(Box<Expression>),
 }
 
 /// What is wrong with an expression, and where in its text.
@@ -186,6 +285,24 @@ impl Expression {
     /// # Errors
     /// If the text is no expression, names something unknown, or is beyond the bounds of this module.
     pub fn parse(text: &str, names: &[&str]) -> Result<Self, ExpressionError> {
+        Self::parse_in(text, names, Dialect::Smooth)
+    }
+
+    /// Reads an expression of a general system, in which names, `t`, [`General`] functions, comparisons and `and`, `or`, `not` may appear.
+    ///
+    /// # Errors
+    /// As [`Expression::parse`]; also if a condition stands where a number is wanted by `and`, `or`, `not` or `if`, or the other way round.
+    ///
+    /// ```
+    /// use twofold_system::Expression;
+    /// let clamped = Expression::parse_general("if(x > 0 and t < 1, min(x, 1), -x^0.5)", &["x"]).unwrap();
+    /// assert_eq!(clamped.to_string(), "if(x > 0 and 1 > t, min(x, 1), -x^0.5)");
+    /// ```
+    pub fn parse_general(text: &str, names: &[&str]) -> Result<Self, ExpressionError> {
+        Self::parse_in(text, names, Dialect::General)
+    }
+
+    fn parse_in(text: &str, names: &[&str], dialect: Dialect) -> Result<Self, ExpressionError> {
         if text.len() > MAX_LENGTH {
             return Err(ExpressionError {
                 message: format!("an expression of {} bytes; the limit is {MAX_LENGTH}", text.len()),
@@ -193,11 +310,11 @@ impl Expression {
                 help: Some("name parts of it in [let]".into()),
             });
         }
-        let mut parser = Parser { text, tokens: tokens(text)?, at: 0, depth: 0, terms: 0, names };
+        let mut parser = Parser { text, tokens: tokens(text, dialect)?, at: 0, depth: 0, terms: 0, names, dialect };
         if parser.peek() == &Token::End {
             return Err(parser.error("an empty expression", Some("write 0 for a component that vanishes".into())));
         }
-        let expression = parser.sum()?;
+        let expression = parser.whole_expression()?;
         match parser.peek() {
             Token::End => Ok(expression),
             Token::Close => Err(parser.error("this parenthesis was never opened", None)),
@@ -219,34 +336,58 @@ impl Expression {
             Expression::Div(a, b) => a.evaluate(name, number) / b.evaluate(name, number),
             Expression::Power(a, n) => a.evaluate(name, number).power(*n),
             Expression::Call(f, a) => f.apply(a.evaluate(name, number)),
+            // Those of general systems are evaluated where it is known which way they go.
+            _ => S::from_f64(f64::NAN),
+        }
+    }
+
+    /// Whether it is a condition: true or false.
+    pub fn is_condition(&self) -> bool {
+        matches!(self, Expression::Greater(..) | Expression::And(..) | Expression::Or(..) | Expression::Not(_))
+    }
+
+    /// Its parts, in order.
+    pub fn parts(&self) -> Vec<&Expression> {
+        match self {
+            Expression::Number(_) | Expression::Pi | Expression::Name(_) => Vec::new(),
+            Expression::Neg(a) | Expression::Power(a, _) | Expression::Call(_, a) | Expression::Not(a) => vec![a],
+            Expression::Add(a, b) | Expression::Sub(a, b) | Expression::Mul(a, b) | Expression::Div(a, b) => vec![a, b],
+            Expression::RealPower(a, b) | Expression::Greater(a, b) | Expression::And(a, b) | Expression::Or(a, b) => {
+                vec![a, b]
+            }
+            Expression::Apply(_, list) => list.iter().collect(),
         }
     }
 
     /// The names in the expression, in order of appearance, repeated where they are.
     pub fn names(&self) -> Vec<&str> {
         match self {
-            Expression::Number(_) | Expression::Pi => Vec::new(),
             Expression::Name(name) => vec![name],
-            Expression::Neg(a) | Expression::Power(a, _) | Expression::Call(_, a) => a.names(),
-            Expression::Add(a, b) | Expression::Sub(a, b) | Expression::Mul(a, b) | Expression::Div(a, b) => {
-                let mut names = a.names();
-                names.extend(b.names());
-                names
-            }
+            _ => self.parts().into_iter().flat_map(Expression::names).collect(),
         }
     }
 
-    /// How tightly the expression holds together: 1 sum, 2 product, 3 sign, 4 power, 5 atom.
+    /// How tightly the expression holds together.
     fn level(&self) -> u8 {
         match self {
-            Expression::Add(..) | Expression::Sub(..) => 1,
-            Expression::Mul(..) | Expression::Div(..) => 2,
-            Expression::Neg(_) => 3,
-            Expression::Power(..) => 4,
-            _ => 5,
+            Expression::Or(..) => 1,
+            Expression::And(..) => 2,
+            Expression::Not(_) => 3,
+            Expression::Greater(..) => 4,
+            Expression::Add(..) | Expression::Sub(..) => SUM,
+            Expression::Mul(..) | Expression::Div(..) => PRODUCT,
+            Expression::Neg(_) => SIGN,
+            Expression::Power(..) | Expression::RealPower(..) => SIGN + 1,
+            _ => ATOM,
         }
     }
 }
+
+/// How tightly sums, products, signs and atoms hold together.
+const SUM: u8 = 5;
+const PRODUCT: u8 = 6;
+const SIGN: u8 = 7;
+const ATOM: u8 = 9;
 
 impl fmt::Display for Expression {
     /// The expression with the fewest parentheses. Parsing it gives the expression back.
@@ -265,17 +406,37 @@ impl fmt::Display for Expression {
             Expression::Name(name) => f.write_str(name),
             Expression::Neg(a) => {
                 f.write_str("-")?;
-                part(f, a, 3)
+                part(f, a, SIGN)
             }
-            Expression::Add(a, b) => pair(f, a, " + ", b, 1),
-            Expression::Sub(a, b) => pair(f, a, " - ", b, 1),
-            Expression::Mul(a, b) => pair(f, a, "*", b, 2),
-            Expression::Div(a, b) => pair(f, a, "/", b, 2),
+            Expression::Add(a, b) => pair(f, a, " + ", b, SUM),
+            Expression::Sub(a, b) => pair(f, a, " - ", b, SUM),
+            Expression::Mul(a, b) => pair(f, a, "*", b, PRODUCT),
+            Expression::Div(a, b) => pair(f, a, "/", b, PRODUCT),
             Expression::Power(a, n) => {
-                part(f, a, 5)?;
+                part(f, a, ATOM)?;
                 write!(f, "^{n}")
             }
+            Expression::RealPower(a, b) => {
+                part(f, a, ATOM)?;
+                f.write_str("^")?;
+                part(f, b, SIGN)
+            }
             Expression::Call(function, a) => write!(f, "{}({a})", function.name()),
+            Expression::Apply(function, list) => {
+                let list: Vec<String> = list.iter().map(Expression::to_string).collect();
+                write!(f, "{}({})", function.name(), list.join(", "))
+            }
+            Expression::Greater(a, b) => {
+                part(f, a, SUM)?;
+                f.write_str(" > ")?;
+                part(f, b, SUM)
+            }
+            Expression::And(a, b) => pair(f, a, " and ", b, 2),
+            Expression::Or(a, b) => pair(f, a, " or ", b, 1),
+            Expression::Not(a) => {
+                f.write_str("not ")?;
+                part(f, a, 3)
+            }
         }
     }
 }
@@ -292,11 +453,13 @@ enum Token {
     Open,
     Close,
     Comma,
+    Greater,
+    Less,
     End,
 }
 
 /// The text cut into tokens, each with its place; an [`Token::End`] closes them.
-fn tokens(text: &str) -> Result<Vec<(Token, Range<usize>)>, ExpressionError> {
+fn tokens(text: &str, dialect: Dialect) -> Result<Vec<(Token, Range<usize>)>, ExpressionError> {
     let mut tokens = Vec::new();
     let bytes = text.as_bytes();
     let run =
@@ -324,6 +487,19 @@ fn tokens(text: &str) -> Result<Vec<(Token, Range<usize>)>, ExpressionError> {
             b'(' => (Token::Open, at + 1),
             b')' => (Token::Close, at + 1),
             b',' => (Token::Comma, at + 1),
+            b @ (b'<' | b'>') if dialect == Dialect::General => {
+                let token = if b == b'<' { Token::Less } else { Token::Greater };
+                (token, at + 1 + usize::from(bytes.get(at + 1) == Some(&b'=')))
+            }
+            b'=' | b'!' if dialect == Dialect::General => {
+                return Err(ExpressionError {
+                    message: "equality is met for a moment only and decides no motion".into(),
+                    span: at..at + 1,
+                    help: Some(
+                        "compare with < or >; for what happens where a number is met, write an [[event]]".into(),
+                    ),
+                });
+            }
             b'0'..=b'9' | b'.' => {
                 let mut end = digits(at);
                 if bytes.get(end) == Some(&b'.') {
@@ -393,6 +569,7 @@ struct Parser<'a> {
     depth: usize,
     terms: usize,
     names: &'a [&'a str],
+    dialect: Dialect,
 }
 
 type Parsed = Result<Expression, ExpressionError>;
@@ -432,6 +609,95 @@ impl Parser<'_> {
             return Err(self.error(format!("more than {MAX_TERMS} terms in one expression"), help));
         }
         Ok(())
+    }
+
+    fn whole_expression(&mut self) -> Parsed {
+        if self.dialect == Dialect::General { self.either() } else { self.sum() }
+    }
+
+    /// Whether the next token is this word; passes it if so.
+    fn word(&mut self, word: &str) -> bool {
+        let found = self.peek() == &Token::Name && self.text[self.span()] == *word;
+        if found {
+            self.advance();
+        }
+        found
+    }
+
+    /// An expression that must be a condition, or must be a number.
+    fn wanted(&mut self, condition: bool, read: impl FnOnce(&mut Self) -> Parsed) -> Parsed {
+        let start = self.span().start;
+        let found = read(self)?;
+        let end = self.tokens[self.at.saturating_sub(1)].1.end;
+        if condition && !found.is_condition() {
+            return Err(ExpressionError {
+                message: "a condition is wanted here, not a number".into(),
+                span: start..end,
+                help: Some("compare it with something: x > 0".into()),
+            });
+        }
+        Ok(found)
+    }
+
+    fn either(&mut self) -> Parsed {
+        let start = self.at;
+        let mut left = self.both()?;
+        while self.word("or") {
+            self.term()?;
+            self.must_be_condition(&left, start)?;
+            let right = self.wanted(true, Self::both)?;
+            left = Expression::Or(Box::new(left), Box::new(right));
+        }
+        Ok(left)
+    }
+
+    fn both(&mut self) -> Parsed {
+        let start = self.at;
+        let mut left = self.negation()?;
+        while self.word("and") {
+            self.term()?;
+            self.must_be_condition(&left, start)?;
+            let right = self.wanted(true, Self::negation)?;
+            left = Expression::And(Box::new(left), Box::new(right));
+        }
+        Ok(left)
+    }
+
+    fn must_be_condition(&self, left: &Expression, start: usize) -> Result<(), ExpressionError> {
+        if left.is_condition() {
+            return Ok(());
+        }
+        Err(ExpressionError {
+            message: "a condition is wanted here, not a number".into(),
+            span: self.tokens[start].1.start..self.tokens[self.at.saturating_sub(2)].1.end,
+            help: Some("compare it with something: x > 0".into()),
+        })
+    }
+
+    fn negation(&mut self) -> Parsed {
+        if self.word("not") {
+            self.term()?;
+            let inner = self.deeper(|p| p.wanted(true, Self::negation))?;
+            return Ok(Expression::Not(Box::new(inner)));
+        }
+        self.comparison()
+    }
+
+    fn comparison(&mut self) -> Parsed {
+        let left = self.sum()?;
+        let less = match self.peek() {
+            Token::Less => true,
+            Token::Greater => false,
+            _ => return Ok(left),
+        };
+        self.advance();
+        self.term()?;
+        let right = self.sum()?;
+        if matches!(self.peek(), Token::Less | Token::Greater) {
+            return Err(self.error("two comparisons in a row", Some("join them: 0 < x and x < 1".into())));
+        }
+        let (left, right) = if less { (right, left) } else { (left, right) };
+        Ok(Expression::Greater(Box::new(left), Box::new(right)))
     }
 
     fn sum(&mut self) -> Parsed {
@@ -497,6 +763,7 @@ impl Parser<'_> {
                 span: start..end,
                 help: None,
             }),
+            None if self.dialect == Dialect::General => Ok(Expression::RealPower(Box::new(base), Box::new(exponent))),
             None => Err(ExpressionError {
                 message: "an exponent must be a whole number".into(),
                 span: start..end,
@@ -530,7 +797,7 @@ impl Parser<'_> {
     fn parenthesis(&mut self) -> Parsed {
         let open = self.span();
         self.advance();
-        let inner = self.deeper(Self::sum)?;
+        let inner = self.deeper(Self::whole_expression)?;
         match self.peek() {
             Token::Close => {
                 self.advance();
@@ -553,6 +820,14 @@ impl Parser<'_> {
         let error = |message: String, help: Option<String>| Err(ExpressionError { message, span: span.clone(), help });
         if name == "pi" {
             return Ok(Expression::Pi);
+        }
+        if self.dialect == Dialect::General {
+            if name == "t" {
+                return Ok(Expression::Name("t".into()));
+            }
+            if let Some((name, function, counts)) = General::entry(name) {
+                return self.apply(name, *function, counts, span);
+            }
         }
         if let Some(function) = Function::named(name) {
             if self.peek() != &Token::Open {
@@ -594,6 +869,52 @@ impl Parser<'_> {
             None => format!("known here: {}", self.names.join(", ")),
         };
         error(format!("unknown name `{name}`"), Some(help))
+    }
+
+    /// The arguments of a function of general systems.
+    fn apply(&mut self, name: &str, function: General, counts: &Range<usize>, span: Range<usize>) -> Parsed {
+        if self.peek() != &Token::Open {
+            return Err(ExpressionError {
+                message: format!("the function `{name}` needs its arguments in parentheses"),
+                span,
+                help: Some(format!("{name}(...)")),
+            });
+        }
+        let given = self.arguments().unwrap_or(counts.start);
+        if !counts.contains(&given) {
+            let wanted = match (counts.start, counts.end - 1) {
+                (1, 1) => "one argument".into(),
+                (least, most) if least == most => format!("{least} arguments"),
+                (least, _) => format!("{least} arguments or more"),
+            };
+            return Err(ExpressionError {
+                message: format!("`{name}` has {wanted}; {given} given"),
+                span,
+                help: (function == General::If).then(|| "if(x > 0, a, b): a where x > 0, else b".into()),
+            });
+        }
+        let open = self.span();
+        self.advance();
+        let mut list = Vec::new();
+        loop {
+            let condition = function == General::If && list.is_empty();
+            let argument = self.deeper(|p| p.wanted(condition, Self::either))?;
+            list.push(argument);
+            match self.peek() {
+                Token::Comma => self.advance(),
+                Token::Close => break,
+                Token::End => {
+                    return Err(ExpressionError {
+                        message: "this parenthesis is never closed".into(),
+                        span: open,
+                        help: Some("add a `)`".into()),
+                    });
+                }
+                _ => return Err(self.error("an operator or a `)` is missing here", Some(self.missing_operator()))),
+            }
+        }
+        self.advance();
+        Ok(Expression::Apply(function, list))
     }
 
     /// How many arguments stand in the parentheses that open here; `None` if they are not closed.

@@ -19,7 +19,7 @@ mod batched;
 pub mod caricature;
 pub mod definition;
 pub mod diagnostic;
-mod document;
+pub mod document;
 pub mod expression;
 pub mod field;
 pub mod filippov;

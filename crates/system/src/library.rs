@@ -10,7 +10,7 @@
 
 use std::sync::OnceLock;
 
-use twofold_systems::FILES;
+use twofold_systems::{FILES, GENERAL, TABLES};
 
 use super::{Definition, System};
 
@@ -22,6 +22,21 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 /// The text of a built-in system's file.
 pub fn text(name: &str) -> Option<&'static str> {
     FILES.iter().find(|(n, _)| *n == name).map(|(_, text)| *text)
+}
+
+/// The names of the built-in general systems, which are not read here.
+pub fn general_names() -> impl Iterator<Item = &'static str> {
+    GENERAL.iter().map(|(name, _)| *name)
+}
+
+/// The text of a built-in general system's file.
+pub fn general(name: &str) -> Option<&'static str> {
+    GENERAL.iter().find(|(n, _)| *n == name).map(|(_, text)| *text)
+}
+
+/// A table that built-in general systems read.
+pub fn table(file: &str) -> Option<&'static str> {
+    TABLES.iter().find(|(n, _)| *n == file).map(|(_, text)| *text)
 }
 
 /// The built-in definitions.

@@ -5,15 +5,19 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 
 use crate::cli::flags::{RunFlags, Use};
+use crate::cli::general;
 use crate::cli::progress::Progress;
 use crate::cli::speak::{deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::draw::plot::{self, Look};
+use crate::hybrid::motion::Record;
+use crate::job::general::GeneralRun;
 use crate::job::question::question_hash;
 use crate::job::spec::RunSpec;
 use crate::job::{Answer, Executor, JobError, Run, Stop, encode};
 use crate::paper::wording;
 use crate::record;
+use crate::render::number::number;
 use crate::render::{RenderError, markup, render};
 
 /// Draw a run: its states against time, a phase plane, its path in space, or with --section its crossings of a plane. The file's
@@ -167,14 +171,20 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         }
         None => None,
     };
+    if arguments.from.is_none()
+        && let Some(run) = general::run_of(&arguments.flags)?
+    {
+        return draw_general(arguments, run, format);
+    }
     let spec = match &recorded {
         Some((spec, _)) => spec.clone(),
         None => arguments.flags.spec(Use::Picture)?,
     };
-    let look = look(arguments, &spec)?;
+    let frame = plot::Frame::from(&spec);
+    let look = look(arguments, &frame)?;
     let unsuitable = |e: plot::PlotError| CliError::Usage(format!("--kind {}: {e}", look.kind.word()));
     // Said before anything is computed.
-    plot::axes(&spec, look.kind, &look.axes).map_err(unsuitable)?;
+    plot::axes(&frame, look.kind, &look.axes).map_err(unsuitable)?;
     try_delivery(Some(&arguments.out))?;
     let progress = Progress::new(arguments.quiet);
     let answer = match recorded {
@@ -185,13 +195,62 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     if answer.stop == Stop::Interrupted {
         small_print.push("an interrupted run: this is what was computed until then".into());
     }
-    let mut sheet = plot::sheet(&spec, &answer, &look, small_print)
+    let mut sheet = plot::sheet(&frame, &answer, &look, small_print)
         .map_err(unsuitable)?
         .provenance("Software", concat!("twofold ", env!("CARGO_PKG_VERSION")))
         .provenance("Picture", format!("plot-{}", look.kind.word()))
         .provenance("Reading", "none")
         .provenance("Method", spec.method.name.name())
         .provenance("Spec-SHA256", question_hash(&Run(spec.clone())).as_str())
+        .provenance("Data-SHA256", record::Hash::of(&encode::bits(&answer.tables)).as_str());
+    sheet.searchable_svg = arguments.searchable;
+    write(&sheet, &arguments.out, format)?;
+    Ok(Exit::Fine)
+}
+
+/// Draws the run of a general system.
+fn draw_general(arguments: &Arguments, mut run: GeneralRun, format: Format) -> Result<Exit, CliError> {
+    if arguments.flags.chord.is_none()
+        && let Record::Path { chord } = &mut run.options.record
+    {
+        *chord = 1e-4;
+    }
+    let definition = run.model.definition().clone();
+    let surface = match &run.options.record {
+        Record::Section(e) => Some(e.to_string()),
+        _ => None,
+    };
+    let frame = plot::Frame {
+        title: definition.title(),
+        states: definition.states(),
+        axes: definition.axes(),
+        system: None,
+        section: surface.as_deref().map(plot::Crossed::Surface),
+        times: (run.options.t_start, run.options.t_end),
+    };
+    let look = look(arguments, &frame)?;
+    let unsuitable = |e: plot::PlotError| CliError::Usage(format!("--kind {}: {e}", look.kind.word()));
+    plot::axes(&frame, look.kind, &look.axes).map_err(unsuitable)?;
+    try_delivery(Some(&arguments.out))?;
+    let progress = Progress::new(arguments.quiet);
+    let reached = |_: f64| progress.asked_to_stop().is_none();
+    let answer = run.compute(&reached).map_err(general::failed)?;
+    let mut small_print = vec![format!(
+        "*t* = {} … {}, followed exactly, dopri5, rtol {}",
+        number(run.options.t_start),
+        number(run.options.t_end),
+        number(run.options.rtol)
+    )];
+    if answer.stop == Stop::Interrupted {
+        small_print.push("an interrupted run: this is what was computed until then".into());
+    }
+    let mut sheet = plot::sheet(&frame, &answer, &look, small_print)
+        .map_err(unsuitable)?
+        .provenance("Software", concat!("twofold ", env!("CARGO_PKG_VERSION")))
+        .provenance("Picture", format!("plot-{}", look.kind.word()))
+        .provenance("Reading", "none")
+        .provenance("Method", "dopri5")
+        .provenance("Spec-SHA256", record::Hash::of_json(&run.about()).as_str())
         .provenance("Data-SHA256", record::Hash::of(&encode::bits(&answer.tables)).as_str());
     sheet.searchable_svg = arguments.searchable;
     write(&sheet, &arguments.out, format)?;
@@ -209,9 +268,9 @@ pub(super) fn small_print(spec: &RunSpec) -> Vec<String> {
 }
 
 /// How the flags want it.
-fn look(arguments: &Arguments, spec: &RunSpec) -> Result<Look, CliError> {
-    let kind = arguments.kind.map_or_else(|| plot::Kind::suiting(spec), Into::into);
-    let names = spec.system.coordinates();
+fn look(arguments: &Arguments, frame: &plot::Frame) -> Result<Look, CliError> {
+    let kind = arguments.kind.map_or_else(|| plot::Kind::suiting(frame), Into::into);
+    let names: Vec<&str> = frame.states.iter().map(|s| s.name.as_str()).collect();
     let mut axes = Vec::new();
     for name in &arguments.axes {
         let Some(i) = names.iter().position(|n| *n == name.trim()) else {

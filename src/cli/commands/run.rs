@@ -8,11 +8,13 @@ use serde_json::json;
 use crate::cli::ending;
 use crate::cli::exit::part_of;
 use crate::cli::flags::{RunFlags, Use};
+use crate::cli::general;
 use crate::cli::progress::Progress;
 use crate::cli::speak::{Delivery, complain, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
+use crate::job::general::GeneralRun;
 use crate::job::spec::{Method, SwitchSpec};
-use crate::job::{self, Executor, Horizon, JobError, Question, Run, Stop, encode, simulate};
+use crate::job::{self, Answer, Executor, Horizon, JobError, Question, Run, Stop, encode, simulate};
 use crate::record::files::Growing;
 
 /// Compute one run: its path, or with --section its crossings of a plane.
@@ -52,6 +54,9 @@ enum Format {
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
+    if let Some(run) = general::run_of(&arguments.flags)? {
+        return general_run(arguments, &run);
+    }
     let spec = arguments.flags.spec(Use::Any)?;
     let out = arguments.delivery.out.as_deref();
     // A spec is JSON whatever the run's numbers would be.
@@ -74,6 +79,104 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         say_horizon(&run, &progress)?;
     }
     Ok(exit)
+}
+
+/// Follows a general system and delivers its rows as they come.
+fn general_run(arguments: &Arguments, run: &GeneralRun) -> Result<Exit, CliError> {
+    let out = arguments.delivery.out.as_deref();
+    for (flag, given) in [("--print-spec", arguments.print_spec), ("--horizon", arguments.horizon)] {
+        if given {
+            return Err(CliError::no_effect(flag, "a general system's file is its own description; leave it out"));
+        }
+    }
+    let format = ending::format(out, arguments.format, Format::Csv)?;
+    try_delivery(out)?;
+    let progress = Progress::with_grace(arguments.delivery.quiet);
+    let title = run.model.definition().title();
+    let watch = job::Progress::begin(&progress, if title.is_empty() { "run" } else { title }, run.options.t_end);
+    let reached = |t: f64| {
+        watch.reached(t);
+        progress.asked_to_stop().is_none()
+    };
+    if let Format::Json = format {
+        let answer = run.compute(&reached).map_err(general::failed)?;
+        watch.done(&format!("{} rows", answer.rows()));
+        deliver(out, &encode::json(&answer, &run.about()))?;
+        return Ok(said_how_it_ended(&answer));
+    }
+    let file = out.filter(|f| !is_standard_output(f));
+    let mut rows = match file {
+        Some(file) => Rows::File(Growing::begin(file)?),
+        None => Rows::Output,
+    };
+    let (table, mut failed, mut count) = (run.table(), None, 0_u64);
+    let found = run.stream(
+        &mut |part| {
+            let mut bytes = if count == 0 { encode::csv_head(&table) } else { Vec::new() };
+            bytes.extend(encode::csv_rows(part));
+            // A run that fails before its first row writes nothing.
+            if !part.is_empty() {
+                failed = rows.append(&bytes).err();
+            }
+            count += part.len() as u64;
+            failed.is_none()
+        },
+        &reached,
+    );
+    watch.done(&format!("{count} rows"));
+    match failed {
+        Some(CliError::Output(e)) if e.kind() == io::ErrorKind::BrokenPipe => return Ok(Exit::Fine),
+        Some(error) => return Err(error),
+        None => {}
+    }
+    let (stop, answer, error) = match found {
+        Ok(answer) => (answer.stop, Some(answer), None),
+        Err(error) => (Stop::Failed, None, Some(general::failed(error))),
+    };
+    if count == 0 {
+        if let Some(error) = error {
+            return Err(error);
+        }
+        rows.append(&encode::csv_head(&table))?;
+    }
+    rows.append(&encode::csv_tail(&table, &run.about()))?;
+    let whole = matches!(stop, Stop::Finished | Stop::Found);
+    if !whole {
+        rows.append(&encode::cut_short(stop))?;
+    }
+    let part = file.filter(|_| !whole).map(part_of);
+    if let Rows::File(file) = rows {
+        file.finish(part.as_deref())?;
+    }
+    let place = part.as_deref().map_or("standard output".to_owned(), |p| p.display().to_string());
+    match (error, answer) {
+        (Some(error), _) => {
+            let said = format!("{error} (the {count} rows up to there are in {place})");
+            Err(CliError::Stopped { said, exit: error.exit() })
+        }
+        (None, Some(answer)) if answer.stop == Stop::Interrupted => {
+            let exit = progress.asked_to_stop().unwrap_or(Exit::Interrupted);
+            let t: f64 = answer.fact("t").map_err(JobError::from)?;
+            Err(stopped_at(t, count, part.as_deref(), exit))
+        }
+        (None, answer) => Ok(answer.map_or(Exit::Fine, |a| said_how_it_ended(&a))),
+    }
+}
+
+/// Says why a run ended before its time, if it did by what its file says.
+fn said_how_it_ended(answer: &Answer) -> Exit {
+    if let Some(zeno) = answer.facts.get("zeno") {
+        complain(&format!(
+            "{} happens infinitely often before t = {} (error at most {}), where the run ends; after_zeno = \"stick\" lets it rest there",
+            zeno["event"].as_str().unwrap_or_default(),
+            zeno["t"],
+            zeno["error"]
+        ));
+    }
+    if let Some(event) = answer.facts.get("stopped_by") {
+        complain(&format!("{} ends the run at t = {}", event.as_str().unwrap_or_default(), answer.facts["t"]));
+    }
+    Exit::Fine
 }
 
 /// What counts as agreement of orbits: nine digits.

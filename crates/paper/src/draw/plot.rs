@@ -12,10 +12,65 @@ use twofold_render::sheet::{
 };
 use twofold_render::style;
 use twofold_system::System;
+use twofold_system::definition::State;
 use twofold_system::filippov::Region;
 
 use super::level::Level;
 use super::surface;
+
+/// What a picture needs to know of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame<'a> {
+    /// The system's title.
+    pub title: &'a str,
+    /// Its states.
+    pub states: &'a [State],
+    /// Those that pictures show.
+    pub axes: &'a [usize],
+    /// The system, if it has switching surfaces that are drawn.
+    pub system: Option<&'a System>,
+    /// What is crossed where crossings were recorded.
+    pub section: Option<Crossed<'a>>,
+    /// When the run begins and ends.
+    pub times: (f64, f64),
+}
+
+/// What a section's orbit crosses.
+#[derive(Clone, Copy, Debug)]
+pub enum Crossed<'a> {
+    /// The plane where a coordinate has a value.
+    Plane(usize, f64),
+    /// The surface where an expression, as text, is zero.
+    Surface(&'a str),
+}
+
+impl<'a> From<&'a RunSpec> for Frame<'a> {
+    fn from(run: &'a RunSpec) -> Self {
+        let definition = run.system.definition();
+        Self {
+            title: definition.title(),
+            states: definition.states(),
+            axes: definition.axes(),
+            system: Some(&run.system),
+            section: match run.observe {
+                Observation::Section { coordinate, value } => Some(Crossed::Plane(coordinate, value)),
+                _ => None,
+            },
+            times: (0.0, run.t_end),
+        }
+    }
+}
+
+impl Frame<'_> {
+    fn names(&self) -> Vec<&str> {
+        self.states.iter().map(|s| s.name.as_str()).collect()
+    }
+
+    /// The curves or surfaces h = 0 in the space of these states.
+    fn levels(&self, shown: &[usize], fixed: &[(usize, f64)]) -> Vec<Level<'_>> {
+        self.system.map_or_else(Vec::new, |system| Level::all(system, shown, fixed))
+    }
+}
 
 /// What a picture of a run shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,12 +97,11 @@ impl Kind {
     }
 
     /// What suits a run: a section if passages were recorded, else by the number of axes that the system suggests, or of its states.
-    pub fn suiting(run: &RunSpec) -> Self {
-        if let Observation::Section { .. } = run.observe {
+    pub fn suiting(run: &Frame) -> Self {
+        if run.section.is_some() {
             return Kind::Section;
         }
-        let suggested = run.system.definition().axes().len();
-        match if suggested > 0 { suggested } else { run.system.dimension() } {
+        match if run.axes.is_empty() { run.states.len() } else { run.axes.len() } {
             1 => Kind::Series,
             2 => Kind::Plane,
             _ => Kind::Space,
@@ -103,11 +157,11 @@ pub enum PlotError {
 ///
 /// # Errors
 /// If the number of axes does not suit the kind.
-pub fn axes(run: &RunSpec, kind: Kind, given: &[usize]) -> Result<Vec<usize>, PlotError> {
-    let n = run.system.dimension();
+pub fn axes(run: &Frame, kind: Kind, given: &[usize]) -> Result<Vec<usize>, PlotError> {
+    let n = run.states.len();
     let wrong = |wanted| Err(PlotError::Axes { kind: kind.word(), wanted, given: given.len() });
     let few = |wanted| PlotError::States { kind: kind.word(), wanted, states: n };
-    let suggested = run.system.definition().axes();
+    let suggested = run.axes;
     let others: Vec<usize> = suggested.iter().copied().chain((0..n).filter(|i| !suggested.contains(i))).collect();
     match (kind, given.len()) {
         // A system's axes are horizontal, depth, vertical; of two panels in the plane the first and the last of them.
@@ -118,8 +172,11 @@ pub fn axes(run: &RunSpec, kind: Kind, given: &[usize]) -> Result<Vec<usize>, Pl
         (Kind::Space, 0) if n < 3 => Err(few(3)),
         (Kind::Space, 0) => Ok(others[..3].to_vec()),
         (Kind::Section, 0) => {
-            let Observation::Section { coordinate, .. } = run.observe else { return Err(SECTION_NEEDED) };
-            Ok(others.into_iter().filter(|i| *i != coordinate).take(2).collect())
+            let flat = match run.section.ok_or(SECTION_NEEDED)? {
+                Crossed::Plane(coordinate, _) => Some(coordinate),
+                Crossed::Surface(_) => None,
+            };
+            Ok(others.into_iter().filter(|i| Some(*i) != flat).take(2).collect())
         }
         (Kind::Plane | Kind::Section, 2) | (Kind::Space, 3) | (Kind::Series, _) => Ok(given.to_vec()),
         (Kind::Plane, _) => wrong("two axes"),
@@ -138,21 +195,21 @@ const PATH_NEEDED: PlotError =
 ///
 /// # Errors
 /// [`PlotError`] if the run cannot be drawn in this way.
-pub fn sheet(run: &RunSpec, answer: &Answer, look: &Look, small_print: Vec<String>) -> Result<Sheet, PlotError> {
+pub fn sheet(run: &Frame, answer: &Answer, look: &Look, small_print: Vec<String>) -> Result<Sheet, PlotError> {
     let shown = axes(run, look.kind, &look.axes)?;
-    let title = look.title.clone().unwrap_or_else(|| run.system.definition().title().to_owned());
+    let title = look.title.clone().unwrap_or_else(|| run.title.to_owned());
     let said = if title.is_empty() { "a system of its own".to_owned() } else { title.clone() };
     let width = match look.kind {
         Kind::Series | Kind::Space => ColumnWidth::Wide,
         Kind::Plane | Kind::Section => ColumnWidth::Single,
     };
-    let mut sheet = Sheet::new(width, 1, format!("{}: {said}", describe(&run.system, look.kind, &shown)));
+    let mut sheet = Sheet::new(width, 1, format!("{}: {said}", describe(run, look.kind, &shown)));
     sheet.title = (!title.is_empty()).then(|| markup::literal(&title));
     sheet.footer = small_print;
     match look.kind {
         Kind::Section => section(sheet, run, answer, &shown),
         kind => {
-            let lines = lines(answer, &run.system)?;
+            let lines = lines(answer, run)?;
             Ok(match kind {
                 Kind::Series => series(sheet, run, &lines, &shown),
                 Kind::Plane => plane(sheet, run, &lines, &shown),
@@ -163,8 +220,8 @@ pub fn sheet(run: &RunSpec, answer: &Answer, look: &Look, small_print: Vec<Strin
 }
 
 /// For readers who cannot see it.
-fn describe(system: &System, kind: Kind, shown: &[usize]) -> String {
-    let names = system.coordinates();
+fn describe(run: &Frame, kind: Kind, shown: &[usize]) -> String {
+    let names = run.names();
     let listed = shown.iter().map(|i| names[*i]).collect::<Vec<_>>().join(", ");
     match kind {
         Kind::Series => format!("{listed} against time"),
@@ -200,8 +257,8 @@ impl Line {
 }
 
 /// The lines of a recorded path or motion.
-fn lines(answer: &Answer, system: &System) -> Result<Vec<Line>, PlotError> {
-    let names = system.coordinates();
+fn lines(answer: &Answer, run: &Frame) -> Result<Vec<Line>, PlotError> {
+    let names = run.names();
     if answer.table("section").is_some() {
         return Err(PATH_NEEDED);
     }
@@ -210,7 +267,17 @@ fn lines(answer: &Answer, system: &System) -> Result<Vec<Line>, PlotError> {
     };
     let sound = |table: &&Table| names.iter().all(|n| table.numbers(n).len() == table.numbers("t").len());
     if let Some(path) = answer.table("path").filter(sound) {
-        return Ok(vec![Line { look: Stroke::Smooth, t: path.numbers("t").to_vec(), x: columns(path, 0..path.len()) }]);
+        let t = path.numbers("t");
+        // A reset is no line: two rows of one time.
+        let jumps = (1..path.len()).filter(|row| t[*row] == t[row - 1]);
+        let mut ends: Vec<usize> = jumps.collect();
+        ends.push(path.len());
+        let mut from = 0;
+        let piece = |to: usize| {
+            let rows = std::mem::replace(&mut from, to)..to;
+            Line { look: Stroke::Smooth, t: t[rows.clone()].to_vec(), x: columns(path, rows) }
+        };
+        return Ok(ends.into_iter().map(piece).collect());
     }
     let motion = answer.table("motion").filter(sound).ok_or(PlotError::NoPoints)?;
     let funnel = motion.integers("future").iter().any(|f| *f > 0);
@@ -275,8 +342,8 @@ fn line_legend(mut sheet: Sheet, lines: &[Line]) -> Sheet {
 }
 
 /// A state's name and unit.
-fn title(system: &System, state: usize) -> String {
-    let state = &system.definition().states()[state];
+fn title(run: &Frame, state: usize) -> String {
+    let state = &run.states[state];
     let name = markup::name(&state.name);
     if state.about.unit.is_empty() { name } else { format!("{name} ({})", markup::literal(&state.about.unit)) }
 }
@@ -291,18 +358,18 @@ fn range(lines: &[Line], state: usize) -> (f64, f64) {
     (axis.lower - half, axis.lower + half)
 }
 
-fn series(mut sheet: Sheet, run: &RunSpec, lines: &[Line], shown: &[usize]) -> Sheet {
+fn series(mut sheet: Sheet, run: &Frame, lines: &[Line], shown: &[usize]) -> Sheet {
     sheet = sheet.panel_aspect(if shown.len() == 1 { 0.4 } else { 0.22 });
-    let end = lines.iter().filter_map(|l| l.t.last()).fold(0.0_f64, |a, b| a.max(*b));
+    let begin = run.times.0;
+    let end = lines.iter().filter_map(|l| l.t.last()).fold(begin, |a, b| a.max(*b));
     let mut surface_shown = false;
     for (i, state) in shown.iter().enumerate() {
         let (low, high) = range(lines, *state);
         let time = if i + 1 == shown.len() { "*t*" } else { "" };
-        let mut panel =
-            PlanePanel::new(Axis::linear(time, 0.0, end), Axis::linear(title(&run.system, *state), low, high));
-        for zero in Level::all(&run.system, &[*state], &[]).iter().flat_map(|l| l.points((low, high))) {
+        let mut panel = PlanePanel::new(Axis::linear(time, begin, end), Axis::linear(title(run, *state), low, high));
+        for zero in run.levels(&[*state], &[]).iter().flat_map(|l| l.points((low, high))) {
             surface_shown = true;
-            panel = panel.line(vec![[0.0, zero], [end, zero]], SURFACE_LEVEL);
+            panel = panel.line(vec![[begin, zero], [end, zero]], SURFACE_LEVEL);
         }
         for line in lines {
             let points = line.t.iter().zip(&line.x[*state]).map(|(t, x)| [*t, *x]).collect();
@@ -352,19 +419,20 @@ fn curve_legend(mut sheet: Sheet, looks: Vec<CurveLook>) -> Sheet {
     sheet
 }
 
-fn plane(sheet: Sheet, run: &RunSpec, lines: &[Line], shown: &[usize]) -> Sheet {
+fn plane(sheet: Sheet, run: &Frame, lines: &[Line], shown: &[usize]) -> Sheet {
     let [u, v] = [shown[0], shown[1]];
     let ranges = [range(lines, u), range(lines, v)];
-    let axis = |k: usize| Axis::linear(title(&run.system, shown[k]), ranges[k].0, ranges[k].1);
+    let axis = |k: usize| Axis::linear(title(run, shown[k]), ranges[k].0, ranges[k].1);
     let mut panel = PlanePanel::new(axis(0), axis(1));
     let mut looks = Vec::new();
-    for level in Level::all(&run.system, shown, &[]) {
+    for level in run.levels(shown, &[]) {
         panel = surface_curve(panel, &level, ranges, &mut looks);
     }
     for line in lines {
         panel = panel.line(line.points([u, v]), line_style(line.look, line.t.len()));
     }
-    let start = lines.iter().filter(|l| l.t.first() == Some(&0.0)).map(|l| [l.x[u][0], l.x[v][0]]).take(1).collect();
+    let start =
+        lines.iter().filter(|l| l.t.first() == Some(&run.times.0)).map(|l| [l.x[u][0], l.x[v][0]]).take(1).collect();
     panel = panel.markers(start, START);
     let sheet = sheet.panel_aspect(0.8).panel("", "", panel);
     curve_legend(line_legend(sheet, lines), looks).legend(LegendEntry::new(LegendKey::Marker(START), "start"))
@@ -372,7 +440,7 @@ fn plane(sheet: Sheet, run: &RunSpec, lines: &[Line], shown: &[usize]) -> Sheet 
 
 fn space(
     mut sheet: Sheet,
-    run: &RunSpec,
+    run: &Frame,
     answer: &Answer,
     lines: &[Line],
     shown: &[usize],
@@ -380,14 +448,14 @@ fn space(
 ) -> Sheet {
     let order = [shown[0], shown[1], shown[2]];
     let ranges = order.map(|i| range(lines, i));
-    let axis = |k: usize| Axis::linear(title(&run.system, order[k]), ranges[k].0, ranges[k].1);
+    let axis = |k: usize| Axis::linear(title(run, order[k]), ranges[k].0, ranges[k].1);
     let mut panel = SpacePanel::new(axis(0), axis(1), axis(2));
     if let Some((azimuth, elevation)) = camera {
         panel = panel.camera(azimuth, elevation);
     }
     let (mut regions, mut seen) = (false, Vec::new());
     let mut patches = Vec::new();
-    for level in Level::all(&run.system, &order, &[]) {
+    for level in run.levels(&order, &[]) {
         regions |= level.has_regions();
         patches.extend(level.patches(&ranges));
     }
@@ -402,18 +470,16 @@ fn space(
     for line in lines {
         panel = panel.line(line.points(order), line_style(line.look, line.t.len()));
     }
-    let exits: Vec<[f64; 3]> = exits(answer, &run.system).into_iter().map(|x| order.map(|i| x[i])).collect();
+    let exits: Vec<[f64; 3]> = exits(answer, run).into_iter().map(|x| order.map(|i| x[i])).collect();
     let any_exits = !exits.is_empty();
     if any_exits {
         panel = panel.markers(exits, EXIT);
     }
     let mut box_of_states = [(0.0, 0.0); 3];
-    let singular = if run.system.dimension() == 3 {
+    let singular = run.system.filter(|system| system.dimension() == 3).and_then(|system| {
         order.iter().zip(ranges).for_each(|(i, r)| box_of_states[*i] = r);
-        surface::singularity(&run.system, &box_of_states)
-    } else {
-        None
-    };
+        surface::singularity(system, &box_of_states)
+    });
     if let Some(point) = singular {
         panel = panel.markers(vec![order.map(|i| point[i])], SINGULARITY);
     }
@@ -436,12 +502,12 @@ fn space(
     sheet
 }
 
-fn section(sheet: Sheet, run: &RunSpec, answer: &Answer, shown: &[usize]) -> Result<Sheet, PlotError> {
+fn section(sheet: Sheet, run: &Frame, answer: &Answer, shown: &[usize]) -> Result<Sheet, PlotError> {
     let table = answer.table("section").ok_or(SECTION_NEEDED)?;
-    let Observation::Section { coordinate, value } = run.observe else { return Err(SECTION_NEEDED) };
-    let names = run.system.coordinates();
+    let crossed = run.section.ok_or(SECTION_NEEDED)?;
+    let names = run.names();
     let t = table.numbers("t");
-    let half = 0.5 * run.t_end;
+    let half = 0.5 * (run.times.0 + run.times.1);
     // One state left: against time.
     let (horizontal, vertical) = match shown {
         [u, v, ..] => (Some(*u), Some(*v)),
@@ -454,22 +520,29 @@ fn section(sheet: Sheet, run: &RunSpec, answer: &Answer, shown: &[usize]) -> Res
         return Err(PlotError::NoPoints);
     }
     let axis = |state: Option<usize>, values: &[f64]| match state {
-        Some(i) => Axis::covering(title(&run.system, i), values.iter().copied()),
-        None => Axis::linear("*t*", 0.0, run.t_end),
+        Some(i) => Axis::covering(title(run, i), values.iter().copied()),
+        None => Axis::linear("*t*", run.times.0, run.times.1),
     };
     let (x, y) = (axis(horizontal, xs), axis(vertical, ys));
     let ranges = [(x.lower, x.upper), (y.lower, y.upper)];
     let mut panel = PlanePanel::new(x, y);
     let mut looks = Vec::new();
     if let (Some(u), Some(v)) = (horizontal, vertical) {
-        for level in Level::all(&run.system, &[u, v], &[(coordinate, value)]) {
+        let fixed = match crossed {
+            Crossed::Plane(coordinate, value) => vec![(coordinate, value)],
+            Crossed::Surface(_) => Vec::new(),
+        };
+        for level in run.levels(&[u, v], &fixed) {
             panel = surface_curve(panel, &level, ranges, &mut looks);
         }
     }
     let points =
         |late: bool| (0..t.len()).filter(|i| (t[*i] > half) == late).map(|i| [xs[i], ys[i]]).collect::<Vec<_>>();
     panel = panel.dots(points(false), DotStyle::early()).dots(points(true), DotStyle::late());
-    let plane = format!("{} = {}", markup::name(names[coordinate]), number(value));
+    let plane = match crossed {
+        Crossed::Plane(coordinate, value) => format!("{} = {}", markup::name(names[coordinate]), number(value)),
+        Crossed::Surface(text) => format!("{} = 0", markup::literal(text)),
+    };
     let sheet = sheet.subtitle(format!("crossings of {plane}")).panel_aspect(0.9).panel("", "", panel);
     let half = number(half);
     let sheet = sheet
@@ -479,9 +552,9 @@ fn section(sheet: Sheet, run: &RunSpec, answer: &Answer, shown: &[usize]) -> Res
 }
 
 /// Where a motion leaves repelling sliding.
-fn exits(answer: &Answer, system: &System) -> Vec<Vec<f64>> {
+fn exits(answer: &Answer, run: &Frame) -> Vec<Vec<f64>> {
     let Some(events) = answer.table("events") else { return Vec::new() };
-    let columns: Vec<&[f64]> = system.coordinates().iter().map(|n| events.numbers(n)).collect();
+    let columns: Vec<&[f64]> = run.names().iter().map(|n| events.numbers(n)).collect();
     let single = |row: usize| events.integers("future").get(row) == Some(&0);
     events
         .words("event")

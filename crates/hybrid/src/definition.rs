@@ -1,0 +1,770 @@
+//! A general system as data, from a file.
+//!
+//! ```toml
+//! name = "bouncing-ball"
+//! states = ["x", { name = "v", meaning = "speed" }]
+//! start = [1, 0]
+//! f = ["v", "-g - drag*v*abs(v)"]        # one expression a state; t is the time
+//!
+//! [parameters]
+//! g = 9.81
+//! drag = "1/100"                         # constants may be expressions
+//!
+//! [[event]]
+//! name = "impact"                        # optional, as all but when, at or every
+//! when = "x"                             # where this is met ...
+//! direction = "down"                     # ... in this direction; or a condition: when = "x < 0" fires when it becomes true
+//! set = { v = "-0.8*v" }                 # right-hand sides see the old values
+//! after_zeno = "stick"                   # impacts that accumulate: motion goes on at rest on the surface
+//!
+//! [modes.NAME]                           # instead of f; the first is where motion begins
+//! f = ["..."]
+//!
+//! [tables.wind]                          # `wind` is then its value at time t
+//! file = "wind.csv"                      # beside the system's file
+//! time = "t"                             # names of its columns
+//! column = "speed"
+//! interpolation = "linear"               # previous, linear, cubic or pchip
+//! ```
+//!
+//! `h`, `plus` and `minus` may stand instead of `f`, as in a [system with one switch](twofold_system::definition).
+
+// A diagnostic is made once, when a file is read.
+#![allow(clippy::result_large_err)]
+
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+use twofold_num::Decimal;
+use twofold_system::diagnostic::{Diagnostic, nearest};
+use twofold_system::document::{About, Ordered, StateEntry};
+use twofold_system::expression::{ExpressionError, is_name, is_reserved_in_general};
+use twofold_system::{Expression, definition::State};
+
+/// Most states of a general system.
+pub const MAX_STATES: usize = 100;
+/// Most parameters, terms, events, modes or tables each.
+pub const MAX_NAMES: usize = 100;
+/// Longest file, in bytes.
+pub const MAX_FILE: usize = 200_000;
+
+/// A constant: a number or an expression of numbers and parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Constant {
+    /// A number.
+    Number(f64),
+    /// An expression.
+    Text(String),
+}
+
+impl Constant {
+    fn text(&self) -> String {
+        match self {
+            Constant::Number(value) => Decimal::from(*value).to_string(),
+            Constant::Text(text) => text.clone(),
+        }
+    }
+}
+
+/// A constant, or several.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Constants {
+    /// One.
+    One(Constant),
+    /// Several.
+    List(Vec<Constant>),
+}
+
+/// A parameter: a constant, or a table with more.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum ParameterEntry {
+    /// Its value.
+    Plain(Constant),
+    /// Its value, and what is said of it.
+    Table {
+        /// Its value.
+        value: Constant,
+        /// What it is, in words.
+        #[serde(default)]
+        meaning: String,
+        /// Its unit.
+        #[serde(default)]
+        unit: String,
+        /// Values that are not above this bound are refused.
+        #[serde(default)]
+        above: Option<f64>,
+        /// Values that are not below this bound are refused.
+        #[serde(default)]
+        below: Option<f64>,
+    },
+}
+
+/// In which direction an expression passes zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Direction {
+    /// From below.
+    Up,
+    /// From above.
+    Down,
+    /// Either.
+    #[default]
+    Both,
+}
+
+/// What happens where impacts accumulate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AfterZeno {
+    /// Motion goes on at rest on the surface.
+    Stick,
+}
+
+/// How a table is read between its rows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Interpolation {
+    /// The last row's value.
+    Previous,
+    /// Straight lines.
+    #[default]
+    Linear,
+    /// A cubic spline with two continuous derivatives (not-a-knot ends: de Boor 1978, ch. IV).
+    Cubic,
+    /// Piecewise cubics that overshoot nowhere (Fritsch & Butland 1984).
+    Pchip,
+}
+
+/// An event as the file has it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EventEntry {
+    /// Its name [default: event 1, event 2, ...].
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub name: String,
+    /// An expression whose zero is met, or a condition that becomes true.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub when: Option<String>,
+    /// The direction in which `when` passes zero: up, down or both.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub direction: Option<Direction>,
+    /// New values of states, by name; they see the old values.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub set: Option<Ordered<Constant>>,
+    /// The mode that holds from then on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mode: Option<String>,
+    /// The only mode in which it fires.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
+    /// Whether the run ends there.
+    #[serde(default)]
+    pub stop: bool,
+    /// Fires at the multiples of this time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub every: Option<Constant>,
+    /// Fires at this time, or at these.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at: Option<Constants>,
+    /// What happens where it fires infinitely often in finite time: "stick", or the run ends there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub after_zeno: Option<AfterZeno>,
+}
+
+/// A mode as the file has it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModeEntry {
+    /// One expression a state.
+    pub f: Vec<Constant>,
+}
+
+/// A table as the file has it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TableEntry {
+    /// A CSV file beside the system's.
+    pub file: String,
+    /// The name of its column of times.
+    pub time: String,
+    /// The name of its column of values.
+    pub column: String,
+    /// How it is read between its rows.
+    #[serde(default)]
+    pub interpolation: Interpolation,
+}
+
+/// A general system's file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Document {
+    /// The system's name: letters, digits, `-` and `_`.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub name: String,
+    /// One line for headings of pictures.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub title: String,
+    /// What the system describes, in sentences.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub about: String,
+    /// Where the system comes from, a string each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub references: Vec<String>,
+    /// The states, in order: a name, or a table.
+    pub states: Vec<StateEntry>,
+    /// Where runs begin: a number or expression for each state.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start: Option<Vec<Constant>>,
+    /// The two or three states that pictures show.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub axes: Vec<String>,
+    /// The derivative of each state.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub f: Option<Vec<Constant>>,
+    /// A switching function, with `plus` and `minus`, instead of `f`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub h: Option<String>,
+    /// The derivatives where h > 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plus: Option<Vec<Constant>>,
+    /// The derivatives where h < 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub minus: Option<Vec<Constant>>,
+    /// Parameters by name.
+    #[serde(default)]
+    pub parameters: Ordered<ParameterEntry>,
+    /// Expressions by name, in any order.
+    #[serde(default, rename = "let")]
+    pub terms: Ordered<Constant>,
+    /// Modes by name, instead of `f`; motion begins in the first.
+    #[serde(default)]
+    pub modes: Ordered<ModeEntry>,
+    /// What happens at moments.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub event: Vec<EventEntry>,
+    /// Data by name.
+    #[serde(default)]
+    pub tables: Ordered<TableEntry>,
+}
+
+/// A parameter of a general system.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Its name.
+    pub name: String,
+    /// Its value: an expression of numbers and of parameters before it.
+    pub value: Expression,
+    /// Its meaning and unit.
+    pub about: About,
+    /// Values that are not above the first and below the second are refused.
+    pub bounds: (Option<f64>, Option<f64>),
+}
+
+/// A mode.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mode {
+    /// Its name; empty if the system has only `f`.
+    pub name: String,
+    /// The derivative of each state.
+    pub field: Vec<Expression>,
+}
+
+/// When an event fires.
+#[derive(Clone, Debug, PartialEq)]
+pub enum When {
+    /// Where an expression passes zero in a direction.
+    Zero(Expression, Direction),
+    /// When a condition becomes true.
+    Becomes(Expression),
+    /// At times: expressions of parameters.
+    At(Vec<Expression>),
+    /// At the multiples of a time.
+    Every(Expression),
+}
+
+/// An event.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Event {
+    /// Its name.
+    pub name: String,
+    /// When it fires.
+    pub when: When,
+    /// New values of states, by the states' numbers.
+    pub set: Vec<(usize, Expression)>,
+    /// The mode from then on.
+    pub mode: Option<usize>,
+    /// The only mode in which it fires.
+    pub from: Option<usize>,
+    /// Whether the run ends there.
+    pub stop: bool,
+    /// Whether motion rests on the surface where it accumulates.
+    pub sticks: bool,
+}
+
+/// A general system as expressions. One that exists is sound: names are known, counts fit, terms do not depend on themselves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Definition {
+    pub(crate) document: Document,
+    pub(crate) states: Vec<State>,
+    pub(crate) parameters: Vec<Parameter>,
+    pub(crate) start: Option<Vec<Expression>>,
+    pub(crate) axes: Vec<usize>,
+    pub(crate) terms: Vec<(String, Expression)>,
+    pub(crate) modes: Vec<Mode>,
+    pub(crate) events: Vec<Event>,
+    pub(crate) tables: Vec<(String, TableEntry)>,
+}
+
+/// Whether a file in TOML or JSON defines a general system: it has a key that systems with one switch have not.
+pub fn is_general(text: &str, json: bool) -> bool {
+    const KEYS: [&str; 4] = ["f", "event", "modes", "tables"];
+    if json {
+        let value: Option<serde_json::Value> = serde_json::from_str(text).ok();
+        return value.is_some_and(|v| KEYS.iter().any(|k| v.get(k).is_some()));
+    }
+    match toml::de::DeTable::parse(text) {
+        Ok(table) => KEYS.iter().any(|k| table.get_ref().get(*k).is_some()),
+        Err(_) => false,
+    }
+}
+
+/// A step of the way to a place in a document.
+#[derive(Clone, Debug, PartialEq)]
+enum Part {
+    Key(String),
+    Item(usize),
+}
+
+type Place = Vec<Part>;
+
+fn key(name: &str) -> Place {
+    vec![Part::Key(name.into())]
+}
+
+fn inside(place: &Place, name: &str) -> Place {
+    let mut place = place.clone();
+    place.push(Part::Key(name.into()));
+    place
+}
+
+fn item(place: &Place, i: usize) -> Place {
+    let mut place = place.clone();
+    place.push(Part::Item(i));
+    place
+}
+
+/// What is wrong with a document, and where.
+struct Problem {
+    place: Place,
+    within: Option<(String, Range<usize>)>,
+    message: String,
+    help: Option<String>,
+}
+
+fn problem<T>(place: Place, message: impl Into<String>, help: Option<&str>) -> Result<T, Problem> {
+    Err(Problem { place, within: None, message: message.into(), help: help.map(Into::into) })
+}
+
+/// The bytes of a TOML text that a place stands for.
+fn span_of(text: &str, place: &Place) -> Option<Range<usize>> {
+    let table = toml::de::DeTable::parse(text).ok()?;
+    let Part::Key(first) = place.first()? else { return None };
+    let mut at = table.get_ref().get(first.as_str())?;
+    let mut span = at.span();
+    for part in &place[1..] {
+        let next = match part {
+            Part::Key(name) => at.get_ref().as_table().and_then(|t| t.get(name.as_str())),
+            Part::Item(i) => at.get_ref().as_array().and_then(|a| a.get(*i)),
+        };
+        // A key that is not there: the table that lacks it.
+        let Some(next) = next else { break };
+        at = next;
+        span = at.span();
+    }
+    Some(span)
+}
+
+impl Definition {
+    /// Reads a definition in TOML; `origin` names the text in errors.
+    ///
+    /// # Errors
+    /// Points to the first thing that is wrong and says what to do.
+    ///
+    /// ```
+    /// use twofold_hybrid::Definition;
+    /// let error = Definition::from_toml("states = ['x']\nf = ['if(x, 1, 2)']", "my.toml").unwrap_err();
+    /// assert_eq!(error.to_string().lines().nth(1), Some(" --> my.toml:2:10"));
+    /// ```
+    pub fn from_toml(text: &str, origin: &str) -> Result<Self, Diagnostic> {
+        let at = |message: String, span: Range<usize>, help| Diagnostic::new(message, origin, text, span, help);
+        if text.len() > MAX_FILE {
+            return Err(at(format!("a file of {} bytes; the limit is {MAX_FILE}", text.len()), 0..0, None));
+        }
+        let document: Document = toml::from_str(text).map_err(|e| {
+            let quoted: Vec<&str> = e.message().split('`').skip(1).step_by(2).collect();
+            let near = quoted.split_first().and_then(|(unknown, known)| nearest(unknown, known));
+            at(e.message().to_owned(), e.span().unwrap_or(0..0), near.map(|n| format!("did you mean `{n}`?")))
+        })?;
+        Self::from_document(document).map_err(|problem| {
+            let mut span = span_of(text, &problem.place).unwrap_or(0..0);
+            if let Some((expression, part)) = problem.within
+                && let Some(start) = text.get(span.clone()).and_then(|literal| literal.rfind(&expression))
+            {
+                span = span.start + start + part.start..span.start + start + part.end;
+            }
+            at(problem.message, span, problem.help)
+        })
+    }
+
+    /// Reads a definition in JSON with the same fields.
+    ///
+    /// # Errors
+    /// Names the first thing that is wrong.
+    pub fn from_json(text: &str, origin: &str) -> Result<Self, Diagnostic> {
+        if text.len() > MAX_FILE {
+            let message = format!("a file of {} bytes; the limit is {MAX_FILE}", text.len());
+            return Err(Diagnostic::new(message, origin, text, 0..0, None));
+        }
+        let document: Document =
+            serde_json::from_str(text).map_err(|e| Diagnostic::new(e.to_string(), origin, text, 0..0, None))?;
+        Self::from_document(document).map_err(|problem| {
+            let place: Vec<String> = problem
+                .place
+                .iter()
+                .map(|part| match part {
+                    Part::Key(name) => name.clone(),
+                    Part::Item(i) => (i + 1).to_string(),
+                })
+                .collect();
+            let place = format!("{origin}, {}", place.join("."));
+            let (text, span) = problem.within.unwrap_or((String::new(), 0..0));
+            Diagnostic::new(problem.message, &place, &text, span, problem.help)
+        })
+    }
+
+    /// The system's name; empty if it has none.
+    pub fn name(&self) -> &str {
+        &self.document.name
+    }
+
+    /// One line about the system; its name if there is no title.
+    pub fn title(&self) -> &str {
+        if self.document.title.is_empty() { self.name() } else { &self.document.title }
+    }
+
+    /// What the file says, as data.
+    pub fn document(&self) -> &Document {
+        &self.document
+    }
+
+    /// The states, in order.
+    pub fn states(&self) -> &[State] {
+        &self.states
+    }
+
+    /// The parameters, in order.
+    pub fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    /// The modes; one without a name if the system has only `f`.
+    pub fn modes(&self) -> &[Mode] {
+        &self.modes
+    }
+
+    /// The events, in order.
+    pub fn events(&self) -> &[Event] {
+        &self.events
+    }
+
+    /// The tables, by name.
+    pub fn tables(&self) -> &[(String, TableEntry)] {
+        &self.tables
+    }
+
+    /// The states that pictures show.
+    pub fn axes(&self) -> &[usize] {
+        &self.axes
+    }
+
+    fn from_document(document: Document) -> Result<Self, Problem> {
+        let d = &document;
+        let sound = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        if d.name.len() > 64 || !d.name.chars().all(sound) {
+            return problem(
+                key("name"),
+                "this cannot be a system's name",
+                Some("letters, digits, - and _, at most 64"),
+            );
+        }
+        if d.states.is_empty() || d.states.len() > MAX_STATES {
+            let message = format!("{} states; a system has 1 to {MAX_STATES}", d.states.len());
+            return problem(key("states"), message, None);
+        }
+        let counts = [
+            ("parameters", d.parameters.0.len()),
+            ("let", d.terms.0.len()),
+            ("modes", d.modes.0.len()),
+            ("event", d.event.len()),
+            ("tables", d.tables.0.len()),
+        ];
+        if let Some((name, count)) = counts.iter().find(|(_, count)| *count > MAX_NAMES) {
+            return problem(key(name), format!("{count} entries; the limit is {MAX_NAMES}"), None);
+        }
+        let names = names(d)?;
+        let all: Vec<&str> = names.iter().map(|(_, n)| *n).collect();
+        let parse = |place: Place, text: &str, known: &[&str]| {
+            Expression::parse_general(text, known).map_err(|error: ExpressionError| Problem {
+                place,
+                within: Some((text.to_owned(), error.span)),
+                message: error.message,
+                help: error.help,
+            })
+        };
+        let number = |place: Place, text: &str, known: &[&str]| {
+            let parsed = parse(place.clone(), text, known)?;
+            if parsed.is_condition() {
+                return problem(
+                    place,
+                    "a condition stands where a number is wanted",
+                    Some("if(condition, 1, 0) makes it one"),
+                );
+            }
+            Ok(parsed)
+        };
+        let n = d.states.len();
+        let list = |place: Place, texts: &[Constant]| -> Result<Vec<Expression>, Problem> {
+            if texts.len() != n {
+                let names: Vec<&str> = d.states.iter().map(|s| s.name.as_str()).collect();
+                let message = format!("{} expressions for {n} states ({})", texts.len(), names.join(", "));
+                return problem(place, message, Some("give one for each state, in their order"));
+            }
+            texts.iter().enumerate().map(|(i, c)| number(item(&place, i), &c.text(), &all)).collect()
+        };
+        let mut parameters: Vec<Parameter> = Vec::new();
+        for (name, entry) in &d.parameters.0 {
+            let place = inside(&key("parameters"), name);
+            let known: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
+            let (value, about, bounds) = match entry {
+                ParameterEntry::Plain(value) => (value, About::default(), (None, None)),
+                ParameterEntry::Table { value, meaning, unit, above, below } => {
+                    (value, About { meaning: meaning.clone(), unit: unit.clone() }, (*above, *below))
+                }
+            };
+            let value = number(place.clone(), &value.text(), &known)?;
+            if value.names().contains(&"t") {
+                return problem(place, "a parameter does not depend on the time", Some("put it into [let]"));
+            }
+            parameters.push(Parameter { name: name.clone(), value, about, bounds });
+        }
+        let mut terms = Vec::new();
+        for (name, text) in &d.terms.0 {
+            terms.push((name.clone(), parse(inside(&key("let"), name), &text.text(), &all)?));
+        }
+        let terms = in_order(terms)?;
+        let modes = match (&d.f, &d.h, d.modes.0.is_empty()) {
+            (Some(f), None, true) => vec![Mode { name: String::new(), field: list(key("f"), f)? }],
+            (None, Some(h), true) => {
+                let switching = number(key("h"), h, &all)?;
+                let missing = || problem(key("h"), "h needs both `plus` and `minus`", None);
+                let Some(plus) = &d.plus else { return missing() };
+                let Some(minus) = &d.minus else { return missing() };
+                let (plus, minus) = (list(key("plus"), plus)?, list(key("minus"), minus)?);
+                let zero = || Box::new(Expression::Number(0.0.into()));
+                let choose = |(a, b)| {
+                    let condition = Expression::Greater(Box::new(switching.clone()), zero());
+                    Expression::Apply(twofold_system::expression::General::If, vec![condition, a, b])
+                };
+                vec![Mode { name: String::new(), field: plus.into_iter().zip(minus).map(choose).collect() }]
+            }
+            (None, None, false) => {
+                let mut modes = Vec::new();
+                for (name, mode) in &d.modes.0 {
+                    let field = list(inside(&inside(&key("modes"), name), "f"), &mode.f)?;
+                    modes.push(Mode { name: name.clone(), field });
+                }
+                modes
+            }
+            (None, None, true) => {
+                return problem(
+                    key("states"),
+                    "there are no equations",
+                    Some("give f, one expression a state: f = [\"-x\"]"),
+                );
+            }
+            _ => {
+                return problem(
+                    key("states"),
+                    "the equations are given twice",
+                    Some("give one of f, h with plus and minus, or modes"),
+                );
+            }
+        };
+        if d.h.is_none() && (d.plus.is_some() || d.minus.is_some()) {
+            return problem(key("plus"), "`plus` and `minus` need the switching function h", None);
+        }
+        let mode_named = |place: Place, name: &Option<String>| -> Result<Option<usize>, Problem> {
+            let Some(name) = name else { return Ok(None) };
+            let known: Vec<&str> = modes.iter().map(|m| m.name.as_str()).collect();
+            match known.iter().position(|n| n == name && !n.is_empty()) {
+                Some(i) => Ok(Some(i)),
+                None => {
+                    let help = nearest(name, &known).map(|near| format!("did you mean `{near}`?"));
+                    problem(place, format!("there is no mode `{name}`"), help.as_deref())
+                }
+            }
+        };
+        let mut events = Vec::new();
+        for (i, entry) in d.event.iter().enumerate() {
+            let place = item(&key("event"), i);
+            let constants: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
+            let when = match (&entry.when, &entry.at, &entry.every) {
+                (Some(text), None, None) => {
+                    let at = inside(&place, "when");
+                    let parsed = parse(at.clone(), text, &all)?;
+                    if parsed.is_condition() {
+                        if entry.direction.is_some() {
+                            let help = "leave direction out, or give an expression whose zero is met";
+                            return problem(
+                                inside(&place, "direction"),
+                                "a condition fires when it becomes true",
+                                Some(help),
+                            );
+                        }
+                        When::Becomes(parsed)
+                    } else {
+                        When::Zero(parsed, entry.direction.unwrap_or_default())
+                    }
+                }
+                (None, Some(times), None) => {
+                    let times = match times {
+                        Constants::One(one) => vec![one.clone()],
+                        Constants::List(list) => list.clone(),
+                    };
+                    let read = times.iter().map(|c| number(inside(&place, "at"), &c.text(), &constants));
+                    When::At(read.collect::<Result<_, _>>()?)
+                }
+                (None, None, Some(period)) => When::Every(number(inside(&place, "every"), &period.text(), &constants)?),
+                (None, None, None) => {
+                    return problem(place, "it is not said when the event fires", Some("give when, at or every"));
+                }
+                _ => {
+                    return problem(
+                        place,
+                        "an event has one of when, at and every",
+                        Some("write one [[event]] for each"),
+                    );
+                }
+            };
+            if entry.direction.is_some() && entry.when.is_none() {
+                return problem(inside(&place, "direction"), "`direction` belongs to `when`", None);
+            }
+            let mut set = Vec::new();
+            for (name, value) in entry.set.iter().flat_map(|s| &s.0) {
+                let at = inside(&inside(&place, "set"), name);
+                let Some(state) = d.states.iter().position(|s| s.name == *name) else {
+                    let known: Vec<&str> = d.states.iter().map(|s| s.name.as_str()).collect();
+                    let help = nearest(name, &known)
+                        .map_or(format!("states are {}", known.join(", ")), |n| format!("did you mean `{n}`?"));
+                    return problem(at, format!("there is no state `{name}` to set"), Some(&help));
+                };
+                set.push((state, number(at, &value.text(), &all)?));
+            }
+            let mode = mode_named(inside(&place, "mode"), &entry.mode)?;
+            let from = mode_named(inside(&place, "from"), &entry.from)?;
+            let sticks = entry.after_zeno == Some(AfterZeno::Stick);
+            if sticks && (set.len() != 1 || !matches!(when, When::Zero(..))) {
+                let help = "give when = \"x\" (its zero is the surface) and set = { v = \"-r*v\" }";
+                return problem(
+                    inside(&place, "after_zeno"),
+                    "only an event that sets one state where an expression is zero can stick",
+                    Some(help),
+                );
+            }
+            if set.is_empty() && mode.is_none() && !entry.stop {
+                // It is recorded, and nothing else happens.
+            }
+            let name = if entry.name.is_empty() { format!("event {}", i + 1) } else { entry.name.clone() };
+            events.push(Event { name, when, set, mode, from, stop: entry.stop, sticks });
+        }
+        let start = match &d.start {
+            None => None,
+            Some(start) if start.len() != n => {
+                return problem(key("start"), format!("{} numbers for {n} states", start.len()), None);
+            }
+            Some(start) => {
+                let known: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
+                let read = start.iter().enumerate().map(|(i, c)| number(item(&key("start"), i), &c.text(), &known));
+                Some(read.collect::<Result<_, _>>()?)
+            }
+        };
+        let mut axes = Vec::new();
+        for (i, axis) in d.axes.iter().enumerate() {
+            let Some(state) = d.states.iter().position(|s| s.name == *axis) else {
+                return problem(item(&key("axes"), i), format!("there is no state `{axis}`"), None);
+            };
+            axes.push(state);
+        }
+        for (name, table) in &d.tables.0 {
+            let place = inside(&inside(&key("tables"), name), "file");
+            let file = std::path::Path::new(&table.file);
+            let plain = file.components().count() == 1 && file.file_name().is_some_and(|f| f == file.as_os_str());
+            if !plain {
+                return problem(place, "a table's file stands beside the system's, without folders", None);
+            }
+        }
+        let states = d.states.iter().map(|s| State { name: s.name.clone(), about: s.about.clone() }).collect();
+        let tables = d.tables.0.clone();
+        Ok(Self { states, parameters, start, axes, terms, modes, events, tables, document })
+    }
+}
+
+/// All names that expressions may use, each sound and given once, with its place.
+fn names(d: &Document) -> Result<Vec<(Place, &str)>, Problem> {
+    let states = d.states.iter().enumerate().map(|(i, s)| (item(&key("states"), i), s.name.as_str()));
+    let under = |table: &'static str| move |n: &'_ str| inside(&key(table), n);
+    let (of_parameters, of_terms, of_tables) = (under("parameters"), under("let"), under("tables"));
+    let parameters = d.parameters.0.iter().map(|(n, _)| (of_parameters(n), n.as_str()));
+    let terms = d.terms.0.iter().map(|(n, _)| (of_terms(n), n.as_str()));
+    let tables = d.tables.0.iter().map(|(n, _)| (of_tables(n), n.as_str()));
+    let mut names: Vec<(Place, &str)> = Vec::new();
+    for (place, name) in states.chain(parameters).chain(terms).chain(tables) {
+        if !is_name(name) || name.len() > 64 {
+            return problem(
+                place,
+                format!("{name:?} cannot be a name"),
+                Some("a letter, then letters, digits and _, at most 64"),
+            );
+        }
+        if is_reserved_in_general(name) {
+            let message = format!("`{name}` has a meaning of its own in expressions");
+            return problem(place, message, Some("choose another name"));
+        }
+        if names.iter().any(|(_, n)| *n == name) {
+            let message = format!("the name `{name}` is given twice");
+            return problem(place, message, Some("give every state, parameter, term and table its own name"));
+        }
+        names.push((place, name));
+    }
+    Ok(names)
+}
+
+/// Terms in an order in which each comes after those that it names.
+fn in_order(mut terms: Vec<(String, Expression)>) -> Result<Vec<(String, Expression)>, Problem> {
+    let mut done: Vec<(String, Expression)> = Vec::new();
+    while !terms.is_empty() {
+        let open: Vec<String> = terms.iter().map(|(n, _)| n.clone()).collect();
+        let ready = terms.iter().position(|(_, e)| !e.names().iter().any(|n| open.iter().any(|o| o == n)));
+        match ready {
+            Some(i) => done.push(terms.remove(i)),
+            None => {
+                let message = format!("`{}` depends on itself", terms[0].0);
+                return problem(inside(&key("let"), &terms[0].0), message, None);
+            }
+        }
+    }
+    Ok(done)
+}

@@ -1,0 +1,525 @@
+//! Switching functions found in plain equations.
+//!
+//! Every `sign`, `abs`, `min`, `max`, `if`, `heaviside`, `clip` and comparison asks on which side of zero some expression is; `floor` and `mod`
+//! ask between which whole numbers. These expressions are the system's switching functions. For fixed answers (a [`Configuration`]) the equations
+//! are smooth, and that is what is written on a [`Tape`] and evaluated: only the branches that hold are computed.
+
+use std::collections::{BTreeMap, HashMap};
+use std::rc::Rc;
+
+use twofold_num::tape::{Program, Recorded};
+use twofold_num::{Arithmetic, Decimal, Elementary, Tape};
+use twofold_system::Expression;
+use twofold_system::expression::{Function, General};
+
+use crate::data::Table;
+use crate::definition::{Definition, When};
+use crate::model::{Model, ModelError, power, smooth};
+
+/// A switching function.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Guard {
+    /// The expression whose sign, or whose whole part, is asked for.
+    pub expression: Expression,
+    /// Whether the whole part is asked for.
+    pub whole: bool,
+    /// Whether it chooses between expressions; otherwise its answer is a number in one.
+    chooses: bool,
+}
+
+/// The answers to all switching functions, the mode, and the pieces of tables that hold.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Configuration {
+    /// The mode's number.
+    pub mode: usize,
+    /// For each guard -1 or +1, or a whole number.
+    pub sides: Vec<f64>,
+    /// For each table the piece.
+    pub pieces: Vec<usize>,
+}
+
+/// The equations for one structure of answers, ready for evaluation. Variables: states, time, answers, then for each table its knot and
+/// coefficients.
+#[derive(Debug)]
+pub struct Compiled {
+    /// The derivatives.
+    pub field: Program,
+    /// The guards that matter ([`Compiled::active`]), then every watched expression.
+    pub watched: Program,
+    /// The guards that the equations ask in this structure.
+    pub active: Vec<usize>,
+    /// Number of values of `watched`.
+    pub outputs: usize,
+    tape: Tape,
+}
+
+/// A system's equations with its switching functions.
+#[derive(Debug)]
+pub struct Equation {
+    definition: Definition,
+    values: BTreeMap<String, f64>,
+    /// The switching functions, each once.
+    pub guards: Vec<Guard>,
+    by_text: HashMap<String, (usize, bool)>,
+    /// The tables' data.
+    pub tables: Vec<Table>,
+    /// Expressions whose zeros are looked for: events', then a section's.
+    pub watched: Vec<Expression>,
+    known: std::cell::RefCell<HashMap<Vec<i8>, Rc<Compiled>>>,
+}
+
+/// What an equation has that cannot be followed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum EquationError {
+    /// Wrong parameters or data.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A name in the place of a condition is none.
+    #[error("`{0}` stands where a condition is wanted, and is a number: compare it with something, such as {0} > 0")]
+    NoCondition(String),
+}
+
+/// The same function with the other sign, as it would be written.
+fn mirrored(e: &Expression) -> Expression {
+    match e {
+        Expression::Sub(a, b) => Expression::Sub(b.clone(), a.clone()),
+        Expression::Neg(a) => (**a).clone(),
+        other => Expression::Neg(Box::new(other.clone())),
+    }
+}
+
+/// a - b without needless parts.
+fn difference(a: &Expression, b: &Expression) -> Expression {
+    let zero = |e: &Expression| matches!(e, Expression::Number(n) if n.value() == 0.0);
+    match (a, b) {
+        (a, b) if zero(b) => a.clone(),
+        (a, b) if zero(a) => mirrored(b),
+        (a, Expression::Neg(b)) => Expression::Add(Box::new(a.clone()), b.clone()),
+        (a, b) => Expression::Sub(Box::new(a.clone()), Box::new(b.clone())),
+    }
+}
+
+impl Equation {
+    /// Finds the switching functions of a system; `section` is watched beside its events.
+    ///
+    /// # Errors
+    /// If the model is not complete, or a condition is none.
+    pub fn new(model: &Model, section: Option<&Expression>) -> Result<Self, EquationError> {
+        let definition = model.definition().clone();
+        let tables = model.tables()?.into_iter().map(|(_, t)| t.clone()).collect();
+        let mut watched: Vec<Expression> = Vec::new();
+        let mut conditions: Vec<Expression> = Vec::new();
+        for event in &definition.events {
+            match &event.when {
+                When::Zero(e, _) => watched.push(e.clone()),
+                When::Becomes(e) => conditions.push(e.clone()),
+                _ => {}
+            }
+        }
+        watched.extend(section.cloned());
+        let mut equation = Self {
+            values: model.values()?,
+            guards: Vec::new(),
+            by_text: HashMap::new(),
+            tables,
+            watched: watched.clone(),
+            known: Default::default(),
+            definition,
+        };
+        let fields: Vec<Expression> = equation.definition.modes.iter().flat_map(|m| m.field.clone()).collect();
+        let terms: Vec<Expression> = equation.definition.terms.iter().map(|(_, e)| e.clone()).collect();
+        for e in fields.iter().chain(&terms).chain(&watched) {
+            equation.find(e, false)?;
+        }
+        for e in &conditions {
+            equation.find(e, true)?;
+        }
+        Ok(equation)
+    }
+
+    /// Number of states.
+    pub fn dimension(&self) -> usize {
+        self.definition.states.len()
+    }
+
+    /// Number of variables of every program.
+    pub fn variables(&self) -> usize {
+        self.dimension() + 1 + self.guards.len() + 5 * self.tables.len()
+    }
+
+    /// The parameters' values.
+    pub fn values(&self) -> &BTreeMap<String, f64> {
+        &self.values
+    }
+
+    fn term(&self, name: &str) -> Option<&Expression> {
+        self.definition.terms.iter().find(|(n, _)| n == name).map(|(_, e)| e)
+    }
+
+    /// Registers the switching functions of an expression.
+    fn find(&mut self, e: &Expression, wants_condition: bool) -> Result<(), EquationError> {
+        match e {
+            Expression::Name(name) if wants_condition => match self.term(name).cloned() {
+                Some(term) if term.is_condition() => return Ok(()),
+                Some(Expression::Name(other)) => return self.find(&Expression::Name(other), true),
+                _ => return Err(EquationError::NoCondition(name.clone())),
+            },
+            Expression::Greater(a, b) => self.register(difference(a, b), false, true),
+            Expression::Call(Function::Sign | Function::Abs, a) => self.register((**a).clone(), false, false),
+            Expression::Apply(f, list) => match f {
+                General::Min | General::Max => {
+                    // Each with the least or greatest before it.
+                    for i in 1..list.len() {
+                        self.register(difference(&list[i], &self.folded(*f, &list[..i])), false, true);
+                    }
+                }
+                General::Clip => {
+                    self.register(difference(&list[0], &list[1]), false, true);
+                    self.register(difference(&list[0], &list[2]), false, true);
+                }
+                General::Heaviside => self.register(list[0].clone(), false, false),
+                General::Floor => self.register(list[0].clone(), true, false),
+                General::Mod => self.register(quotient(list), true, false),
+                General::Atan2 => {
+                    self.register(list[1].clone(), false, true);
+                    self.register(list[0].clone(), false, true);
+                }
+                _ => {}
+            },
+            _ => {}
+        }
+        let conditions = |i: usize| match e {
+            Expression::And(..) | Expression::Or(..) | Expression::Not(_) => true,
+            Expression::Apply(General::If, _) => i == 0,
+            _ => false,
+        };
+        for (i, part) in e.parts().into_iter().enumerate() {
+            self.find(part, conditions(i))?;
+        }
+        Ok(())
+    }
+
+    fn folded(&self, f: General, list: &[Expression]) -> Expression {
+        if list.len() == 1 { list[0].clone() } else { Expression::Apply(f, list.to_vec()) }
+    }
+
+    fn register(&mut self, expression: Expression, whole: bool, chooses: bool) {
+        let key = |e: &Expression| format!("{}{e}", if whole { "whole " } else { "" });
+        if let Some((i, _)) = self.by_text.get(&key(&expression)) {
+            self.guards[*i].chooses |= chooses;
+            return;
+        }
+        let i = self.guards.len();
+        if !whole {
+            self.by_text.insert(key(&mirrored(&expression)), (i, true));
+        }
+        self.by_text.insert(key(&expression), (i, false));
+        self.guards.push(Guard { expression, whole, chooses });
+    }
+
+    /// The guard of an expression, and whether it is the expression's negative.
+    fn guard(&self, e: &Expression, whole: bool) -> (usize, bool) {
+        let key = format!("{}{e}", if whole { "whole " } else { "" });
+        self.by_text.get(&key).copied().unwrap_or((0, false))
+    }
+
+    /// Whether a condition holds in a configuration.
+    pub fn holds(&self, e: &Expression, at: &Configuration) -> bool {
+        match e {
+            Expression::Greater(a, b) => self.positive(&difference(a, b), at),
+            Expression::And(a, b) => self.holds(a, at) && self.holds(b, at),
+            Expression::Or(a, b) => self.holds(a, at) || self.holds(b, at),
+            Expression::Not(a) => !self.holds(a, at),
+            Expression::Name(name) => self.term(name).is_some_and(|term| self.holds(term, at)),
+            _ => false,
+        }
+    }
+
+    fn positive(&self, e: &Expression, at: &Configuration) -> bool {
+        let (i, flipped) = self.guard(e, false);
+        (at.sides[i] > 0.0) != flipped
+    }
+
+    /// The value of an expression at a state, following conditions by the numbers themselves.
+    pub fn value(&self, e: &Expression, t: f64, x: &[f64]) -> f64 {
+        let name = |name: &str| -> Option<f64> {
+            if name == "t" {
+                return Some(t);
+            }
+            if let Some(i) = self.definition.states.iter().position(|s| s.name == name) {
+                return Some(x[i]);
+            }
+            if let Some(value) = self.values.get(name) {
+                return Some(*value);
+            }
+            if let Some(term) = self.term(name) {
+                return Some(self.value(term, t, x));
+            }
+            let table = self.definition.tables.iter().position(|(n, _)| n == name)?;
+            Some(self.tables[table].value(self.tables[table].piece(t), t))
+        };
+        crate::model::evaluate(e, &name)
+    }
+
+    /// The equations for the structure of this configuration.
+    pub fn compiled(&self, at: &Configuration) -> Rc<Compiled> {
+        let mut key = vec![at.mode as i8];
+        key.extend(self.guards.iter().zip(&at.sides).filter(|(g, _)| g.chooses).map(|(_, s)| *s as i8));
+        if let Some(found) = self.known.borrow().get(&key) {
+            return found.clone();
+        }
+        let made = Rc::new(self.compile(at));
+        let mut known = self.known.borrow_mut();
+        // A long run among very many structures keeps memory flat.
+        if known.len() >= 4096 {
+            known.clear();
+        }
+        known.insert(key, made.clone());
+        made
+    }
+
+    fn compile(&self, at: &Configuration) -> Compiled {
+        let mut active = Vec::new();
+        let n = self.dimension();
+        let tape = Tape::record(self.variables(), |v| {
+            let mut writer = Writer { equation: self, at, v, terms: HashMap::new(), guards: BTreeMap::new() };
+            let mut outputs: Vec<Recorded> =
+                self.definition.modes[at.mode].field.iter().map(|e| writer.number(e)).collect();
+            let watched: Vec<Recorded> = self.watched.iter().map(|e| writer.number(e)).collect();
+            for event in &self.definition.events {
+                if let When::Becomes(e) = &event.when {
+                    writer.condition(e);
+                }
+            }
+            // A guard may ask others: until no new one is found.
+            loop {
+                let open: Vec<usize> = writer.guards.iter().filter(|(_, g)| g.is_none()).map(|(i, _)| *i).collect();
+                if open.is_empty() {
+                    break;
+                }
+                for i in open {
+                    let value = writer.number(&self.guards[i].expression.clone());
+                    writer.guards.insert(i, Some(value));
+                }
+            }
+            for (i, guard) in &writer.guards {
+                active.push(*i);
+                outputs.extend(guard);
+            }
+            outputs.extend(watched);
+            outputs
+        });
+        let outputs = n + active.len() + self.watched.len();
+        Compiled {
+            field: Program::new(&tape.select(0..n)),
+            watched: Program::new(&tape.select(n..outputs)),
+            outputs: outputs - n,
+            active,
+            tape,
+        }
+    }
+
+    /// The domain that is left at a point: the first root, logarithm or division there whose value is no finite number, as words.
+    pub fn broken(&self, compiled: &Compiled, variables: &[f64]) -> Option<String> {
+        use twofold_num::tape::Operation;
+        let tape = compiled.tape.select(0..self.dimension());
+        let values = tape.values(variables);
+        let needed = tape.needed();
+        let names: Vec<String> = self.definition.states.iter().map(|s| s.name.clone()).collect();
+        for (node, operation) in tape.operations().iter().enumerate() {
+            if !needed[node] || values[node].is_finite() {
+                continue;
+            }
+            if operation.arguments().all(|a| values[a].is_finite()) {
+                let what = match operation {
+                    Operation::Sqrt(_) => "the square root of a negative number",
+                    Operation::Ln(_) => "the logarithm (or a power) of a number that is not positive",
+                    Operation::Div(..) => "a division by zero",
+                    _ => "a number beyond the range of double precision",
+                };
+                // The component that it spoils, and the expression that is written there.
+                let spoilt = self.definition.modes.iter().flat_map(|m| m.field.iter().enumerate());
+                let place = spoilt.zip(tape.outputs().iter().cycle()).find(|(_, out)| !values[**out].is_finite());
+                return Some(match place {
+                    Some(((i, e), _)) => format!("{what}, in the equation of {}, `{e}`", names[i]),
+                    None => what.into(),
+                });
+            }
+        }
+        None
+    }
+}
+
+/// Whether any equation of a system has a switching function.
+pub(crate) fn has_switches(definition: &Definition) -> bool {
+    fn asks(e: &Expression) -> bool {
+        let itself = match e {
+            Expression::Greater(..) | Expression::Call(Function::Sign | Function::Abs, _) => true,
+            Expression::Apply(f, _) => {
+                use General::{Atan2, Clip, Floor, Heaviside, If, Max, Min, Mod};
+                matches!(f, Min | Max | If | Heaviside | Floor | Mod | Clip | Atan2)
+            }
+            _ => false,
+        };
+        itself || e.parts().into_iter().any(asks)
+    }
+    let fields = definition.modes.iter().flat_map(|m| &m.field);
+    let terms = definition.terms.iter().map(|(_, e)| e);
+    let events = definition.events.iter().filter_map(|e| match &e.when {
+        When::Zero(e, _) | When::Becomes(e) => Some(e),
+        _ => None,
+    });
+    fields.chain(terms).chain(events).any(asks)
+}
+
+fn quotient(list: &[Expression]) -> Expression {
+    Expression::Div(Box::new(list[0].clone()), Box::new(list[1].clone()))
+}
+
+/// Writes expressions on a tape for a configuration.
+struct Writer<'a> {
+    equation: &'a Equation,
+    at: &'a Configuration,
+    v: &'a [Recorded],
+    terms: HashMap<String, Recorded>,
+    /// Guards that were asked, with their values once written.
+    guards: BTreeMap<usize, Option<Recorded>>,
+}
+
+impl Writer<'_> {
+    /// Asks on which side of zero an expression is: the answer's variable and whether it is to be mirrored.
+    fn ask(&mut self, e: &Expression, whole: bool) -> (usize, bool) {
+        let (i, flipped) = self.equation.guard(e, whole);
+        self.guards.entry(i).or_insert(None);
+        (i, flipped)
+    }
+
+    fn side(&mut self, e: &Expression) -> Recorded {
+        let (i, flipped) = self.ask(e, false);
+        let side = self.v[self.equation.dimension() + 1 + i];
+        if flipped { -side } else { side }
+    }
+
+    fn whole(&mut self, e: &Expression) -> Recorded {
+        let (i, _) = self.ask(e, true);
+        self.v[self.equation.dimension() + 1 + i]
+    }
+
+    fn positive(&mut self, e: &Expression) -> bool {
+        let (i, flipped) = self.ask(e, false);
+        (self.at.sides[i] > 0.0) != flipped
+    }
+
+    fn condition(&mut self, e: &Expression) -> bool {
+        match e {
+            Expression::Greater(a, b) => self.positive(&difference(a, b)),
+            Expression::And(a, b) => self.condition(a) && self.condition(b),
+            Expression::Or(a, b) => self.condition(a) || self.condition(b),
+            Expression::Not(a) => !self.condition(a),
+            Expression::Name(name) => {
+                let term = self.equation.term(name).cloned();
+                term.is_some_and(|term| self.condition(&term))
+            }
+            _ => false,
+        }
+    }
+
+    fn name(&mut self, name: &str) -> Recorded {
+        let equation = self.equation;
+        let n = equation.dimension();
+        if name == "t" {
+            return self.v[n];
+        }
+        if let Some(i) = equation.definition.states.iter().position(|s| s.name == name) {
+            return self.v[i];
+        }
+        if let Some(value) = equation.values.get(name) {
+            return Recorded::parameter(name, &Decimal::from(*value));
+        }
+        if let Some(known) = self.terms.get(name) {
+            return *known;
+        }
+        if let Some(term) = equation.term(name).cloned() {
+            let value = self.number(&term);
+            self.terms.insert(name.to_owned(), value);
+            return value;
+        }
+        let table = equation.definition.tables.iter().position(|(n, _)| n == name).unwrap_or(0);
+        let first = n + 1 + equation.guards.len() + 5 * table;
+        let s = self.v[n] - self.v[first];
+        let [a, b, c, d] = [1, 2, 3, 4].map(|i| self.v[first + i]);
+        a + s * (b + s * (c + s * d))
+    }
+
+    fn number(&mut self, e: &Expression) -> Recorded {
+        match e {
+            Expression::Number(n) => Recorded::constant(n),
+            Expression::Pi => Recorded::pi(),
+            Expression::Name(name) => self.name(name),
+            Expression::Neg(a) => -self.number(a),
+            Expression::Add(a, b) => self.number(a) + self.number(b),
+            Expression::Sub(a, b) => self.number(a) - self.number(b),
+            Expression::Mul(a, b) => self.number(a) * self.number(b),
+            Expression::Div(a, b) => self.number(a) / self.number(b),
+            Expression::Power(a, n) => self.number(a).power(*n),
+            Expression::RealPower(a, b) => power(self.number(a), self.number(b)),
+            Expression::Call(Function::Sign, a) => self.side(a),
+            Expression::Call(Function::Abs, a) => self.side(a) * self.number(a),
+            Expression::Call(f, a) => {
+                let value = self.number(a);
+                f.apply(value)
+            }
+            Expression::Greater(..) | Expression::And(..) | Expression::Or(..) | Expression::Not(_) => {
+                Recorded::from_f64(if self.condition(e) { 1.0 } else { 0.0 })
+            }
+            Expression::Apply(f, list) => self.apply(*f, list),
+        }
+    }
+
+    fn apply(&mut self, f: General, list: &[Expression]) -> Recorded {
+        match f {
+            General::If => {
+                let chosen = if self.condition(&list[0]) { 1 } else { 2 };
+                self.number(&list[chosen])
+            }
+            General::Min | General::Max => {
+                let last = list.len() - 1;
+                if last == 0 {
+                    return self.number(&list[0]);
+                }
+                let before = self.equation.folded(f, &list[..last]);
+                let greater = self.positive(&difference(&list[last], &before));
+                if greater == (f == General::Max) { self.number(&list[last]) } else { self.number(&before) }
+            }
+            General::Clip => {
+                if !self.positive(&difference(&list[0], &list[1])) {
+                    self.number(&list[1])
+                } else if self.positive(&difference(&list[0], &list[2])) {
+                    self.number(&list[2])
+                } else {
+                    self.number(&list[0])
+                }
+            }
+            General::Heaviside => (self.side(&list[0]) + Recorded::one()).scale(0.5),
+            General::Floor => self.whole(&list[0]),
+            General::Mod => {
+                let whole = self.whole(&quotient(list));
+                let (a, b) = (self.number(&list[0]), self.number(&list[1]));
+                a - b * whole
+            }
+            General::Atan2 => {
+                let right = self.positive(&list[1]);
+                let up = if right { true } else { self.positive(&list[0]) };
+                let (y, x) = (self.number(&list[0]), self.number(&list[1]));
+                // To the right the half angle keeps away from its branch; to the left it is measured from the axis.
+                let r = (x * x + y * y).sqrt();
+                match (right, up) {
+                    (true, _) => (y / (r + x)).atan().scale(2.0),
+                    (false, true) => Recorded::pi() - (y / (r - x)).atan().scale(2.0),
+                    (false, false) => -Recorded::pi() - (y / (r - x)).atan().scale(2.0),
+                }
+            }
+            other => smooth(other, self.number(&list[0])),
+        }
+    }
+}

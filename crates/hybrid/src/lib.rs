@@ -1,0 +1,43 @@
+//! General piecewise-smooth and hybrid systems.
+//!
+//! A system is written as plain equations: `f = [...]`, in which `sign`, `abs`, `min`, `max`, `if`, `heaviside`, `floor`, `mod`, `clip` and comparisons
+//! are [switching functions](definition). They are found in the expressions ([`equation`]), located as motion meets them, crossed or slid upon as
+//! Filippov's convention says ([`selection`]). Events reset states and change modes; tables bring data. [`motion`] follows all of it exactly: no step
+//! runs across a switch.
+//!
+//! ```
+//! use twofold_hybrid::{Definition, Model, Options, follow};
+//! let text = r#"
+//!     states = ["x", "v"]
+//!     start = [1, 0]
+//!     f = ["v", "-2"]
+//!     [[event]]
+//!     when = "x"
+//!     direction = "down"
+//!     set = { v = "-0.5*v" }
+//! "#;
+//! let ball = Model::new(Definition::from_toml(text, "ball.toml")?);
+//! let mut impacts = Vec::new();
+//! follow(&ball, &Options { t_end: 2.5, ..Options::default() }, &mut |point| {
+//!     impacts.extend(point.event.map(|_| point.t));
+//!     true
+//! })?;
+//! assert!((impacts[0] - 1.0).abs() < 1e-12 && (impacts[1] - 1.0).abs() < 1e-12); // before and after the reset
+//! assert!((impacts[2] - 2.0).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod data;
+pub mod definition;
+pub mod equation;
+pub mod model;
+pub mod motion;
+mod roots;
+pub mod selection;
+mod step;
+#[cfg(test)]
+mod tests;
+
+pub use definition::Definition;
+pub use model::Model;
+pub use motion::{Ending, HybridError, Options, Point, follow};

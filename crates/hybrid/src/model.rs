@@ -1,0 +1,221 @@
+//! A general system with values for its parameters and data for its tables.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use serde_json::{Value, json};
+use twofold_num::elementary;
+use twofold_system::Expression;
+use twofold_system::diagnostic::nearest;
+use twofold_system::expression::General;
+
+use crate::data::{BadTable, Table};
+use crate::definition::Definition;
+
+/// A general system, ready to be followed once its tables have their data.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model {
+    definition: Arc<Definition>,
+    given: BTreeMap<String, f64>,
+    tables: BTreeMap<String, Table>,
+}
+
+/// A wrong value of a parameter, or data that are missing.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ModelError {
+    /// There is no such parameter.
+    #[error("the system has no parameter `{0}`: {1}")]
+    Unknown(String, String),
+    /// A parameter out of its bounds, or no finite number.
+    #[error("`{0}` is {1}: give a value {2}")]
+    Value(String, f64, String),
+    /// A table without data.
+    #[error("the table `{0}` has no data")]
+    NoData(String),
+    /// A table that is wrong.
+    #[error(transparent)]
+    Table(#[from] BadTable),
+}
+
+impl Model {
+    /// The system with the values that its definition gives.
+    pub fn new(definition: Definition) -> Self {
+        Self { definition: Arc::new(definition), given: BTreeMap::new(), tables: BTreeMap::new() }
+    }
+
+    /// The same system with another value of a parameter.
+    ///
+    /// # Errors
+    /// If there is no such parameter.
+    pub fn with(mut self, name: &str, value: f64) -> Result<Self, ModelError> {
+        let known: Vec<&str> = self.definition.parameters.iter().map(|p| p.name.as_str()).collect();
+        if !known.contains(&name) {
+            let help = match nearest(name, &known) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None if known.is_empty() => "it has none at all".into(),
+                None => format!("it has {}", known.join(", ")),
+            };
+            return Err(ModelError::Unknown(name.into(), help));
+        }
+        self.given.insert(name.into(), value);
+        Ok(self)
+    }
+
+    /// The same system with data for a table, the text of its CSV file.
+    ///
+    /// # Errors
+    /// If there is no such table, or its data are wrong.
+    pub fn with_table(mut self, name: &str, csv: &str) -> Result<Self, ModelError> {
+        let entry = self.definition.tables.iter().find(|(n, _)| n == name);
+        let Some((_, entry)) = entry else { return Err(ModelError::NoData(name.into())) };
+        self.tables.insert(name.into(), Table::read(entry, csv)?);
+        Ok(self)
+    }
+
+    /// What the system is.
+    pub fn definition(&self) -> &Definition {
+        &self.definition
+    }
+
+    /// The names of the states.
+    pub fn coordinates(&self) -> Vec<&str> {
+        self.definition.states.iter().map(|s| s.name.as_str()).collect()
+    }
+
+    /// The tables' data, in the definition's order.
+    ///
+    /// # Errors
+    /// If one has none.
+    pub fn tables(&self) -> Result<Vec<(&str, &Table)>, ModelError> {
+        let find = |(name, _): &'_ (String, _)| {
+            let found = self.tables.get_key_value(name).map(|(n, t)| (n.as_str(), t));
+            found.ok_or_else(|| ModelError::NoData(name.clone()))
+        };
+        self.definition.tables.iter().map(find).collect()
+    }
+
+    /// The parameters' values.
+    ///
+    /// # Errors
+    /// If one is out of its bounds or no finite number.
+    pub fn values(&self) -> Result<BTreeMap<String, f64>, ModelError> {
+        let mut values: BTreeMap<String, f64> = BTreeMap::new();
+        for p in &self.definition.parameters {
+            let value = match self.given.get(&p.name) {
+                Some(value) => *value,
+                None => evaluate(&p.value, &|name| values.get(name).copied()),
+            };
+            let refuse = |rule: String| Err(ModelError::Value(p.name.clone(), value, rule));
+            match p.bounds {
+                _ if !value.is_finite() => return refuse("that is a finite number".into()),
+                (Some(above), _) if value <= above => return refuse(format!("above {above}")),
+                (_, Some(below)) if value >= below => return refuse(format!("below {below}")),
+                _ => values.insert(p.name.clone(), value),
+            };
+        }
+        Ok(values)
+    }
+
+    /// The state where runs begin, if the file gives one.
+    ///
+    /// # Errors
+    /// As [`Model::values`].
+    pub fn start(&self) -> Result<Option<Vec<f64>>, ModelError> {
+        let values = self.values()?;
+        let number = |e: &Expression| evaluate(e, &|name| values.get(name).copied());
+        Ok(self.definition.start.as_ref().map(|start| start.iter().map(number).collect()))
+    }
+
+    /// Whether its equations have switching functions.
+    pub fn has_switches(&self) -> bool {
+        crate::equation::has_switches(&self.definition)
+    }
+
+    /// What decides the system's numbers, as data: what the file says, with these values, and the tables' points.
+    pub fn json(&self) -> Value {
+        let mut document = serde_json::to_value(&self.definition.document).unwrap_or_default();
+        for (name, value) in &self.given {
+            document["parameters"][name] = json!(value);
+        }
+        for (name, table) in &self.tables {
+            document["tables"][name]["data"] = json!({ "knots": table.knots, "pieces": table.pieces });
+        }
+        document
+    }
+}
+
+/// The value of an expression in `f64` with the value of each name; not-a-number where a name has none.
+pub fn evaluate(e: &Expression, name: &dyn Fn(&str) -> Option<f64>) -> f64 {
+    let at = |e: &Expression| evaluate(e, name);
+    let truth = |holds: bool| if holds { 1.0 } else { 0.0 };
+    match e {
+        Expression::Name(n) => name(n).unwrap_or(f64::NAN),
+        Expression::Number(n) => n.value(),
+        Expression::Pi => std::f64::consts::PI,
+        Expression::Neg(a) => -at(a),
+        Expression::Add(a, b) => at(a) + at(b),
+        Expression::Sub(a, b) => at(a) - at(b),
+        Expression::Mul(a, b) => at(a) * at(b),
+        Expression::Div(a, b) => at(a) / at(b),
+        Expression::Power(a, n) => twofold_num::Elementary::power(at(a), *n),
+        Expression::Call(f, a) => f.apply(at(a)),
+        Expression::RealPower(a, b) => real_power(at(a), at(b)),
+        Expression::Greater(a, b) => truth(at(a) > at(b)),
+        Expression::And(a, b) => truth(at(a) != 0.0 && at(b) != 0.0),
+        Expression::Or(a, b) => truth(at(a) != 0.0 || at(b) != 0.0),
+        Expression::Not(a) => truth(at(a) == 0.0),
+        Expression::Apply(f, list) => match f {
+            General::If => at(&list[if at(&list[0]) != 0.0 { 1 } else { 2 }]),
+            General::Min => list.iter().map(at).reduce(|a, b| if b < a { b } else { a }).unwrap_or(f64::NAN),
+            General::Max => list.iter().map(at).reduce(|a, b| if b > a { b } else { a }).unwrap_or(f64::NAN),
+            General::Heaviside => truth(at(&list[0]) >= 0.0),
+            General::Floor => at(&list[0]).floor(),
+            General::Mod => {
+                let (a, b) = (at(&list[0]), at(&list[1]));
+                a - b * (a / b).floor()
+            }
+            General::Clip => {
+                let (x, low, high) = (at(&list[0]), at(&list[1]), at(&list[2]));
+                if x < low {
+                    low
+                } else if x > high {
+                    high
+                } else {
+                    x
+                }
+            }
+            General::Atan2 => elementary::atan2(at(&list[0]), at(&list[1])),
+            General::Sinh | General::Cosh | General::Asin | General::Acos | General::Log10 | General::Log => {
+                smooth(*f, at(&list[0]))
+            }
+        },
+    }
+}
+
+/// a^b = exp(b ln a), and 0^b = 0 for positive b.
+fn real_power<S: twofold_num::Elementary>(a: S, b: S) -> S {
+    (b * a.ln()).exp()
+}
+
+/// A smooth function of one number made of those that every number type has. Sinh through tanh keeps its digits near zero.
+pub(crate) fn smooth<S: twofold_num::Elementary>(f: General, x: S) -> S {
+    let number = S::from_f64;
+    let cosh = |x: S| {
+        let e = x.exp();
+        (e + S::one() / e).scale(0.5)
+    };
+    match f {
+        General::Sinh => x.tanh() * cosh(x),
+        General::Cosh => cosh(x),
+        General::Asin => (x / ((S::one() - x) * (S::one() + x)).sqrt()).atan(),
+        General::Acos => ((S::one() - x) / (S::one() + x)).sqrt().atan().scale(2.0),
+        General::Log10 => x.ln() / number(10.0).ln(),
+        General::Log => x.ln(),
+        _ => number(f64::NAN),
+    }
+}
+
+/// [`real_power`] of recorded numbers.
+pub(crate) fn power<S: twofold_num::Elementary>(a: S, b: S) -> S {
+    real_power(a, b)
+}

@@ -1,0 +1,112 @@
+//! The first zero of a function along a step.
+//!
+//! Values at five places give a polynomial of degree four, which is what a linear function of the step's continuous extension is. Where its Bernstein
+//! coefficients have one sign there is no zero (Farin 2002, sec. 6.3); else the step is halved until a change of sign stands alone, which is then narrowed
+//! down on the function itself (regula falsi, the Illinois way: Dowell & Jarratt 1971).
+
+/// Places of the samples, as fractions.
+pub(crate) const PLACES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+/// How often a step is halved where its end is on the same side, and where it is beyond zero: down to the last digits.
+const DEPTH: usize = 12;
+const DEEPEST: usize = 60;
+
+/// The Bernstein coefficients of the polynomial through five equidistant values.
+fn bernstein(v: &[f64; 5]) -> [f64; 5] {
+    let [a, b, c, d, e] = *v;
+    [
+        a,
+        (-13.0 * a + 48.0 * b - 36.0 * c + 16.0 * d - 3.0 * e) / 12.0,
+        (13.0 * a - 64.0 * b + 120.0 * c - 64.0 * d + 13.0 * e) / 18.0,
+        (-3.0 * a + 16.0 * b - 36.0 * c + 48.0 * d - 13.0 * e) / 12.0,
+        e,
+    ]
+}
+
+/// Whether the polynomial through these values stays on its side of zero, where it may begin at zero.
+pub(crate) fn stays(v: &[f64; 5], side: f64) -> bool {
+    let b = bernstein(v);
+    b[1..].iter().all(|c| c * side > 0.0) && b[0] * side >= 0.0
+}
+
+/// The first place in (from, to] where the function, which begins on `side` of zero (or at zero, leaving to that side), meets zero or is beyond it.
+pub(crate) fn first(
+    v: [f64; 5],
+    side: f64,
+    from: f64,
+    to: f64,
+    f: &mut dyn FnMut(f64) -> f64,
+    depth: usize,
+) -> Option<f64> {
+    if stays(&v, side) {
+        return None;
+    }
+    let b = bernstein(&v);
+    let ends_beyond = v[4] * side <= 0.0;
+    let mut signs = b.iter().map(|c| c * side).filter(|c| *c != 0.0).map(|c| c > 0.0).collect::<Vec<_>>();
+    signs.dedup();
+    if ends_beyond && v[0] * side > 0.0 && signs.len() <= 2 {
+        return Some(narrow(from, v[0], to, v[4], side, f));
+    }
+    if depth >= if ends_beyond { DEEPEST } else { DEPTH } {
+        return ends_beyond.then_some(to);
+    }
+    let middle = 0.5 * (from + to);
+    let quarter = 0.25 * (to - from);
+    let (p, q) = (f(from + 0.5 * quarter), f(from + 1.5 * quarter));
+    if let Some(found) = first([v[0], p, v[1], q, v[2]], side, from, middle, f, depth + 1) {
+        return Some(found);
+    }
+    let (p, q) = (f(middle + 0.5 * quarter), f(middle + 1.5 * quarter));
+    first([v[2], p, v[3], q, v[4]], side, middle, to, f, depth + 1)
+}
+
+/// Narrows a change of sign down to the last digits; the place given is at zero or beyond it.
+fn narrow(mut a: f64, mut fa: f64, mut b: f64, mut fb: f64, side: f64, f: &mut dyn FnMut(f64) -> f64) -> f64 {
+    for _ in 0..100 {
+        if fb == 0.0 || b - a <= 4.0 * f64::EPSILON * b.abs() {
+            break;
+        }
+        let mut c = b - fb * (b - a) / (fb - fa);
+        if !(c > a && c < b) {
+            c = 0.5 * (a + b);
+        }
+        if !(c > a && c < b) {
+            break;
+        }
+        let fc = f(c);
+        if fc * side > 0.0 {
+            a = c;
+            fa = fc;
+            fb *= 0.5;
+        } else {
+            b = c;
+            fb = fc;
+            fa *= 0.5;
+        }
+    }
+    b
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn find(f: impl Fn(f64) -> f64, side: f64) -> Option<f64> {
+        first(PLACES.map(&f), side, 0.0, 1.0, &mut |x| f(x), 0)
+    }
+
+    #[test]
+    fn the_first_of_several_is_found() {
+        let near = |found: Option<f64>, want: f64| assert!((found.unwrap() - want).abs() < 1e-14, "{found:?}");
+        near(find(|x| (x - 0.3) * (x - 0.9), 1.0), 0.3);
+        near(find(|x| (x - 0.61) * (x - 0.62), 1.0), 0.61);
+        near(find(|x| 0.2 - x, 1.0), 0.2);
+        near(find(|x| x - 1.0, -1.0), 1.0);
+        // Two zeros between two samples.
+        near(find(|x| (x - 0.30) * (x - 0.31) * (1.0 + x), 1.0), 0.3);
+        assert_eq!(find(|x| (x - 0.3) * (x - 0.3) + 1e-6, 1.0), None);
+        // From zero, leaving.
+        assert_eq!(find(|x| x, 1.0), None);
+        near(find(|x| x * (0.5 - x), 1.0), 0.5);
+    }
+}

@@ -1,0 +1,330 @@
+//! Known results, each by formula or by an independent program.
+
+use crate::motion::Outcome;
+use crate::motion::{Exit, Record};
+use crate::{Definition, Ending, HybridError, Model, Options, follow};
+
+fn model(text: &str) -> Model {
+    Model::new(Definition::from_toml(text, "test.toml").unwrap_or_else(|e| panic!("{e}")))
+}
+
+/// The events of a run with their times, and how it ends.
+fn run(model: &Model, t_end: f64) -> (Vec<(f64, String)>, Result<Outcome, HybridError>) {
+    let mut events = Vec::new();
+    let options = Options { t_end, ..Options::default() };
+    let outcome = follow(model, &options, &mut |point| {
+        events.extend(point.event.map(|e| (point.t, e.to_owned())));
+        true
+    });
+    (events, outcome)
+}
+
+fn end(text: &str, t_end: f64) -> Vec<f64> {
+    let (_, outcome) = run(&model(text), t_end);
+    let outcome = outcome.unwrap_or_else(|e| panic!("{e}\n{text}"));
+    assert_eq!(outcome.ending, Ending::Finished, "{text}");
+    outcome.x
+}
+
+fn near(found: f64, want: f64, within: f64) {
+    assert!((found - want).abs() <= within, "{found} is not {want} to {within:e}");
+}
+
+fn shipped(name: &str) -> Model {
+    let text = twofold_system::library::general(name).unwrap();
+    let mut model = model(text);
+    for (table, entry) in model.definition().tables().to_vec() {
+        model = model.with_table(&table, twofold_system::library::table(&entry.file).unwrap()).unwrap();
+    }
+    model
+}
+
+#[test]
+fn every_general_system_that_ships_is_read_and_followed() {
+    for name in twofold_system::library::general_names() {
+        let model = shipped(name);
+        assert_eq!(model.definition().name(), name);
+        assert!(!model.definition().title().is_empty() && !model.definition().document().references.is_empty());
+        let t_end = if name == "buck-ramp" { 0.01 } else { 5.0 };
+        run(&model, t_end).1.unwrap_or_else(|e| panic!("{name}: {e}"));
+    }
+}
+
+/// Impacts accumulate at sqrt(2 h/g) (1 + r)/(1 - r).
+#[test]
+fn a_ball_comes_to_rest_when_its_impacts_accumulate() {
+    let zeno = (2.0_f64 / 9.81).sqrt() * 1.8 / 0.2;
+    let (events, outcome) = run(&shipped("bouncing-ball"), 10.0);
+    let outcome = outcome.unwrap();
+    let (t, name) = events.last().unwrap();
+    assert_eq!((name.as_str(), outcome.ending), ("impact at rest", Ending::Finished));
+    near(*t, zeno, 1e-11);
+    near(outcome.x[0], 0.0, 1e-15);
+    assert_eq!(outcome.x[1], 0.0);
+    // Without a word about what comes after: it ends there, with a bound that holds.
+    let text = twofold_system::library::general("bouncing-ball").unwrap().replace("after_zeno = \"stick\"\n", "");
+    let Ending::Zeno { event, t, error } = run(&model(&text), 10.0).1.unwrap().ending else {
+        panic!("no accumulation")
+    };
+    assert_eq!(event, "impact");
+    assert!((t - zeno).abs() <= error + 1e-11 && error < 1e-9, "{t} {error}");
+}
+
+/// Inelastic impacts rest at once; a table that moves lets go where it falls faster than the ball.
+#[test]
+fn contacts_open_where_the_surface_falls_away() {
+    let ball = |r: &str| {
+        format!(
+            "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-1']\n[let]\ntable = '0.5*sin(2*t)'\n[[event]]\nwhen = 'x - table'\ndirection = 'down'\n\
+             set = {{ v = 'cos(2*t) - {r}*(v - cos(2*t))' }}\nafter_zeno = 'stick'"
+        )
+    };
+    // At rest the ball moves with the table and leaves where the table's acceleration, -2 sin(2 t), falls below -1: 2 t = pi/6 (mod 2 pi).
+    let model = model(&ball("0"));
+    let mut rows = Vec::new();
+    let options = Options { t_end: 5.0, record: Record::Times { every: 0.01 }, ..Options::default() };
+    follow(&model, &options, &mut |p| {
+        rows.push((p.t, p.x[0], p.x[1], p.event.map(str::to_owned)));
+        true
+    })
+    .unwrap();
+    let resting: Vec<f64> = rows
+        .iter()
+        .filter(|(t, x, v, _)| (x - 0.5 * (2.0 * t).sin()).abs() < 1e-9 && (v - (2.0 * t).cos()).abs() < 1e-9)
+        .map(|(t, ..)| *t)
+        .collect();
+    assert!(resting.len() > 20, "{resting:?}");
+    // Between two rests the ball flies on the parabola of the moment it left.
+    let leave = std::f64::consts::PI + std::f64::consts::PI / 12.0;
+    let free = rows.iter().find(|(t, ..)| *t > leave + 0.3).unwrap();
+    let s = free.0 - leave;
+    near(free.1, 0.25 + 3.0_f64.sqrt() / 2.0 * s - 0.5 * s * s, 1e-9);
+}
+
+/// The period is ln((high - cold)/(high - warm))/k + ln((warm - low)/(cold - low))/k = 20 ln 1.5.
+#[test]
+fn a_thermostat_has_its_period() {
+    let (events, _) = run(&shipped("relay-hysteresis"), 100.0);
+    let on: Vec<f64> = events.iter().filter(|(_, e)| e == "too cold").map(|(t, _)| *t).collect();
+    let period = 20.0 * 1.5_f64.ln();
+    near(on[0], period, 1e-9);
+    near(on[on.len() - 1] - on[on.len() - 3], period, 1e-9);
+}
+
+/// On the line s = 0 the motion is x' = -lambda x, whatever the disturbance.
+#[test]
+fn sliding_control_decays_as_its_line_says() {
+    let model = shipped("sliding-mode-control");
+    let mut rows = Vec::new();
+    let options = Options { t_end: 8.0, record: Record::Times { every: 1.0 }, ..Options::default() };
+    follow(&model, &options, &mut |p| {
+        rows.push((p.x[0], p.x[1], p.signs.to_owned()));
+        true
+    })
+    .unwrap();
+    for pair in rows.windows(2).skip(2) {
+        assert_eq!(pair[0].2, "0");
+        near(pair[1].0 / pair[0].0, (-1.0_f64).exp(), 1e-9);
+        near(pair[1].0 + pair[1].1, 0.0, 1e-14);
+    }
+}
+
+/// McGeer (1990): just after an impact w^2 = c^2 4 (g/l) sin(alpha) sin(slope)/(1 - c^2), c = cos(2 alpha).
+#[test]
+fn a_rimless_wheel_walks_with_its_speed() {
+    let model = shipped("rimless-wheel");
+    let (_, outcome) = run(&model, 60.0);
+    assert!(outcome.unwrap().events > 50);
+    let mut after = 0.0;
+    follow(&model, &Options { t_end: 60.0, ..Options::default() }, &mut |p| {
+        after = p.event.map_or(after, |_| p.x[1]);
+        true
+    })
+    .unwrap();
+    let (alpha, slope) = (std::f64::consts::PI / 8.0, 0.08_f64);
+    let c = (2.0 * alpha).cos();
+    near(after, (c * c * 4.0 * 9.81 * alpha.sin() * slope.sin() / (1.0 - c * c)).sqrt(), 1e-8);
+}
+
+/// The steady amplitude without a wall is 1/sqrt((1 - w^2)^2 + (2 zeta w)^2): a wall a little farther is never met, a little nearer is.
+#[test]
+fn a_wall_beyond_the_amplitude_is_not_met() {
+    let (w, zeta) = (2.8_f64, 0.05_f64);
+    let amplitude = 1.0 / ((1.0 - w * w).powi(2) + (2.0 * zeta * w).powi(2)).sqrt();
+    let phase = (2.0 * zeta * w).atan2(1.0 - w * w);
+    let start = format!("start = [{:e}, {:e}]", amplitude * phase.cos(), amplitude * w * phase.sin());
+    let text = twofold_system::library::general("impact-oscillator").unwrap().replace("start = [0, 0]", &start);
+    let impacts = |wall: f64| run(&model(&text).with("wall", wall).unwrap(), 100.0).1.unwrap().events;
+    assert_eq!(impacts(amplitude * (1.0 + 1e-7)), 0);
+    assert!(impacts(amplitude * (1.0 - 1e-7)) > 0);
+}
+
+/// SciPy 1.17.1: DOP853 with rtol 1e-12 from switch to switch by its events.
+#[test]
+fn numbers_are_scipys() {
+    let x = end("states = ['x', 'v']\nstart = [0, 0]\nf = ['v', '-x + 0.5*sin(t) - 0.3*sign(v - 0.1)']", 5.0);
+    near(x[0], 0.01399237, 1e-8);
+    near(x[1], -0.5056829, 1e-7);
+}
+
+/// (equations, end time, last state)
+#[test]
+fn switching_functions_mean_what_they_say() {
+    let pi = std::f64::consts::PI;
+    for (f, t, want) in [
+        ("floor(t)", 5.0, 10.0),
+        ("mod(t, 2)", 5.0, 4.5),
+        ("mod(-t, 2)", 3.0, 3.5),
+        ("if(abs(t - 5) < 1e-6, 1e6, 0)", 10.0, 2.0),
+        ("if(t > 1 and not (t > 3) or t > 4, 1, 0)", 5.0, 3.0),
+        ("max(t, 2, 4 - t)", 5.0, 6.0 + 10.5),
+        ("clip(t, 1, 3)", 5.0, 1.0 + 4.0 + 6.0),
+        ("heaviside(t - 2) + (t > 3)", 5.0, 5.0),
+        ("abs(t - 2)", 5.0, 2.0 + 4.5),
+        ("atan2(sin(t), cos(t))", 2.0 * pi, 0.0),
+        ("sinh(t) + cosh(t)", 1.0, 1.0_f64.exp() - 1.0),
+        ("asin(t) + acos(t)", 1.0, pi / 2.0),
+        ("t^1.5 + log10(10^t) + log(exp(t))", 1.0, 0.4 + 0.5 + 0.5),
+        ("sign(sin(pi*t))", 5.5, 0.5),
+    ] {
+        let x = end(&format!("states = ['x']\nstart = [0]\nf = ['{f}']"), t);
+        near(x[0], want, 2e-9);
+    }
+}
+
+/// Systems in other units move the same way: states by any factor, switching functions by any positive number.
+#[test]
+fn units_change_nothing() {
+    let text = |unit: f64, scale: f64| {
+        format!(
+            "states = ['x', 'v']\nstart = [{:e}, 0]\nf = ['v', '-x - {unit:e}*0.3*sign({scale:e}*(v - {unit:e}*0.1)) + {unit:e}*sin(2*t)']\n\
+             [[event]]\nwhen = '{scale:e}*(x - {unit:e}*1.2)'\ndirection = 'up'\nset = {{ v = '-0.7*v' }}",
+            unit * 0.5
+        )
+    };
+    let plain = end(&text(1.0, 1.0), 20.0);
+    for unit in [1e-12, 1e-6, 1e6, 1e12] {
+        for scale in [1e-12, 1.0, 1e12] {
+            let x = end(&text(unit, scale), 20.0);
+            near(x[0] / unit, plain[0], 1e-8);
+            near(x[1] / unit, plain[1], 1e-8);
+        }
+    }
+}
+
+#[test]
+fn what_is_not_decided_is_said_with_the_ways() {
+    let text = "states = ['x', 'y']\nstart = [0, 0]\nf = ['sign(x)', '1']";
+    let error = run(&model(text), 1.0).1.unwrap_err();
+    assert!(error.to_string().contains("x = 0") && error.to_string().contains("+ or - or 0"), "{error}");
+    for (exit, want) in [(Exit::Plus, 1.0), (Exit::Minus, -1.0)] {
+        let options = Options { t_end: 1.0, exit, ..Options::default() };
+        near(follow(&model(text), &options, &mut |_| true).unwrap().x[0], want, 1e-12);
+    }
+}
+
+/// Two relays that know nothing of each other, met together: each does what it does alone (twisting, corner, sliding on both).
+#[test]
+fn surfaces_that_are_met_together_are_decided_together() {
+    let x = end("states = ['x', 'y']\nstart = [1, 1]\nf = ['-sign(x)', '-sign(y)']", 3.0);
+    assert!(x[0].abs() < 1e-14 && x[1].abs() < 1e-14, "{x:?}");
+    let x = end("states = ['x', 'y']\nstart = [1, 1]\nf = ['-2 + sign(x)', '-2 - sign(y)']", 2.0);
+    near(x[0], -3.0, 1e-12);
+    // Reaches y = 0 after 1/3 at -3, then goes on at -1.
+    near(x[1], -(2.0 - 1.0 / 3.0), 1e-12);
+    // Sliding on x = 0 meets y = 0 and slides on both.
+    let x = end(
+        "states = ['x', 'y', 'z']\nstart = [0.5, 2, 0]\nf = ['-sign(x) + 0.5', '-sign(y)', 'sign(x) + sign(y)']",
+        5.0,
+    );
+    assert!(x[0].abs() < 1e-14 && x[1].abs() < 1e-14, "{x:?}");
+    // z: 2 until x = 0 at t = 1, then 0.5 + 1 until y = 0 at t = 2, then 0.5.
+    near(x[2], 2.0 + 1.5 + 1.5, 1e-9);
+}
+
+/// A block in a chain sticks or not, whatever its hundred neighbours do; nothing is done for each pair.
+#[test]
+fn fifty_blocks_on_a_belt() {
+    let n = 50;
+    let states: Vec<String> = (0..n).map(|i| format!("'x{i}'")).chain((0..n).map(|i| format!("'v{i}'"))).collect();
+    let start: Vec<String> =
+        (0..n).map(|i| format!("{}", 0.01 * f64::from(i))).chain((0..n).map(|_| "0".into())).collect();
+    let mut f: Vec<String> = (0..n).map(|i| format!("'v{i}'")).collect();
+    for i in 0..n {
+        let left = if i > 0 { format!("x{} - x{i}", i - 1) } else { format!("-x{i}") };
+        let right = if i + 1 < n { format!(" + x{} - x{i}", i + 1) } else { String::new() };
+        f.push(format!("'{left}{right} - 0.5*sign(v{i} - 0.1) - 0.05*v{i}'"));
+    }
+    let text = format!("states = [{}]\nstart = [{}]\nf = [{}]", states.join(", "), start.join(", "), f.join(", "));
+    let x = end(&text, 2.0);
+    // The middle moves with the belt from the time v = 0.1 is reached, at about 0.2.
+    near(x[n as usize + 25], 0.1, 1e-12);
+    near(x[26] - x[25], 0.01, 1e-9);
+}
+
+#[test]
+fn events_happen_in_the_files_order_and_see_old_values() {
+    let text = "states = ['x', 'y']\nstart = [0, 0]\nf = ['1', '0']\n\
+        [[event]]\nname = 'a'\nwhen = 'x - 1'\nset = { x = 'y - 5', y = 'x + 10' }\n\
+        [[event]]\nname = 'b'\nwhen = 'x - 1'\nset = { y = 'y + 1' }\n\
+        [[event]]\nname = 'c'\nat = [2, 3]\n[[event]]\nname = 'd'\nevery = 1\n[[event]]\nname = 'e'\nwhen = 'x > -3'\nstop = true";
+    let (events, outcome) = run(&model(text), 9.0);
+    let outcome = outcome.unwrap();
+    let names: Vec<&str> = events.iter().map(|(_, e)| e.as_str()).collect();
+    assert_eq!(names, ["a", "b", "d", "b", "c", "d", "c", "d", "e"]);
+    assert_eq!(outcome.ending, Ending::Stopped("e".into()));
+    near(outcome.t, 3.0, 1e-12);
+    near(outcome.x[0], -3.0, 1e-12);
+    near(outcome.x[1], 1.0, 1e-12);
+}
+
+/// What is zero at the start happens when it is next met.
+#[test]
+fn an_event_that_is_zero_at_the_start_waits() {
+    let text = "states = ['x', 'v']\nstart = [0, 1]\nf = ['v', '-x']\n[[event]]\nwhen = 'x'\nstop = true";
+    near(run(&model(text), 9.0).1.unwrap().t, std::f64::consts::PI, 1e-9);
+}
+
+#[test]
+fn the_end_of_a_domain_is_named() {
+    let error = run(&model("states = ['x']\nstart = [4]\nf = ['-sqrt(x) - 1']"), 5.0).1.unwrap_err();
+    let HybridError::Domain { t, what, .. } = error else { panic!("{error}") };
+    near(t, 2.0 * (2.0 - 3.0_f64.ln()), 1e-8);
+    assert!(what.contains("square root") && what.contains("-sqrt(x) - 1"), "{what}");
+    // A branch that motion never reaches is never computed.
+    let x = end("states = ['x']\nstart = [1]\nf = ['if(x > 0, -x, sqrt(x))']", 5.0);
+    near(x[0], (-5.0_f64).exp(), 1e-10);
+}
+
+#[test]
+fn errors_point_into_the_file() {
+    for (text, place, message, help) in [
+        ("states = ['x']\nf = ['if(x, 1, 2)']", "2:10", "a condition is wanted", "x > 0"),
+        ("states = ['x']\nf = ['max(x)']", "2:7", "2 arguments or more; 1 given", ""),
+        ("states = ['x']\nf = ['x == 1']", "2:9", "equality", "[[event]]"),
+        ("states = ['x']\nf = ['0 < x < 1']", "2:13", "two comparisons", "0 < x and x < 1"),
+        ("states = ['x']\nf = ['x', '1']", "2:5", "2 expressions for 1 states", ""),
+        ("states = ['x']\nf = ['y']", "2:7", "unknown name `y`", ""),
+        ("states = ['t']\nf = ['1']", "1:11", "meaning of its own", ""),
+        ("states = ['x']\nf = ['1']\n[[event]]\nset = { x = '0' }", "3:1", "not said when", "when, at or every"),
+        ("states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x'\nset = { y = '0' }", "5:13", "no state `y`", "states are x"),
+        ("states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x > 1'\ndirection = 'up'", "5:13", "becomes true", ""),
+        ("states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x'\nmode = 'on'", "5:8", "no mode `on`", ""),
+        ("states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x'\nafter_zeno = 'stick'", "5:14", "sets one state", ""),
+        ("states = ['x']\nf = ['1']\nevnt = 3", "3:1", "unknown field `evnt`", "did you mean `event`?"),
+        (
+            "states = ['x']\nf = ['wind']\n[tables.wind]\nfile = '../wind.csv'\ntime = 't'\ncolumn = 'v'",
+            "4:8",
+            "beside the system's",
+            "",
+        ),
+        ("states = ['x']\nf = ['a']\n[let]\na = 'b'\nb = 'a'", "4:5", "depends on itself", ""),
+        ("states = ['x']\nf = ['1']\n[parameters]\na = 't'", "4:5", "does not depend on the time", ""),
+    ] {
+        let error = Definition::from_toml(text, "f").expect_err(text);
+        let found = format!("{}:{}", error.line, error.column);
+        assert!(error.message.contains(message), "{text}\n{error}");
+        assert_eq!(found, place, "{text}\n{error}");
+        assert!(error.help.clone().unwrap_or_default().contains(help), "{text}\n{error}");
+    }
+}

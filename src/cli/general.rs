@@ -1,0 +1,187 @@
+//! Runs of general systems: which flags describe them, and how they are computed and delivered.
+
+use std::path::Path;
+
+use super::CliError;
+use super::flags::RunFlags;
+use crate::hybrid::definition::is_general;
+use crate::hybrid::motion::{Exit as Side, Record};
+use crate::hybrid::{Definition, HybridError, Model, Options};
+use crate::job::JobError;
+use crate::job::general::GeneralRun;
+use crate::record::files::read_text;
+use crate::system::Expression;
+
+/// Flags that have an effect on the run of a general system.
+const WORK: [&str; 12] = [
+    "--system",
+    "--set",
+    "--start",
+    "--t-start",
+    "--t-end",
+    "--method",
+    "--rtol",
+    "--atol",
+    "--max-step",
+    "--max-steps",
+    "--exit",
+    "--section",
+];
+
+fn usage(text: String) -> CliError {
+    CliError::Usage(text)
+}
+
+/// The general system that the flags name, if they name one.
+///
+/// # Errors
+/// If its file cannot be read or understood.
+pub fn model(flags: &RunFlags) -> Result<Option<Model>, CliError> {
+    let Some(name) = flags.system.as_deref() else { return Ok(None) };
+    let (definition, folder) = match crate::system::library::general(name) {
+        Some(text) => (Definition::from_toml(text, name), None),
+        None => {
+            let path = Path::new(name);
+            if crate::system::System::builtin(name).is_some() || !path.is_file() {
+                return Ok(None);
+            }
+            let text = read_text(path)?;
+            let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+            if !is_general(&text, json) {
+                return Ok(None);
+            }
+            let read = if json { Definition::from_json(&text, name) } else { Definition::from_toml(&text, name) };
+            (read, path.parent())
+        }
+    };
+    let wrong = |problem: String| usage(format!("--system {name}: {problem}"));
+    let mut model = Model::new(definition.map_err(|e| wrong(e.to_string()))?);
+    for (table, entry) in model.definition().tables().to_vec() {
+        let text = match folder {
+            Some(folder) => read_text(&folder.join(&entry.file))?,
+            None => crate::system::library::table(&entry.file).unwrap_or_default().to_owned(),
+        };
+        model = model.with_table(&table, &text).map_err(|e| wrong(e.to_string()))?;
+    }
+    for text in &flags.set {
+        let refused = |problem: String| usage(format!("--set \"{text}\": {problem}"));
+        let Some((parameter, value)) = text.split_once('=') else {
+            return Err(refused("there is no \"=\"; give it as NAME=VALUE, such as alpha=0.2".into()));
+        };
+        let value: f64 = value.trim().parse().map_err(|_| {
+            refused(format!("`{}` is not a decimal number; write it like 0.25, -3 or 1e-5", value.trim()))
+        })?;
+        model = model.with(parameter.trim(), value).map_err(|e| refused(e.to_string()))?;
+    }
+    model.values().map_err(|e| wrong(e.to_string()))?;
+    Ok(Some(model))
+}
+
+/// The run of a general system that the flags describe, if they name one.
+///
+/// # Errors
+/// If a flag has no effect on it, or a value is wrong.
+pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
+    let Some(model) = model(flags)? else { return Ok(None) };
+    let recording = ["--chord", "--every"];
+    if let Some(flag) = flags.given().into_iter().find(|f| !WORK.contains(f) && !recording.contains(f)) {
+        let why = match flag {
+            "--switch" => {
+                "a general system is followed exactly, from switch to switch; leave it out, or write the system with h, plus and minus"
+            }
+            _ => "it belongs to systems with one or two switching surfaces (h, plus, minus); leave it out",
+        };
+        return Err(CliError::no_effect(flag, why));
+    }
+    if let Some(method) = flags.method
+        && method != super::words::Method::Dopri5
+    {
+        return Err(usage("--method: general systems are followed by dopri5; leave it out".into()));
+    }
+    let positive = |flag: &str, value: Option<f64>| match value {
+        Some(v) if !(v.is_finite() && v > 0.0) => Err(usage(format!("{flag} {v}: give a finite number above 0"))),
+        other => Ok(other),
+    };
+    let defaults = Options::default();
+    let record = match (&flags.section, flags.every, flags.chord) {
+        (Some(_), Some(_), _) => {
+            return Err(CliError::no_effect(
+                "--every",
+                "crossings of a section are not thinned; leave one of the two out",
+            ));
+        }
+        (Some(_), _, Some(_)) => {
+            return Err(CliError::no_effect(
+                "--chord",
+                "it belongs to a recorded path; leave it out, or leave out --section",
+            ));
+        }
+        (_, Some(_), Some(_)) => {
+            return Err(CliError::no_effect(
+                "--chord",
+                "--every says which points are recorded; leave one of the two out",
+            ));
+        }
+        (Some(text), ..) => Record::Section(section(text, &model)?),
+        (None, Some(every), _) => Record::Times { every: positive("--every", Some(every))?.unwrap_or(every) },
+        (None, None, chord) => Record::Path { chord: positive("--chord", chord)?.unwrap_or(1e-3) },
+    };
+    let exit = match flags.exit.as_deref() {
+        None => Side::Undecided,
+        Some("at-once:plus") => Side::Plus,
+        Some("at-once:minus") => Side::Minus,
+        Some(other) => {
+            return Err(usage(format!("--exit \"{other}\": of a general system give at-once:plus or at-once:minus")));
+        }
+    };
+    if let Some(start) = &flags.start
+        && start.len() != model.coordinates().len()
+    {
+        let states = model.coordinates().join(", ");
+        return Err(usage(format!(
+            "--start has {} numbers; give {}, one for each of {states}",
+            start.len(),
+            model.coordinates().len()
+        )));
+    }
+    let options = Options {
+        t_start: flags.t_start.unwrap_or(0.0),
+        t_end: flags.t_end.unwrap_or(150.0),
+        start: flags.start.clone(),
+        rtol: positive("--rtol", flags.rtol)?.unwrap_or(defaults.rtol),
+        atol: positive("--atol", flags.atol)?,
+        max_step: positive("--max-step", flags.max_step)?.unwrap_or(defaults.max_step),
+        max_steps: flags.max_steps.unwrap_or(defaults.max_steps),
+        record,
+        exit,
+    };
+    Ok(Some(GeneralRun { model, options }))
+}
+
+/// Reads "x - y = 0".
+fn section(text: &str, model: &Model) -> Result<Expression, CliError> {
+    let wrong = |problem: &str| {
+        usage(format!("--section \"{text}\": {problem}; give an equation such as {}=0", model.coordinates()[0]))
+    };
+    let (left, right) = text.split_once('=').ok_or_else(|| wrong("there is no \"=\""))?;
+    let definition = model.definition();
+    let terms = definition.document().terms.0.iter().map(|(n, _)| n.as_str());
+    let tables = definition.tables().iter().map(|(n, _)| n.as_str());
+    let parameters = definition.parameters().iter().map(|p| p.name.as_str());
+    let names: Vec<&str> = model.coordinates().into_iter().chain(parameters).chain(terms).chain(tables).collect();
+    let read = |side: &str| {
+        let parsed = Expression::parse_general(side, &names)
+            .map_err(|e| wrong(&format!("{}{}", e.message, e.help.map_or(String::new(), |h| format!(" ({h})")))))?;
+        if parsed.is_condition() { Err(wrong("a condition is no number")) } else { Ok(parsed) }
+    };
+    let (left, right) = (read(left.trim())?, read(right.trim())?);
+    Ok(Expression::Sub(Box::new(left), Box::new(right)))
+}
+
+/// What a failed run says under the command line.
+pub fn failed(error: HybridError) -> CliError {
+    match error {
+        HybridError::Equation(_) | HybridError::Start(_) | HybridError::Bad(_) => usage(error.to_string()),
+        other => CliError::Job(JobError::Other(other.to_string())),
+    }
+}
