@@ -396,7 +396,7 @@ impl Definition {
     /// ```
     /// use twofold_hybrid::Definition;
     /// let error = Definition::from_toml("states = ['x']\nf = ['if(x, 1, 2)']", "my.toml").unwrap_err();
-    /// assert_eq!(error.to_string().lines().nth(1), Some(" --> my.toml:2:10"));
+    /// assert_eq!(error.to_string().lines().nth(1), Some("  --> my.toml:2:10"));
     /// ```
     pub fn from_toml(text: &str, origin: &str) -> Result<Self, Diagnostic> {
         let at = |message: String, span: Range<usize>, help| Diagnostic::new(message, origin, text, span, help);

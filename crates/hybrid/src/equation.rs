@@ -50,6 +50,9 @@ pub struct Compiled {
     pub active: Vec<usize>,
     /// Number of values of `watched`.
     pub outputs: usize,
+    /// What can be flat where a step looks and steep elsewhere, and the program of its arguments.
+    pub(crate) gates: Vec<Gate>,
+    pub(crate) gate_arguments: Program,
     tape: Tape,
 }
 
@@ -310,10 +313,13 @@ impl Equation {
             outputs
         });
         let outputs = n + active.len() + self.watched.len();
+        let gates = gates(&tape.select(0..n));
         Compiled {
             field: Program::new(&tape.select(0..n)),
             watched: Program::new(&tape.select(n..outputs)),
             outputs: outputs - n,
+            gate_arguments: Program::new(&with_outputs(&tape, gates.iter().map(|(_, a)| *a).collect())),
+            gates: gates.into_iter().map(|(gate, _)| gate).collect(),
             active,
             tape,
         }
@@ -348,6 +354,66 @@ impl Equation {
         }
         None
     }
+}
+
+/// An operation that can be flat where a step looks and steep elsewhere, by its argument.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Gate {
+    /// tanh, erf, atan: flat beyond this argument.
+    Step(f64),
+    /// Nothing below this argument.
+    Exp,
+    /// Sine and cosine.
+    Wave,
+    /// A divisor, or the argument of a root or logarithm: smooth in its own scale.
+    Scale,
+}
+
+impl Gate {
+    /// Whether it does nothing that a step could miss while its argument is between these numbers.
+    pub fn is_quiet(self, low: f64, high: f64) -> bool {
+        let width = high - low;
+        match self {
+            Gate::Step(flat) => width <= 1.0 || low >= flat || high <= -flat,
+            Gate::Exp => width <= 1.0 || high <= -40.0,
+            Gate::Wave => width <= 3.0,
+            Gate::Scale => low.abs().max(high.abs()) <= 8.0 * low.abs().min(high.abs()) && low * high > 0.0,
+        }
+    }
+}
+
+/// The gates of a function's needed operations that depend on a variable, with their arguments.
+fn gates(tape: &Tape) -> Vec<(Gate, usize)> {
+    use twofold_num::tape::Operation::{Atan, Cos, Div, Erf, Exp, Ln, Sin, Sqrt, Tanh, Variable};
+    let needed = tape.needed();
+    let mut varies = vec![false; tape.operations().len()];
+    let mut found: Vec<(Gate, usize)> = Vec::new();
+    for (node, operation) in tape.operations().iter().enumerate() {
+        varies[node] = matches!(operation, Variable(_)) || operation.arguments().any(|a| varies[a]);
+        let gate = match *operation {
+            Tanh(a) => (Gate::Step(10.0), a),
+            Erf(a) => (Gate::Step(4.2), a),
+            Atan(a) => (Gate::Step(1e3), a),
+            Exp(a) => (Gate::Exp, a),
+            Sin(a) | Cos(a) => (Gate::Wave, a),
+            Div(_, a) | Sqrt(a) | Ln(a) => (Gate::Scale, a),
+            _ => continue,
+        };
+        if needed[node] && varies[gate.1] && !found.contains(&gate) {
+            found.push(gate);
+        }
+    }
+    found
+}
+
+/// The same operations with these as values.
+fn with_outputs(tape: &Tape, nodes: Vec<usize>) -> Tape {
+    Tape::record(tape.variables(), |v| {
+        let mut values = Vec::new();
+        let mut replay = twofold_num::tape::Replay::new(tape, v);
+        values.extend(nodes.into_iter().map(|node| replay.operation(node)));
+        values
+    })
 }
 
 /// Whether any equation of a system has a switching function.

@@ -329,6 +329,26 @@ pub fn follow(
     Follower::new(model, options)?.run(observe)
 }
 
+/// What each state's error is measured by in a step.
+fn scale_now(follower: &Follower, step: &Step) -> Vec<f64> {
+    let options = follower.options;
+    let span = options.t_end - options.t_start;
+    let scale = |i: usize| {
+        let size = step.x[i].abs().max(step.y[i].abs());
+        match options.atol {
+            Some(atol) => atol + options.rtol * size,
+            // By the state's own size; from zero on by what it moves in this step, or in a millionth of the run.
+            None => {
+                let moved = (step.y[i] - step.x[i]).abs();
+                let speed = step.k.iter().map(|k| k[i].abs()).fold(0.0, f64::max);
+                let least = (0.1 * moved).max(1e-6 * span * speed);
+                options.rtol * size.max(0.01 * follower.size[i]).max(least) + f64::MIN_POSITIVE
+            }
+        }
+    };
+    (0..step.x.len()).map(scale).collect()
+}
+
 fn same(a: &[f64], b: &[f64]) -> bool {
     let close = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-13 * (a.abs() + b.abs());
     a.iter().zip(b).all(close)
@@ -794,21 +814,21 @@ impl<'a> Follower<'a> {
             let error = loop {
                 let follower = &mut self;
                 step.take(wanted, &mut |t, x, out| follower.rhs(t, x, out));
-                let (rtol, atol) = (self.options.rtol, self.options.atol);
-                let (size, span) = (&self.size, self.options.t_end - self.options.t_start);
-                let scale = |i: usize| match atol {
-                    Some(atol) => atol + rtol * step.x[i].abs().max(step.y[i].abs()),
-                    // By the state's own size; from zero on by what it moves in this step, or in a millionth of the run.
-                    None => {
-                        let moved = (step.y[i] - step.x[i]).abs();
-                        let speed = step.k.iter().map(|k| k[i].abs()).fold(0.0, f64::max);
-                        let least = (0.1 * moved).max(1e-6 * span * speed);
-                        rtol * step.x[i].abs().max(step.y[i].abs()).max(0.01 * size[i]).max(least) + f64::MIN_POSITIVE
-                    }
-                };
-                let error = step.error(&scale);
+                let scale = scale_now(follower, &step);
+                let error = step.error(&|i| scale[i]);
                 if error <= 1.0 {
-                    break error;
+                    match follower.unseen(&step, &scale) {
+                        None => break error,
+                        // What the step did not see begins there: it is made to end before.
+                        Some(theta) => {
+                            rejected += 1;
+                            wanted *= theta.clamp(0.05, 0.9);
+                            if follower.t + wanted == follower.t || rejected > 200 {
+                                break error;
+                            }
+                            continue;
+                        }
+                    }
                 }
                 rejected += 1;
                 let factor = if error.is_nan() { 0.1 } else { (0.9 * rough_pow(error, -0.2)).clamp(0.1, 0.9) };
@@ -1013,6 +1033,55 @@ impl<'a> Follower<'a> {
         let h1 = if d <= 1e-15 { h0 * 1e3 } else { rough_pow(0.01 / d, 0.2) };
         let h = if h1.is_finite() { (100.0 * h0).min(h1) } else { h0 };
         h.min(span)
+    }
+
+    /// The place in a step before which all is as the step saw it, if there is something that it did not see: an operation that is flat at the step's stages
+    /// and steep between them. Where arguments move far, the field along the continuous extension is compared with the extension's own derivative (the
+    /// defect: Enright 1989).
+    fn unseen(&mut self, step: &Step, scale: &[f64]) -> Option<f64> {
+        let compiled = self.compiled.clone();
+        if compiled.gates.is_empty() || step.h == 0.0 {
+            return None;
+        }
+        let n = self.n;
+        let (mut x, mut out) = (vec![0.0; n], vec![0.0; compiled.gates.len()]);
+        let mut arguments = |follower: &mut Self, theta: f64| {
+            step.at(theta, &mut x);
+            follower.variables[..n].copy_from_slice(&x);
+            follower.variables[n] = step.t + theta * step.h;
+            compiled.gate_arguments.evaluate(&follower.variables, &mut out);
+            out.clone()
+        };
+        let mut open = vec![(0.0, 1.0, 0, arguments(self, 0.0), arguments(self, 1.0))];
+        let mut looked = 0;
+        let (mut at, mut slope, mut field) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        while let Some((a, b, depth, first, last)) = open.pop() {
+            let middle = 0.5 * (a + b);
+            let between = arguments(self, middle);
+            let quiet = compiled.gates.iter().enumerate().all(|(i, gate)| {
+                let (p, q, r) = (first[i], between[i], last[i]);
+                // A parabola's reach beyond its three points.
+                let bend = (0.5 * (p + r) - q).abs() * 0.5;
+                gate.is_quiet(p.min(q).min(r) - bend, p.max(q).max(r) + bend)
+            });
+            if quiet && depth == 0 {
+                return None;
+            }
+            step.at(middle, &mut at);
+            step.slope_at(middle, &mut slope);
+            self.rhs(step.t + middle * step.h, &at, &mut field);
+            looked += 1;
+            let defect =
+                (0..n).map(|i| ((field[i] - slope[i]) * step.h * (b - a) / scale[i]).abs()).fold(0.0, f64::max);
+            if !(defect <= 1e3) {
+                return Some(a.max(0.05));
+            }
+            if !quiet && depth < 14 && looked < 4096 {
+                open.push((middle, b, depth + 1, between.clone(), last));
+                open.push((a, middle, depth + 1, first, between));
+            }
+        }
+        None
     }
 
     fn is_fresh(&self, sought: Sought) -> bool {

@@ -101,6 +101,19 @@ impl Step {
         if self.y.iter().all(|y| y.is_finite()) { (sum / n as f64).sqrt() } else { f64::NAN }
     }
 
+    /// The derivative of the continuous extension at the fraction `theta` of the step.
+    pub fn slope_at(&self, theta: f64, out: &mut [f64]) {
+        let rest = 1.0 - theta;
+        let [a, b, c, d] = &self.extension;
+        for i in 0..out.len() {
+            let inner = c[i] + rest * d[i];
+            let middle = b[i] + theta * inner;
+            // d/dtheta of theta (a + rest (b + theta (c + rest d))).
+            let slope = a[i] + rest * middle + theta * (-middle + rest * (inner - theta * d[i]));
+            out[i] = slope / self.h;
+        }
+    }
+
     /// The state at the fraction `theta` of the step.
     pub fn at(&self, theta: f64, out: &mut [f64]) {
         let rest = 1.0 - theta;

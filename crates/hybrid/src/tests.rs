@@ -192,6 +192,22 @@ fn switching_functions_mean_what_they_say() {
     }
 }
 
+/// Pulses and layers far thinner than a step would be: each has its integral.
+#[test]
+fn what_is_thinner_than_a_step_is_seen() {
+    let root_pi = std::f64::consts::PI.sqrt();
+    for (f, t, want) in [
+        ("1e4*exp(-((t - 5)/1e-4)^2)", 10.0, root_pi),
+        ("exp(-(1e3*(t - 3.3))^2)*1e3 + exp(-(1e4*(t - 7.7))^2)*1e4", 10.0, 2.0 * root_pi),
+        ("(1 - tanh((t - 5)/1e-5)^2)/1e-5", 10.0, 2.0),
+        ("1e-3/((t - 5)^2 + 1e-6)", 10.0, 2.0 * 5000.0_f64.atan()),
+        ("tanh((t - 5)*1e6)", 11.0, 1.0),
+    ] {
+        let x = end(&format!("states = ['x']\nstart = [0]\nf = ['{f}']"), t);
+        near(x[0], want, 1e-6);
+    }
+}
+
 /// Systems in other units move the same way: states by any factor, switching functions by any positive number.
 #[test]
 fn units_change_nothing() {

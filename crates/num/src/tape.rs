@@ -468,6 +468,11 @@ impl<'a> Replay<'a> {
         self.node(self.tape.outputs[i])
     }
 
+    /// The value of one operation of the tape.
+    pub fn operation(&mut self, node: Node) -> Recorded {
+        self.node(node)
+    }
+
     fn node(&mut self, wanted: Node) -> Recorded {
         // Depth first without recursion: a node is written when its arguments have been.
         let mut open = vec![wanted];
