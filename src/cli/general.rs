@@ -10,7 +10,8 @@ use crate::hybrid::{Definition, HybridError, Model, Options};
 use crate::job::JobError;
 use crate::job::general::GeneralRun;
 use crate::record::files::read_text;
-use crate::system::Expression;
+use crate::system::diagnostic::nearest;
+use crate::system::{Expression, library};
 
 /// Flags that have an effect on the run of a general system.
 const WORK: [&str; 12] = [
@@ -37,17 +38,33 @@ fn usage(text: String) -> CliError {
 /// # Errors
 /// If its file cannot be read or understood.
 pub fn model(flags: &RunFlags) -> Result<Option<Model>, CliError> {
-    let Some(name) = flags.system.as_deref() else { return Ok(None) };
-    let (definition, folder) = match crate::system::library::general(name) {
+    flags.system.as_deref().map_or(Ok(None), |name| named(name, &flags.set, false))
+}
+
+/// The system of this name, a general one or one with h, plus and minus read as such.
+///
+/// # Errors
+/// If there is none, or it cannot be understood.
+pub fn any_model(name: &str, set: &[String]) -> Result<Model, CliError> {
+    named(name, set, true)?.ok_or_else(|| {
+        let known: Vec<&str> = library::names().chain(library::general_names()).collect();
+        let near = nearest(name, &known).map_or(String::new(), |near| format!(", did you mean {near}?"));
+        usage(format!("--system {name}: there is no such built-in system{near}; give a file's name for your own"))
+    })
+}
+
+fn named(name: &str, set: &[String], any: bool) -> Result<Option<Model>, CliError> {
+    let path = Path::new(name);
+    let built_in = library::general(name).or_else(|| library::text(name).filter(|_| any));
+    let (definition, folder) = match built_in {
         Some(text) => (Definition::from_toml(text, name), None),
         None => {
-            let path = Path::new(name);
-            if crate::system::System::builtin(name).is_some() || !path.is_file() {
+            if library::text(name).is_some() || !path.is_file() {
                 return Ok(None);
             }
             let text = read_text(path)?;
             let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-            if !is_general(&text, json) {
+            if !any && !is_general(&text, json) {
                 return Ok(None);
             }
             let read = if json { Definition::from_json(&text, name) } else { Definition::from_toml(&text, name) };
@@ -59,11 +76,11 @@ pub fn model(flags: &RunFlags) -> Result<Option<Model>, CliError> {
     for (table, entry) in model.definition().tables().to_vec() {
         let text = match folder {
             Some(folder) => read_text(&folder.join(&entry.file))?,
-            None => crate::system::library::table(&entry.file).unwrap_or_default().to_owned(),
+            None => library::table(&entry.file).unwrap_or_default().to_owned(),
         };
         model = model.with_table(&table, &text).map_err(|e| wrong(e.to_string()))?;
     }
-    for text in &flags.set {
+    for text in set {
         let refused = |problem: String| usage(format!("--set \"{text}\": {problem}"));
         let Some((parameter, value)) = text.split_once('=') else {
             return Err(refused("there is no \"=\"; give it as NAME=VALUE, such as alpha=0.2".into()));

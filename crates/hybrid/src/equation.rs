@@ -150,6 +150,18 @@ impl Equation {
         self.dimension() + 1 + self.guards.len() + 5 * self.tables.len()
     }
 
+    /// Whether a field depends on the time, by itself or through a table.
+    pub fn depends_on_time(&self) -> bool {
+        fn asks(equation: &Equation, e: &Expression) -> bool {
+            e.names().into_iter().any(|name| {
+                name == "t"
+                    || equation.definition.tables.iter().any(|(table, _)| table == name)
+                    || equation.term(name).is_some_and(|term| asks(equation, term))
+            })
+        }
+        self.definition.modes.iter().flat_map(|m| &m.field).any(|e| asks(self, e))
+    }
+
     /// The parameters' values.
     pub fn values(&self) -> &BTreeMap<String, f64> {
         &self.values

@@ -32,6 +32,7 @@ pub mod definition;
 pub mod equation;
 pub mod model;
 pub mod motion;
+pub mod rests;
 mod roots;
 pub mod selection;
 mod step;

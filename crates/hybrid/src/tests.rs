@@ -344,3 +344,26 @@ fn errors_point_into_the_file() {
         assert!(error.help.clone().unwrap_or_default().contains(help), "{text}\n{error}");
     }
 }
+
+/// Equilibria, and pseudo-equilibria with the eigenvalues that a formula gives.
+#[test]
+fn rests_are_found_with_their_stability() {
+    use crate::rests::{Place, rests};
+    // Two foci and a saddle of a double well.
+    let well = model("states = ['x', 'v']\nf = ['v', 'x - x^3 - 0.2*v']");
+    let kinds: Vec<String> = rests(&well, &[(-2.0, 2.0); 2]).unwrap().iter().map(|r| r.kind()).collect();
+    assert_eq!(kinds, ["stable focus", "saddle", "stable focus"]);
+    // Sliding on v = 0.2 with x' = 0.2: no rest. With the belt at rest every x within friction is one: none is isolated.
+    let block = "states = ['x', 'v']\nf = ['v', '-x - sign(v - 0.2)']";
+    assert!(rests(&model(block), &[(-3.0, 3.0); 2]).unwrap().iter().all(|r| r.place == Place::Field));
+    // On x = 0: fields (1, y - 1) below and (-1, y + 3) above: halves cancel in x, so y' = y + 1, which vanishes at -1 and grows.
+    let planar = model("states = ['x', 'y']\nf = ['-sign(x)', 'y + 1 + 2*sign(x)']");
+    let found = rests(&planar, &[(-3.0, 3.0); 2]).unwrap();
+    assert_eq!(found.len(), 1, "{found:?}");
+    near(found[0].x[1], -1.0, 1e-12);
+    near(found[0].eigenvalues[0][0], 1.0, 1e-9);
+    assert!(
+        matches!(&found[0].place, Place::Surface { surface, weight, attracting: true } if surface == "x" && (weight - 0.5).abs() < 1e-12)
+    );
+    assert!(rests(&model("states = ['x']\nf = ['sin(t)']"), &[(-1.0, 1.0)]).unwrap_err().to_string().contains("time"));
+}

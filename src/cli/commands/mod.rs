@@ -12,6 +12,7 @@ mod orbit;
 mod plot;
 mod published;
 mod report;
+mod rests;
 mod run;
 mod scan;
 mod store;
@@ -40,6 +41,7 @@ enum Command {
     Plot(Box<plot::Arguments>),
     Orbit(Box<orbit::Arguments>),
     Lyapunov(Box<lyapunov::Arguments>),
+    Rests(rests::Arguments),
     Scan(Box<scan::Arguments>),
     New(new::Arguments),
     Figure(Box<figure::Arguments>),
@@ -72,6 +74,7 @@ pub fn main() -> ExitCode {
         Command::Plot(arguments) => plot::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Lyapunov(arguments) => lyapunov::run(&arguments),
+        Command::Rests(arguments) => rests::run(&arguments),
         Command::Scan(arguments) => scan::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
         Command::Figure(arguments) => figure::run(&arguments),

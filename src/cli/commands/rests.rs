@@ -1,0 +1,117 @@
+//! `twofold rests`: states that do not move.
+
+use serde_json::json;
+
+use crate::cli::general;
+use crate::cli::speak::{Delivery, deliver, try_delivery};
+use crate::cli::{CliError, Exit, ending};
+use crate::hybrid::rests::{Place, Rest, RestError, rests};
+use crate::job::JobError;
+
+/// Find the rests of a system in a box: equilibria of its fields and pseudo-equilibria on its switching surfaces, with eigenvalues and stability.
+///
+/// Newton's method starts at 400 places of the box; a rest that none of them leads to is not found. Systems with h, plus and minus are read as
+/// general ones; one with a table [second] is refused.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    twofold rests --system gene-switch --within x=0..2 --within y=0..2\n  \
+    twofold rests --system my.toml --set gain=2 --within x=-3..3 --within v=-1..1 --format json")]
+pub struct Arguments {
+    /// A system: a built-in one or a file.
+    #[arg(long, value_name = "NAME|FILE")]
+    system: String,
+    /// Give a parameter of the system another value; may be repeated.
+    #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true)]
+    set: Vec<String>,
+    /// Bounds of a state, such as x=-2..2; may be repeated [default: -10 to 10].
+    #[arg(long, value_name = "STATE=LOW..HIGH", allow_hyphen_values = true)]
+    within: Vec<String>,
+    /// Output format [default: what the name of --out ends in, else text].
+    #[arg(long, value_enum)]
+    format: Option<Format>,
+    #[command(flatten)]
+    delivery: Delivery,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Format {
+    /// A line for each rest.
+    Text,
+    /// Everything.
+    Json,
+}
+
+pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
+    let model = general::any_model(&arguments.system, &arguments.set)?;
+    let names = model.coordinates();
+    let mut within = vec![(-10.0, 10.0); names.len()];
+    for text in &arguments.within {
+        let wrong =
+            |why: &str| CliError::Usage(format!("--within \"{text}\": {why}; give one such as {}=-2..2", names[0]));
+        let (name, range) = text.split_once('=').ok_or_else(|| wrong("there is no \"=\""))?;
+        let (low, high) = range.split_once("..").ok_or_else(|| wrong("there is no \"..\""))?;
+        let state = names.iter().position(|n| *n == name.trim()).ok_or_else(|| wrong("there is no such state"))?;
+        let number = |text: &str| text.trim().parse::<f64>().map_err(|_| wrong("a bound is no number"));
+        within[state] = (number(low)?, number(high)?);
+    }
+    let out = arguments.delivery.out.as_deref();
+    let format = ending::format(out, arguments.format, Format::Text)?;
+    try_delivery(out)?;
+    let found = rests(&model, &within).map_err(|error| match error {
+        RestError::Driven => CliError::Job(JobError::Other(error.to_string())),
+        other => CliError::Usage(other.to_string()),
+    })?;
+    let modes = model.definition().modes();
+    let bytes = match format {
+        Format::Text => {
+            let lines: Vec<String> =
+                found.iter().map(|rest| line(rest, &names, modes.len() > 1, &modes[rest.mode].name)).collect();
+            let none = "no rest was found in the box (--within)".to_owned();
+            format!("{}\n", if lines.is_empty() { none } else { lines.join("\n") }).into_bytes()
+        }
+        Format::Json => {
+            let list: Vec<_> = found
+                .iter()
+                .map(|rest| {
+                    let place = match &rest.place {
+                        Place::Field => json!("field"),
+                        Place::Surface { surface, weight, attracting } => {
+                            json!({ "surface": surface, "weight": weight, "attracting": attracting })
+                        }
+                    };
+                    json!({ "state": rest.x, "mode": modes[rest.mode].name, "place": place, "eigenvalues": rest.eigenvalues, "kind": rest.kind() })
+                })
+                .collect();
+            let about = json!({ "system": model.json(), "within": within });
+            let mut bytes = serde_json::to_vec_pretty(&json!({ "about": about, "states": names, "rests": list }))
+                .expect("plain data");
+            bytes.push(b'\n');
+            bytes
+        }
+    };
+    deliver(out, &bytes)?;
+    Ok(Exit::Fine)
+}
+
+fn line(rest: &Rest, names: &[&str], with_mode: bool, mode: &str) -> String {
+    let state: Vec<String> = names.iter().zip(&rest.x).map(|(n, v)| format!("{n} = {v}")).collect();
+    let mode = if with_mode { format!(", mode {mode}") } else { String::new() };
+    let place = match &rest.place {
+        Place::Field => "equilibrium".to_owned(),
+        Place::Surface { surface, weight, attracting } => {
+            let moves = if *attracting { "attracts" } else { "repels" };
+            format!("pseudo-equilibrium on {surface} = 0, which {moves} (weight {weight})")
+        }
+    };
+    let values: Vec<String> = rest
+        .eigenvalues
+        .iter()
+        .map(|[re, im]| match im {
+            0.0 => format!("{re}"),
+            im if *im < 0.0 => format!("{re} - {}i", -im),
+            im => format!("{re} + {im}i"),
+        })
+        .collect();
+    let values = if values.is_empty() { String::new() } else { format!("; eigenvalues {}", values.join(", ")) };
+    format!("{place}{mode}: {}; {}{values}", state.join(", "), rest.kind())
+}
