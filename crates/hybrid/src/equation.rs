@@ -50,6 +50,8 @@ pub struct Compiled {
     pub active: Vec<usize>,
     /// Number of values of `watched`.
     pub outputs: usize,
+    /// Which variables each value depends on: derivatives, then watched values.
+    depends: Vec<Vec<u64>>,
     /// What can be flat where a step looks and steep elsewhere, and the program of its arguments.
     pub(crate) gates: Vec<Gate>,
     pub(crate) gate_arguments: Program,
@@ -68,6 +70,8 @@ pub struct Equation {
     pub tables: Vec<Table>,
     /// Expressions whose zeros are looked for: events', then a section's.
     pub watched: Vec<Expression>,
+    /// For each event its new values as a program, where no switching function decides them.
+    pub(crate) resets: Vec<Option<Program>>,
     known: std::cell::RefCell<HashMap<Vec<i8>, Rc<Compiled>>>,
 }
 
@@ -126,6 +130,7 @@ impl Equation {
             by_text: HashMap::new(),
             tables,
             watched: watched.clone(),
+            resets: Vec::new(),
             known: Default::default(),
             definition,
         };
@@ -137,12 +142,35 @@ impl Equation {
         for e in &conditions {
             equation.find(e, true)?;
         }
+        equation.resets = equation.definition.events.iter().map(|event| equation.reset(&event.set)).collect();
         Ok(equation)
+    }
+
+    fn reset(&self, set: &[(usize, Expression)]) -> Option<Program> {
+        let whole = |e: &Expression| {
+            let names = e.names();
+            let tables = &self.definition.tables;
+            !asks(e) && names.iter().all(|n| self.term(n).is_none() && !tables.iter().any(|(table, _)| table == n))
+        };
+        if !set.iter().all(|(_, e)| whole(e)) {
+            return None;
+        }
+        let at = Configuration { mode: 0, sides: vec![1.0; self.guards.len()], pieces: Vec::new() };
+        let tape = Tape::record(self.variables(), |v| {
+            let mut writer = Writer { equation: self, at: &at, v, terms: HashMap::new(), guards: BTreeMap::new() };
+            set.iter().map(|(_, e)| writer.number(e)).collect()
+        });
+        Some(Program::new(&tape))
     }
 
     /// Number of states.
     pub fn dimension(&self) -> usize {
         self.definition.states.len()
+    }
+
+    /// Whether a guard chooses between expressions, so that its side changes the structure of the equations.
+    pub(crate) fn chooses(&self, guard: usize) -> bool {
+        self.guards[guard].chooses
     }
 
     /// Number of variables of every program.
@@ -330,6 +358,7 @@ impl Equation {
             field: Program::new(&tape.select(0..n)),
             watched: Program::new(&tape.select(n..outputs)),
             outputs: outputs - n,
+            depends: dependencies(&tape),
             gate_arguments: Program::new(&with_outputs(&tape, gates.iter().map(|(_, a)| *a).collect())),
             gates: gates.into_iter().map(|(gate, _)| gate).collect(),
             active,
@@ -418,6 +447,30 @@ fn gates(tape: &Tape) -> Vec<(Gate, usize)> {
     found
 }
 
+/// For each value the variables that it depends on, as bits.
+fn dependencies(tape: &Tape) -> Vec<Vec<u64>> {
+    let words = tape.variables().div_ceil(64);
+    let mut of: Vec<Vec<u64>> = Vec::with_capacity(tape.operations().len());
+    for operation in tape.operations() {
+        let mut bits = vec![0; words];
+        if let twofold_num::tape::Operation::Variable(i) = operation {
+            bits[i / 64] |= 1 << (i % 64);
+        }
+        for argument in operation.arguments() {
+            bits.iter_mut().zip(&of[argument]).for_each(|(bits, more)| *bits |= more);
+        }
+        of.push(bits);
+    }
+    tape.outputs().iter().map(|node| of[*node].clone()).collect()
+}
+
+impl Compiled {
+    /// Whether a value (derivatives, then watched values) depends on a variable.
+    pub(crate) fn depends(&self, value: usize, variable: usize) -> bool {
+        self.depends[value][variable / 64] & (1 << (variable % 64)) != 0
+    }
+}
+
 /// The same operations with these as values.
 fn with_outputs(tape: &Tape, nodes: Vec<usize>) -> Tape {
     Tape::record(tape.variables(), |v| {
@@ -428,19 +481,21 @@ fn with_outputs(tape: &Tape, nodes: Vec<usize>) -> Tape {
     })
 }
 
+/// Whether an expression itself has a switching function.
+fn asks(e: &Expression) -> bool {
+    let itself = match e {
+        Expression::Greater(..) | Expression::Call(Function::Sign | Function::Abs, _) => true,
+        Expression::Apply(f, _) => {
+            use General::{Atan2, Clip, Floor, Heaviside, If, Max, Min, Mod};
+            matches!(f, Min | Max | If | Heaviside | Floor | Mod | Clip | Atan2)
+        }
+        _ => false,
+    };
+    itself || e.parts().into_iter().any(asks)
+}
+
 /// Whether any equation of a system has a switching function.
 pub(crate) fn has_switches(definition: &Definition) -> bool {
-    fn asks(e: &Expression) -> bool {
-        let itself = match e {
-            Expression::Greater(..) | Expression::Call(Function::Sign | Function::Abs, _) => true,
-            Expression::Apply(f, _) => {
-                use General::{Atan2, Clip, Floor, Heaviside, If, Max, Min, Mod};
-                matches!(f, Min | Max | If | Heaviside | Floor | Mod | Clip | Atan2)
-            }
-            _ => false,
-        };
-        itself || e.parts().into_iter().any(asks)
-    }
     let fields = definition.modes.iter().flat_map(|m| &m.field);
     let terms = definition.terms.iter().map(|(_, e)| e);
     let events = definition.events.iter().filter_map(|e| match &e.when {

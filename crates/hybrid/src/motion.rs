@@ -295,6 +295,8 @@ struct Follower<'a> {
     /// Guards that are slid upon, and for each the configuration on its positive side (all others slid upon on their negative one).
     sliding: Vec<usize>,
     base: Vec<(Rc<Compiled>, Vec<f64>)>,
+    /// Surfaces slid upon that know nothing of each other: the one that each state's derivative depends on.
+    separate: Option<Vec<Option<usize>>>,
     contact: Option<Contact>,
     /// Which side of zero each watched expression is on; 0 if it stays there.
     watch_side: Vec<f64>,
@@ -432,6 +434,7 @@ impl<'a> Follower<'a> {
             variables: vec![0.0; equation.variables()],
             sliding: Vec::new(),
             base: Vec::new(),
+            separate: None,
             contact: None,
             watch_side: vec![0.0; watched],
             fresh_guard: vec![false; guards],
@@ -482,16 +485,19 @@ impl<'a> Follower<'a> {
             config.sides[*guard] = self.low(*guard, &config);
         }
         self.sliding = sliding;
-        self.base = Vec::new();
-        for guard in self.sliding.clone() {
-            let mut flipped = config.clone();
-            flipped.sides[guard] = self.high(guard, &config);
-            let variables = self.load(&flipped);
-            self.base.push((self.equation.compiled(&flipped), variables));
-        }
         self.compiled = self.equation.compiled(&config);
         self.variables = self.load(&config);
         self.config = config;
+        self.separate = self.separate();
+        self.base = Vec::new();
+        if self.separate.is_none() {
+            for guard in self.sliding.clone() {
+                let mut flipped = self.config.clone();
+                flipped.sides[guard] = self.high(guard, &self.config);
+                let variables = self.load(&flipped);
+                self.base.push((self.equation.compiled(&flipped), variables));
+            }
+        }
         self.signs = self
             .equation
             .guards
@@ -505,6 +511,62 @@ impl<'a> Follower<'a> {
                 () => '-',
             })
             .collect();
+    }
+
+    /// For several surfaces slid upon of which none changes another's speed: which of them each derivative depends on.
+    fn separate(&self) -> Option<Vec<Option<usize>>> {
+        let k = self.sliding.len();
+        if k < 2 || self.sliding.iter().any(|g| self.equation.chooses(*g)) {
+            return None;
+        }
+        let n = self.n;
+        let variable = |place: usize| n + 1 + self.sliding[place];
+        let mut owner = vec![None; n];
+        for (i, owner) in owner.iter_mut().enumerate() {
+            let mut owners = (0..k).filter(|place| self.compiled.depends(i, variable(*place)));
+            *owner = owners.next();
+            if owners.next().is_some() {
+                return None;
+            }
+        }
+        for place in 0..k {
+            let active = self.compiled.active.iter().position(|g| *g == self.sliding[place])?;
+            let strange = (0..n).any(|i| self.compiled.depends(n + active, i) && owner[i].is_some_and(|o| o != place));
+            let asks = (0..k).any(|other| self.compiled.depends(n + active, variable(other)));
+            if strange || asks {
+                return None;
+            }
+        }
+        Some(owner)
+    }
+
+    /// Weights of surfaces that know nothing of each other, what each adds to its own speed, and the field on all positive sides.
+    fn separate_weights(&mut self, t: f64, x: &[f64], field0: &[f64]) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+        let n = self.n;
+        self.variables[..n].copy_from_slice(x);
+        self.variables[n] = t;
+        let low = Self::along(&self.compiled, &self.variables, field0);
+        let sides = |follower: &mut Self, add: f64| {
+            for guard in &follower.sliding {
+                // On the positive side of a sign 1, of a whole part one more.
+                follower.variables[n + 1 + guard] +=
+                    if follower.equation.guards[*guard].whole { 0.5 * add } else { add };
+            }
+        };
+        sides(self, 2.0);
+        let mut field1 = vec![0.0; n];
+        self.compiled.field.evaluate(&self.variables, &mut field1);
+        let high = Self::along(&self.compiled, &self.variables, &field1);
+        sides(self, -2.0);
+        let mut jumps = Vec::with_capacity(self.sliding.len());
+        let weight = |guard: &usize| {
+            let place = self.compiled.active.iter().position(|g| g == guard);
+            let (a, b) = place.map_or((f64::NAN, f64::NAN), |p| (low[p], high[p]));
+            jumps.push(b - a);
+            -a / (b - a)
+        };
+        let weights = self.sliding.iter().map(weight).collect();
+        (weights, jumps, field1)
     }
 
     /// The answers on both sides of a guard's zero.
@@ -530,7 +592,14 @@ impl<'a> Follower<'a> {
         self.variables[..n].copy_from_slice(x);
         self.variables[n] = t;
         self.compiled.field.evaluate(&self.variables, out);
-        if !self.sliding.is_empty() {
+        if let Some(owner) = self.separate.clone() {
+            let (weights, _, field1) = self.separate_weights(t, x, out);
+            for i in 0..n {
+                if let Some(place) = owner[i] {
+                    out[i] += weights[place] * (field1[i] - out[i]);
+                }
+            }
+        } else if !self.sliding.is_empty() {
             let weights = self.weights(t, x, out);
             let field0 = out.to_vec();
             for (place, weight) in weights.iter().enumerate() {
@@ -723,12 +792,19 @@ impl<'a> Follower<'a> {
         if !self.sliding.is_empty() {
             let mut field0 = vec![0.0; n];
             compiled.field.evaluate(&self.variables, &mut field0);
-            let (a, matrix) = self.sliding_equations(t, x, &field0);
-            let k = a.len();
-            let b: Vec<f64> = a.iter().map(|v| -v).collect();
-            weights = solve_any(&matrix, &b, 0.0).unwrap_or_else(|| vec![f64::NAN; k]);
-            // Attracting where minus the matrix has a positive determinant, which a single surface's jump of speed is.
-            determinant = determinant_of_negative(matrix, k);
+            if self.separate.is_some() {
+                let jumps;
+                (weights, jumps, _) = self.separate_weights(t, x, &field0);
+                // Each attracts by itself: the one that is nearest to doing so no more counts.
+                determinant = jumps.iter().map(|j| -j).fold(f64::INFINITY, f64::min);
+            } else {
+                let (a, matrix) = self.sliding_equations(t, x, &field0);
+                let k = a.len();
+                let b: Vec<f64> = a.iter().map(|v| -v).collect();
+                weights = solve_any(&matrix, &b, 0.0).unwrap_or_else(|| vec![f64::NAN; k]);
+                // Attracting where minus the matrix has a positive determinant, which a single surface's jump of speed is.
+                determinant = determinant_of_negative(matrix, k);
+            }
         }
         out.clear();
         for (sought, _) in list {
@@ -1338,8 +1414,19 @@ impl<'a> Follower<'a> {
             if !quiet && !self.emit(self.t, Some(&event.name), observe) {
                 return Ok(Some(Ending::Interrupted));
             }
-            for (state, value) in &event.set {
-                new[*state] = self.equation.value(value, self.t, &old);
+            match &self.equation.resets[*i] {
+                Some(program) => {
+                    self.variables[..self.n].copy_from_slice(&old);
+                    self.variables[self.n] = self.t;
+                    let mut values = vec![0.0; event.set.len()];
+                    program.evaluate(&self.variables, &mut values);
+                    event.set.iter().zip(values).for_each(|((state, _), value)| new[*state] = value);
+                }
+                None => {
+                    for (state, value) in &event.set {
+                        new[*state] = self.equation.value(value, self.t, &old);
+                    }
+                }
             }
             mode = event.mode.or(mode);
             if event.stop {
@@ -1374,7 +1461,9 @@ impl<'a> Follower<'a> {
                 .filter(|i| self.fresh_watch[*i] && stays_zero(&self.equation.watched[*i]))
                 .collect();
             self.contact = None;
-            self.settle_afresh(&zero)?;
+            if mode.is_some() || !self.equation.guards.is_empty() {
+                self.settle_afresh(&zero)?;
+            }
             for i in 0..self.watch_side.len() {
                 self.begin_watching(i, watched.contains(&i));
             }
@@ -1847,17 +1936,28 @@ impl<'a> Follower<'a> {
 
     /// Finds the side of a watched expression; `zero`: it is zero here, whatever rounding says.
     fn begin_watching(&mut self, i: usize, zero: bool) {
-        let e = self.equation.watched[i].clone();
-        let value = self.equation.value(&e, self.t, &self.x);
-        if !zero && value.abs() > 1e-14 * self.magnitude(&e) {
-            self.watch_side[i] = value.signum();
-            self.fresh_watch[i] = false;
-            return;
+        let place = self.compiled.active.len() + i;
+        if !zero {
+            let value = self.watched_values()[place];
+            if value.abs() > 1e-14 * self.magnitude(&self.equation.watched[i]) {
+                self.watch_side[i] = value.signum();
+                self.fresh_watch[i] = false;
+                return;
+            }
         }
         let config = self.config.clone();
-        let (compiled, rates) = self.rates(&config);
-        self.watch_side[i] = rates.direction(compiled.active.len() + i);
+        let (_, rates) = self.rates(&config);
+        self.watch_side[i] = rates.direction(place);
         self.fresh_watch[i] = true;
+    }
+
+    /// The values of guards and watched expressions at the present point.
+    fn watched_values(&mut self) -> Vec<f64> {
+        let mut values = vec![0.0; self.compiled.outputs];
+        self.variables[..self.n].copy_from_slice(&self.x);
+        self.variables[self.n] = self.t;
+        self.compiled.watched.evaluate(&self.variables, &mut values);
+        values
     }
 
     fn note_conditions(&mut self) {
