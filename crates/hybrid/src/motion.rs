@@ -734,13 +734,16 @@ impl<'a> Follower<'a> {
                 }
             }
         }
-        // Second derivatives are asked of the present programs.
-        let kept = (
-            std::mem::replace(&mut self.variables, variables),
-            std::mem::replace(&mut self.compiled, compiled.clone()),
-        );
-        let second = self.second_along(&field, None);
-        (self.variables, self.compiled) = kept;
+        // Second derivatives matter where first ones are zero; they are asked of the present programs.
+        let mut second = vec![0.0; outputs];
+        if (0..outputs).any(|i| !(slopes[i].abs() > 1e-11 * terms[i])) {
+            let kept = (
+                std::mem::replace(&mut self.variables, variables),
+                std::mem::replace(&mut self.compiled, compiled.clone()),
+            );
+            second = self.second_along(&field, None);
+            (self.variables, self.compiled) = kept;
+        }
         (compiled, Rates { field, first: slopes, second, terms })
     }
 
@@ -980,7 +983,7 @@ impl<'a> Follower<'a> {
             h = if earliest.is_finite() {
                 // Where things happen often, steps are about as long as what is between them.
                 let between = std::mem::replace(&mut last_met, self.t);
-                h_next.max(h).min(4.0 * (self.t - between).max(f64::EPSILON * self.t.abs()))
+                h_next.max(h).min(1.5 * (self.t - between).max(f64::EPSILON * self.t.abs()))
             } else {
                 h_next
             };
@@ -1208,23 +1211,26 @@ impl<'a> Follower<'a> {
         self.measure(&one, self.t + b * longest, &room, &mut high);
         let slope = (high[0] - low[0]) / ((b - a) * longest);
         let mut length = h;
-        for _ in 0..3 {
+        for correction in 0.. {
             let follower = &mut *self;
             step.take(length, &mut |t, x, out| follower.rhs(t, x, out));
-            let y = step.y.clone();
-            self.measure(&one, self.t + length, &y, &mut low);
+            if correction == 3 {
+                break;
+            }
+            self.measure(&one, self.t + length, &step.y, &mut low);
             let correction = low[0] / slope;
             // Where the function only touches zero, or is none at all, the first place stays.
+            let rounding = 2.0 * f64::EPSILON * (self.t + length).abs();
+            let wanted = (length - correction).clamp(0.0, longest);
             if !correction.is_finite()
                 || correction.abs() > 1e-3 * longest
-                || correction.abs() <= 2.0 * f64::EPSILON * (self.t + length).abs()
+                || correction.abs() <= rounding
+                || wanted == length
             {
                 break;
             }
-            length = (length - correction).clamp(0.0, longest);
+            length = wanted;
         }
-        let follower = &mut *self;
-        step.take(length, &mut |t, x, out| follower.rhs(t, x, out));
     }
 
     // Recording.

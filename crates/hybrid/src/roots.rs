@@ -45,7 +45,7 @@ pub(crate) fn first(
     let mut signs = b.iter().map(|c| c * side).filter(|c| *c != 0.0).map(|c| c > 0.0).collect::<Vec<_>>();
     signs.dedup();
     if ends_beyond && v[0] * side > 0.0 && signs.len() <= 2 {
-        return Some(narrow(from, v[0], to, v[4], side, f));
+        return Some(narrow(from, to, &v, side, f));
     }
     if depth >= if ends_beyond { DEEPEST } else { DEPTH } {
         return ends_beyond.then_some(to);
@@ -60,13 +60,49 @@ pub(crate) fn first(
     first([v[2], p, v[3], q, v[4]], side, middle, to, f, depth + 1)
 }
 
+/// Where the polynomial through five values, which has one change of sign, is zero, as a fraction: Newton's method within bounds.
+fn polynomial_root(v: &[f64; 5], side: f64) -> f64 {
+    let b = bernstein(v);
+    let value = |u: f64| {
+        let w = 1.0 - u;
+        let (mut level, mut slope) = (b, 0.0);
+        for n in (1..5).rev() {
+            if n == 1 {
+                slope = 4.0 * (level[1] - level[0]);
+            }
+            for i in 0..n {
+                level[i] = w * level[i] + u * level[i + 1];
+            }
+        }
+        (level[0], slope)
+    };
+    let (mut low, mut high, mut u) = (0.0, 1.0, 0.5);
+    for _ in 0..60 {
+        let (p, slope) = value(u);
+        if p * side > 0.0 {
+            low = u
+        } else {
+            high = u
+        }
+        let newton = u - p / slope;
+        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        if (next - u).abs() <= f64::EPSILON * u {
+            return next;
+        }
+        u = next;
+    }
+    u
+}
+
 /// Narrows a change of sign down to the last digits; the place given is at zero or beyond it.
-fn narrow(mut a: f64, mut fa: f64, mut b: f64, mut fb: f64, side: f64, f: &mut dyn FnMut(f64) -> f64) -> f64 {
+fn narrow(from: f64, to: f64, v: &[f64; 5], side: f64, f: &mut dyn FnMut(f64) -> f64) -> f64 {
+    let (mut a, mut fa, mut b, mut fb) = (from, v[0], to, v[4]);
+    let rounding = 8.0 * f64::EPSILON * v.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let mut c = from + (to - from) * polynomial_root(v, side);
     for _ in 0..100 {
         if fb == 0.0 || b - a <= 4.0 * f64::EPSILON * b.abs() {
             break;
         }
-        let mut c = b - fb * (b - a) / (fb - fa);
         if !(c > a && c < b) {
             c = 0.5 * (a + b);
         }
@@ -74,6 +110,9 @@ fn narrow(mut a: f64, mut fa: f64, mut b: f64, mut fb: f64, side: f64, f: &mut d
             break;
         }
         let fc = f(c);
+        if fc.abs() <= rounding {
+            return c;
+        }
         if fc * side > 0.0 {
             a = c;
             fa = fc;
@@ -83,6 +122,7 @@ fn narrow(mut a: f64, mut fa: f64, mut b: f64, mut fb: f64, side: f64, f: &mut d
             fb = fc;
             fa *= 0.5;
         }
+        c = b - fb * (b - a) / (fb - fa);
     }
     b
 }
