@@ -4,6 +4,8 @@
 //! zero of all switching functions, events' expressions and limits of sliding; it is made again to end there, and
 //! [what happens there](crate::selection) is decided from the equations on both sides.
 
+pub mod tangent;
+
 use std::rc::Rc;
 
 use twofold_num::Dual;
@@ -98,6 +100,8 @@ pub struct Point<'a> {
     pub signs: &'a str,
     /// The event that happens here.
     pub event: Option<&'a str>,
+    /// At a crossing of the section +1 if its expression rises, -1 if it falls.
+    pub direction: Option<f64>,
 }
 
 /// How a run came to its end.
@@ -312,6 +316,8 @@ struct Follower<'a> {
     trains: Vec<Train>,
     switch_trains: Vec<Train>,
     signs: String,
+    tangents: Option<tangent::Tangents>,
+    growth: Option<tangent::Growth>,
     /// The next multiple that is recorded.
     next_record: f64,
     rhs_room: Vec<Vec<f64>>,
@@ -328,7 +334,7 @@ pub fn follow(
     options: &Options,
     observe: &mut dyn FnMut(&Point) -> bool,
 ) -> Result<Outcome, HybridError> {
-    Follower::new(model, options)?.run(observe)
+    Follower::new(model, options)?.run_whole(observe).map(|(outcome, _)| outcome)
 }
 
 /// What each state's error is measured by in a step.
@@ -445,6 +451,8 @@ impl<'a> Follower<'a> {
             trains: vec![Train::default(); events.len()],
             switch_trains: vec![Train::default(); guards],
             signs: String::new(),
+            tangents: None,
+            growth: None,
             next_record: f64::INFINITY,
             rhs_room: vec![vec![0.0; n]; 4],
             outcome: Outcome { ending: Ending::Finished, t: t0, x: x.clone(), steps: 0, switches: 0, events: 0 },
@@ -838,16 +846,25 @@ impl<'a> Follower<'a> {
 
     // The run.
 
-    fn run(mut self, observe: &mut dyn FnMut(&Point) -> bool) -> Result<Outcome, HybridError> {
+    /// The run, and the follower as it is at its end.
+    fn run_whole(mut self, observe: &mut dyn FnMut(&Point) -> bool) -> Result<(Outcome, Self), HybridError> {
+        let ending = self.run(observe)?;
+        self.outcome.ending = ending;
+        self.outcome.t = self.t;
+        self.outcome.x = self.x.clone();
+        Ok((self.outcome.clone(), self))
+    }
+
+    fn run(&mut self, observe: &mut dyn FnMut(&Point) -> bool) -> Result<Ending, HybridError> {
         let definition = self.model.definition().clone();
-        let mut clock = Clock::new(&self)?;
+        let mut clock = Clock::new(self)?;
         let mut step = Step::new(self.n);
         let mut h = 0.0;
         let mut quiet = 0;
         let mut last_met = f64::NEG_INFINITY;
         if !matches!(self.options.record, Record::Section(_)) {
             if !self.emit(self.t, None, observe) {
-                return Ok(self.end(Ending::Interrupted));
+                return Ok(Ending::Interrupted);
             }
             if let Record::Times { every } = self.options.record {
                 self.next_record = ((self.t / every).floor() + 1.0) * every;
@@ -860,13 +877,13 @@ impl<'a> Follower<'a> {
             if clock.next().is_some_and(|time| time <= self.t) {
                 let met = self.met_here();
                 if let Some(ending) = self.on_time(&mut clock, &definition, &met, observe)? {
-                    return Ok(self.end(ending));
+                    return Ok(ending);
                 }
                 h = 0.0;
                 continue;
             }
             if self.t >= self.options.t_end {
-                return Ok(self.end(Ending::Finished));
+                return Ok(Ending::Finished);
             }
             if self.outcome.steps >= self.options.max_steps {
                 return Err(HybridError::Budget { steps: self.outcome.steps, t: self.t });
@@ -891,7 +908,7 @@ impl<'a> Follower<'a> {
             // A step that the tolerance allows.
             let mut rejected = 0;
             let error = loop {
-                let follower = &mut self;
+                let follower = &mut *self;
                 step.take(wanted, &mut |t, x, out| follower.rhs(t, x, out));
                 let scale = scale_now(follower, &step);
                 let error = step.error(&|i| scale[i]);
@@ -950,7 +967,7 @@ impl<'a> Follower<'a> {
                         continue;
                     }
                     let (begin, length) = (self.t, wanted);
-                    let follower = &mut self;
+                    let follower = &mut *self;
                     let (one, mut value, mut at) = ([(*sought, *side)], Vec::new(), vec![0.0; room.len()]);
                     let mut f = |theta: f64| {
                         step.at(theta, &mut at);
@@ -968,10 +985,11 @@ impl<'a> Follower<'a> {
             }
             // The step stands.
             let length = step.h;
+            self.carry(&step);
             self.outcome.steps += 1;
             let end = if stopped && !earliest.is_finite() { stop } else { self.t + length };
             if !self.record(&step, end, observe) {
-                return Ok(self.end(Ending::Interrupted));
+                return Ok(Ending::Interrupted);
             }
             for i in 0..self.n {
                 self.size[i] = self.size[i].max(step.y[i].abs());
@@ -979,6 +997,7 @@ impl<'a> Follower<'a> {
             let progress = end > self.t;
             self.t = end;
             self.x.copy_from_slice(&step.y);
+            self.note_growth(end);
             self.clear_fresh(&list, &list_values[4], earliest.is_finite());
             h = if earliest.is_finite() {
                 // Where things happen often, steps are about as long as what is between them.
@@ -1006,10 +1025,17 @@ impl<'a> Follower<'a> {
                     self.t = time;
                     self.on_time(&mut clock, &definition, &met, observe)?
                 }
-                None => self.meet(&definition, &met, &[], observe)?,
+                None => {
+                    let before = self.before(&met)?;
+                    let ending = self.meet(&definition, &met, &[], observe)?;
+                    if ending.is_none() {
+                        self.after(before)?;
+                    }
+                    ending
+                }
             };
             if let Some(ending) = ending {
-                return Ok(self.end(ending));
+                return Ok(ending);
             }
         }
     }
@@ -1026,7 +1052,11 @@ impl<'a> Follower<'a> {
         let (mut config, sliding) = (self.config.clone(), self.sliding.clone());
         config.pieces = self.equation.tables.iter().map(|table| table.piece(self.t)).collect();
         self.adopt(config, sliding);
+        let before = self.before(met)?;
         let ending = self.meet(definition, met, &due, observe)?;
+        if ending.is_none() {
+            self.after(before)?;
+        }
         if ending.is_none() && !self.equation.tables.is_empty() {
             // A table's jump may let sliding end, and make switching functions jump.
             let zero = self.sliding.clone();
@@ -1051,13 +1081,6 @@ impl<'a> Follower<'a> {
         let (compiled, rates) = self.rates(&config);
         let passes = |i: &usize| rates.direction(compiled.active.len() + i) * self.watch_side[*i] < 0.0;
         near.into_iter().filter(passes).map(Sought::Watched).collect()
-    }
-
-    fn end(mut self, ending: Ending) -> Outcome {
-        self.outcome.ending = ending;
-        self.outcome.t = self.t;
-        self.outcome.x = self.x;
-        self.outcome
     }
 
     fn left_domain(&mut self, t: f64, x: &[f64]) -> HybridError {
@@ -1236,14 +1259,15 @@ impl<'a> Follower<'a> {
     // Recording.
 
     fn emit(&self, t: f64, event: Option<&str>, observe: &mut dyn FnMut(&Point) -> bool) -> bool {
-        observe(&Point { t, x: &self.x, mode: self.config.mode, signs: &self.signs, event })
+        observe(&Point { t, x: &self.x, mode: self.config.mode, signs: &self.signs, event, direction: None })
     }
 
     /// Records a step; says whether more is wanted.
     fn record(&mut self, step: &Step, end: f64, observe: &mut dyn FnMut(&Point) -> bool) -> bool {
         let mut at = vec![0.0; self.n];
-        let mut give =
-            |t: f64, x: &[f64]| observe(&Point { t, x, mode: self.config.mode, signs: &self.signs, event: None });
+        let mut give = |t: f64, x: &[f64]| {
+            observe(&Point { t, x, mode: self.config.mode, signs: &self.signs, event: None, direction: None })
+        };
         match self.options.record {
             Record::Times { every } => {
                 let mut next = self.next_record;
@@ -1311,7 +1335,9 @@ impl<'a> Follower<'a> {
                     passed.push(i);
                     match self.event_of[i] {
                         None => {
-                            if !self.emit(self.t, None, observe) {
+                            let (mode, signs, direction) = (self.config.mode, &self.signs, Some(-side));
+                            let point = Point { t: self.t, x: &self.x, mode, signs, event: None, direction };
+                            if !observe(&point) {
                                 return Ok(Some(Ending::Interrupted));
                             }
                         }
@@ -1450,6 +1476,11 @@ impl<'a> Follower<'a> {
             return Err(HybridError::Stuck { t: self.t, x: old, why });
         }
         let changed = new != old;
+        let set: Vec<(usize, &Expression)> =
+            fired.iter().flat_map(|i| &definition.events()[*i].set).map(|(state, e)| (*state, e)).collect();
+        if !set.is_empty() {
+            self.note_reset(&set, &old);
+        }
         self.x = new;
         if changed || mode.is_some() {
             if let Some(mode) = mode {

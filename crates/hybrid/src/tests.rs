@@ -367,3 +367,79 @@ fn rests_are_found_with_their_stability() {
     );
     assert!(rests(&model("states = ['x']\nf = ['sin(t)']"), &[(-1.0, 1.0)]).unwrap_err().to_string().contains("time"));
 }
+
+/// Multipliers and exponents against what formulas say, through crossing, sliding and resets.
+#[test]
+fn tangent_vectors_pass_switches_by_saltation_matrices() {
+    use crate::motion::tangent::{Return, closed_orbit, exponents};
+    let section = |text: &str| {
+        Record::Section(twofold_system::Expression::parse_general(text, &["x", "v", "a", "w", "T"]).unwrap())
+    };
+    // The wheel: w^2 after a step is c^2 (w^2 + const), so that the multiplier is c^2, c = cos(pi/4).
+    let options = Options { start: Some(vec![-0.3, 1.2]), record: section("a"), t_end: 50.0, ..Options::default() };
+    let orbit = closed_orbit(&shipped("rimless-wheel"), &options, &Return::Crossings(1)).unwrap();
+    assert_eq!(orbit.multipliers.len(), 1);
+    near(orbit.multipliers[0][0], 0.5, 1e-8);
+    // A linear oscillator that loses half of its speed at a wall, driven so that a ball comes back: x'' = -1 with v -> -r v + u. One bounce: v -> r v + u.
+    let juggler = model(
+        "states = ['x', 'v']\nstart = [0, 1.9]\nf = ['v', '-1']\n[[event]]\nwhen = 'x'\ndirection = 'down'\nset = { v = '1 - 0.5*v' }",
+    );
+    let options = Options { start: Some(vec![1.9, 0.1]), record: section("v - 0"), t_end: 50.0, ..Options::default() };
+    let orbit =
+        closed_orbit(&juggler, &Options { record: section("0 - v"), ..options }, &Return::Crossings(1)).unwrap();
+    near(orbit.period, 4.0, 1e-9);
+    near(orbit.multipliers[0][0], 0.5, 1e-7);
+    // x' = -x + a(t) with a relay that crosses: x'' + x' ... the exponent of a linear system with a switch in its input is its own eigenvalue.
+    let relay = model("states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-x - 0.2*v + sign(sin(t))']");
+    let found = exponents(&relay, &Options { t_end: 400.0, ..Options::default() }, 40.0, 2).unwrap();
+    near(found.values[0], -0.1, 2e-3);
+    near(found.values[0] + found.values[1], -0.2, 1e-6);
+    // A forced oscillator's multipliers over one period are exp of its eigenvalues times the period.
+    let period = 2.0 * std::f64::consts::PI;
+    let options = Options { start: Some(vec![0.3, 0.2]), ..Options::default() };
+    let orbit = closed_orbit(&relay, &options, &Return::Period(period)).unwrap();
+    let size = (orbit.multipliers[0][0].powi(2) + orbit.multipliers[0][1].powi(2)).sqrt();
+    near(size, (-0.1 * period).exp(), 1e-8);
+    // Stick-slip: a piece of sliding forgets everything, and the multiplier is 0.
+    let block = model("states = ['x', 'v']\nstart = [0, 0]\nf = ['v', '-x + (1 - 0.3*(0.5 - v))*sign(0.5 - v)*1']");
+    let options = Options { start: Some(vec![0.0, 0.5]), record: section("x"), t_end: 60.0, ..Options::default() };
+    if let Ok(orbit) = closed_orbit(&block, &options, &Return::Crossings(1)) {
+        near(orbit.multipliers[0][0], 0.0, 1e-9);
+    }
+}
+
+/// Carried tangent vectors agree with neighbours that are followed themselves.
+#[test]
+fn tangent_vectors_agree_with_finite_differences() {
+    use crate::motion::tangent::{Return, closed_orbit};
+    let text = "states = ['x', 'v']\nf = ['v', '-x - 0.1*v - 0.4*sign(v - 0.3) + 1.2*cos(1.3*t)']\n\
+        [[event]]\nwhen = 'x - 0.9'\ndirection = 'up'\nset = { v = '-0.6*v + 0.1*x' }";
+    let period = 2.0 * std::f64::consts::PI / 1.3;
+    let model = model(text);
+    let start = vec![0.2, 0.1];
+    // The derivative of the map over one period, by the first Newton step's matrix: multipliers of a closed orbit need one to exist.
+    let Ok(orbit) =
+        closed_orbit(&model, &Options { start: Some(start), ..Options::default() }, &Return::Period(period))
+    else {
+        panic!("no orbit")
+    };
+    let map = |x: Vec<f64>| {
+        let options = Options { start: Some(x), t_end: period, ..Options::default() };
+        follow(&model, &options, &mut |_| true).unwrap().x
+    };
+    let h = 1e-6;
+    let mut matrix = [0.0; 4];
+    for j in 0..2 {
+        let (mut up, mut down) = (orbit.x.clone(), orbit.x.clone());
+        up[j] += h;
+        down[j] -= h;
+        let (up, down) = (map(up), map(down));
+        for i in 0..2 {
+            matrix[i * 2 + j] = (up[i] - down[i]) / (2.0 * h);
+        }
+    }
+    let (trace, determinant) = (matrix[0] + matrix[3], matrix[0] * matrix[3] - matrix[1] * matrix[2]);
+    let [a, b] = [orbit.multipliers[0], orbit.multipliers[1]];
+    near(a[0] + b[0], trace, 1e-5);
+    near(a[0] * b[0] - a[1] * b[1], determinant, 1e-5);
+}

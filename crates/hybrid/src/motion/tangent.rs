@@ -1,0 +1,531 @@
+//! Tangent vectors along a motion, and what they say: Lyapunov exponents and Floquet multipliers.
+//!
+//! Between switches a tangent vector is carried by the derivative of the method's own step. Where a surface is met at the speed m' of its function, with
+//! fields f- before and f+ behind and a reset R, it is multiplied by the *saltation matrix* (Aizerman & Gantmakher 1958; Leine & Nijmeijer 2004, ch. 7)
+//!
+//! S = DR + (f+ - DR f- - dR/dt) (grad m)^T / m'.
+//!
+//! Behind it f+ may be a sliding field: S then takes away what is normal to the surface. Where sliding ends the field is continuous, and S = 1.
+
+use super::{Ending, Follower, HybridError, Options, Record, Sought};
+use crate::Model;
+use crate::step::{A, Step};
+use twofold_num::Dual;
+use twofold_num::elementary::ln;
+use twofold_num::linear::{eigenvalues, solve_any};
+use twofold_system::Expression;
+
+type D = Dual<f64, 1>;
+type DD = Dual<D, 1>;
+
+/// Tangent vectors, and the reset that an event has just made.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tangents {
+    /// The vectors.
+    pub vectors: Vec<Vec<f64>>,
+    /// Derivative of the last reset by the state, row by row, and by the time.
+    pub reset: Option<(Vec<f64>, Vec<f64>)>,
+}
+
+/// What stands before something is met.
+pub(super) struct Before {
+    field: Vec<f64>,
+    gradient: Vec<f64>,
+    speed: f64,
+}
+
+impl Follower<'_> {
+    /// Carries the tangent vectors through a step, by the derivative of its stages.
+    pub(super) fn carry(&mut self, step: &Step) {
+        let Some(mut tangents) = self.tangents.take() else { return };
+        let n = self.n;
+        for y in &mut tangents.vectors {
+            let mut k: Vec<Vec<f64>> = Vec::with_capacity(7);
+            for s in 0..7 {
+                let (mut x, mut v) = (step.x.clone(), y.clone());
+                for (a, (kx, kv)) in A[s].iter().zip(step.k.iter().zip(&k)) {
+                    for i in 0..n {
+                        x[i] += step.h * a * kx[i];
+                        v[i] += step.h * a * kv[i];
+                    }
+                }
+                if s == 6 {
+                    *y = v;
+                    break;
+                }
+                let t = step.t + crate::step::C[s] * step.h;
+                k.push(self.slope_along(t, &x, &v));
+            }
+        }
+        self.tangents = Some(tangents);
+    }
+
+    /// The derivative of the field in the direction `v`, sliding included.
+    fn slope_along(&mut self, t: f64, x: &[f64], v: &[f64]) -> Vec<f64> {
+        let n = self.n;
+        let load = |variables: &[f64]| -> Vec<D> {
+            let mut duals: Vec<D> = variables.iter().map(|v| D::constant(*v)).collect();
+            for i in 0..n {
+                duals[i] = Dual { value: x[i], partials: [v[i]] };
+            }
+            duals[n] = D::constant(t);
+            duals
+        };
+        let field = |compiled: &crate::equation::Compiled, variables: &[D]| {
+            let mut out = vec![D::constant(0.0); n];
+            compiled.field.evaluate(variables, &mut out);
+            out
+        };
+        let along = |compiled: &crate::equation::Compiled, variables: &[D], field: &[D]| -> Vec<D> {
+            let nested: Vec<DD> = variables
+                .iter()
+                .enumerate()
+                .map(|(i, value)| {
+                    let partial = match i {
+                        i if i < n => field[i],
+                        i if i == n => D::constant(1.0),
+                        _ => D::constant(0.0),
+                    };
+                    Dual { value: *value, partials: [partial] }
+                })
+                .collect();
+            let mut out = vec![DD::constant(D::constant(0.0)); compiled.outputs];
+            compiled.watched.evaluate(&nested, &mut out);
+            out.iter().map(|d| d.partials[0]).collect()
+        };
+        let variables = load(&self.variables);
+        let low = field(&self.compiled, &variables);
+        let k = self.sliding.len();
+        if k == 0 {
+            return low.iter().map(|d| d.partials[0]).collect();
+        }
+        let place = |compiled: &crate::equation::Compiled, guard: usize| {
+            compiled.active.iter().position(|g| *g == guard).unwrap_or(0)
+        };
+        let rates = along(&self.compiled, &variables, &low);
+        let a: Vec<D> = self.sliding.iter().map(|g| rates[place(&self.compiled, *g)]).collect();
+        let mut columns = Vec::with_capacity(k);
+        for (column, guard) in self.sliding.iter().enumerate() {
+            let (compiled, mut v) = match self.base.get(column) {
+                Some((compiled, variables)) => (compiled.clone(), load(variables)),
+                None => (self.compiled.clone(), variables.clone()),
+            };
+            if self.base.is_empty() {
+                let up = if self.equation.guards[*guard].whole { 1.0 } else { 2.0 };
+                v[n + 1 + guard].value += up;
+            }
+            let high = field(&compiled, &v);
+            let rates = along(&compiled, &v, &high);
+            let speeds: Vec<D> = self.sliding.iter().map(|g| rates[place(&compiled, *g)]).collect();
+            columns.push((high, speeds));
+        }
+        let mut matrix = vec![D::constant(0.0); k * k];
+        for (c, (_, speeds)) in columns.iter().enumerate() {
+            for r in 0..k {
+                matrix[r * k + c] = speeds[r] - a[r];
+            }
+        }
+        let weights = solve_duals(matrix, a.iter().map(|a| -*a).collect());
+        let mut out = low.clone();
+        for (weight, (high, _)) in weights.iter().zip(&columns) {
+            for i in 0..n {
+                out[i] += *weight * (high[i] - low[i]);
+            }
+        }
+        out.iter().map(|d| d.partials[0]).collect()
+    }
+
+    /// What is needed of the moment before something is met.
+    pub(super) fn before(&mut self, met: &[Sought]) -> Result<Option<Before>, HybridError> {
+        if self.tangents.is_none() {
+            return Ok(None);
+        }
+        if let Some(tangents) = &mut self.tangents {
+            tangents.reset = None;
+        }
+        let n = self.n;
+        let (t, x) = (self.t, self.x.clone());
+        let mut field = vec![0.0; n];
+        self.rhs(t, &x, &mut field);
+        let mut found: Option<(Vec<f64>, f64)> = None;
+        for sought in met {
+            let place = match *sought {
+                Sought::Guard { guard, .. } => self.compiled.active.iter().position(|g| *g == guard),
+                Sought::Watched(i) => Some(self.compiled.active.len() + i),
+                _ => None,
+            };
+            let Some(place) = place else { continue };
+            let mut gradient = vec![0.0; n + 1];
+            let mut out = vec![D::constant(0.0); self.compiled.outputs];
+            for (j, slope) in gradient.iter_mut().enumerate() {
+                let mut duals: Vec<D> = self.variables.iter().map(|v| D::constant(*v)).collect();
+                duals[..n].iter_mut().zip(&x).for_each(|(d, x)| d.value = *x);
+                duals[n].value = t;
+                duals[j].partials = [1.0];
+                self.compiled.watched.evaluate(&duals, &mut out);
+                *slope = out[place].partials[0];
+            }
+            let in_time = gradient.pop().unwrap_or(0.0);
+            let terms: f64 = gradient.iter().zip(&field).map(|(g, f)| (g * f).abs()).sum::<f64>() + in_time.abs();
+            let speed: f64 = gradient.iter().zip(&field).map(|(g, f)| g * f).sum::<f64>() + in_time;
+            if !(speed.abs() > 1e-9 * terms) {
+                return Err(self.no_tangents(
+                    "a surface is only touched (grazing), where neighbours have no common linear motion",
+                ));
+            }
+            let scaled: Vec<f64> = gradient.iter().map(|g| g / speed).collect();
+            if let Some((other, s)) = &found {
+                let differ =
+                    other.iter().zip(&scaled).any(|(a, b)| (a / s - b).abs() > 1e-6 * (b.abs() + (a / s).abs()));
+                if differ {
+                    return Err(self.no_tangents(
+                        "two surfaces are met at one moment, where neighbours have no common linear motion",
+                    ));
+                }
+                continue;
+            }
+            found = Some((gradient, speed));
+        }
+        Ok(Some(match found {
+            Some((gradient, speed)) => Before { field, gradient, speed },
+            // The field is continuous, or the time is fixed: nothing is met earlier or later by a neighbour.
+            None => Before { field, gradient: vec![0.0; n], speed: 1.0 },
+        }))
+    }
+
+    fn no_tangents(&self, why: &str) -> HybridError {
+        HybridError::Stuck { t: self.t, x: self.x.clone(), why: format!("tangent vectors end: {why}") }
+    }
+
+    /// Notes the derivative of a reset, for tangent vectors.
+    pub(super) fn note_reset(&mut self, set: &[(usize, &Expression)], old: &[f64]) {
+        if self.tangents.is_none() {
+            return;
+        }
+        let n = self.n;
+        let mut by_state = vec![0.0; n * n];
+        (0..n).for_each(|i| by_state[i * n + i] = 1.0);
+        let mut by_time = vec![0.0; n];
+        for (state, e) in set {
+            let value = |t: f64, x: &[f64]| self.equation.value(e, t, x);
+            // Central differences with a step for each state's own size, by Richardson's extrapolation of two.
+            let slope = |f: &dyn Fn(f64) -> f64, h: f64| {
+                let d = |h: f64| (f(h) - f(-h)) / (2.0 * h);
+                (4.0 * d(0.5 * h) - d(h)) / 3.0
+            };
+            for j in 0..n {
+                let h = 1e-4 * self.size[j].max(old[j].abs()).max(f64::MIN_POSITIVE.sqrt());
+                let at = |shift: f64| {
+                    let mut x = old.to_vec();
+                    x[j] += shift;
+                    value(self.t, &x)
+                };
+                by_state[state * n + j] = slope(&at, h);
+            }
+            let h = 1e-4 * (self.options.t_end - self.options.t_start).min(1.0);
+            by_time[*state] = slope(&|shift| value(self.t + shift, old), h);
+        }
+        if let Some(tangents) = &mut self.tangents {
+            tangents.reset = Some((by_state, by_time));
+        }
+    }
+
+    /// Multiplies the tangent vectors by the saltation matrix of what has been met.
+    pub(super) fn after(&mut self, before: Option<Before>) -> Result<(), HybridError> {
+        let Some(before) = before else { return Ok(()) };
+        if self.contact.is_some() {
+            return Err(self.no_tangents("impacts accumulate and the motion rests on a surface"));
+        }
+        let n = self.n;
+        let (t, x) = (self.t, self.x.clone());
+        let mut field = vec![0.0; n];
+        self.rhs(t, &x, &mut field);
+        let Some(mut tangents) = self.tangents.take() else { return Ok(()) };
+        let (by_state, by_time) = tangents.reset.take().unwrap_or_else(|| {
+            let mut one = vec![0.0; n * n];
+            (0..n).for_each(|i| one[i * n + i] = 1.0);
+            (one, vec![0.0; n])
+        });
+        let times =
+            |v: &[f64]| -> Vec<f64> { (0..n).map(|i| (0..n).map(|j| by_state[i * n + j] * v[j]).sum()).collect() };
+        let moved = times(&before.field);
+        for y in &mut tangents.vectors {
+            let later = before.gradient.iter().zip(y.iter()).map(|(g, y)| g * y).sum::<f64>() / before.speed;
+            let new = times(y);
+            for i in 0..n {
+                y[i] = new[i] + (field[i] - moved[i] - by_time[i]) * later;
+            }
+        }
+        self.tangents = Some(tangents);
+        Ok(())
+    }
+}
+
+/// Elimination with pivots on numbers that carry a derivative.
+fn solve_duals(mut a: Vec<D>, mut b: Vec<D>) -> Vec<D> {
+    let k = b.len();
+    for c in 0..k {
+        let size = |i: &usize| a[*i * k + c].value.abs();
+        let pivot = (c..k).max_by(|i, j| size(i).total_cmp(&size(j))).unwrap_or(c);
+        (0..k).for_each(|j| a.swap(c * k + j, pivot * k + j));
+        b.swap(c, pivot);
+        for r in c + 1..k {
+            let factor = a[r * k + c] / a[c * k + c];
+            for j in c..k {
+                let less = factor * a[c * k + j];
+                a[r * k + j] = a[r * k + j] - less;
+            }
+            let less = factor * b[c];
+            b[r] = b[r] - less;
+        }
+    }
+    for r in (0..k).rev() {
+        let mut sum = b[r];
+        for j in r + 1..k {
+            sum = sum - a[r * k + j] * b[j];
+        }
+        b[r] = sum / a[r * k + r];
+    }
+    b
+}
+
+/// Lyapunov exponents.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exponents {
+    /// The exponents, largest first, per unit time; minus infinity for directions that sliding takes away.
+    pub values: Vec<f64>,
+    /// Half the width of a 95 % interval of each, from the scatter of twenty parts of the run.
+    pub errors: Vec<f64>,
+    /// From when to when the mean was taken.
+    pub times: (f64, f64),
+}
+
+/// Parts of a run from whose scatter errors follow.
+const PARTS: usize = 20;
+/// Student's t for 19 degrees of freedom, 95 %.
+const STUDENT: f64 = 2.093;
+
+/// The `count` largest Lyapunov exponents of the orbit from the start, after `transient`: Benettin, Galgani, Giorgilli & Strelcyn (1980), with saltation
+/// matrices at every switch and reset.
+///
+/// # Errors
+/// As [`follow`](super::follow); also where tangent vectors end: at a grazing, at two surfaces at once, at rest after accumulated impacts.
+pub fn exponents(model: &Model, options: &Options, transient: f64, count: usize) -> Result<Exponents, HybridError> {
+    let begin = options.t_start + transient;
+    if !(transient >= 0.0 && begin < options.t_end) {
+        return Err(HybridError::Bad(format!(
+            "the transient is {transient}: give a time from 0 to below the run's length"
+        )));
+    }
+    let n = model.coordinates().len();
+    let settings = Options { record: Record::Times { every: f64::INFINITY }, ..options.clone() };
+    let mut follower = Follower::new(model, &settings)?;
+    let unit = |i: usize| {
+        let mut v = vec![0.0; n];
+        v[i] = 1.0;
+        v
+    };
+    follower.tangents = Some(Tangents { vectors: (0..count.min(n)).map(unit).collect(), reset: None });
+    follower.growth = Some(Growth {
+        begin,
+        end: options.t_end,
+        from: (transient == 0.0).then_some(begin),
+        sums: vec![vec![0.0; PARTS]; count.min(n)],
+    });
+    let (outcome, follower) = follower.run_whole(&mut |_| true)?;
+    if outcome.ending != Ending::Finished {
+        return Err(HybridError::Bad(format!(
+            "the run ends at t = {} ({:?}), and there is no mean",
+            outcome.t, outcome.ending
+        )));
+    }
+    let growth = follower.growth.ok_or_else(|| HybridError::Bad("there is no mean".into()))?;
+    let part = (options.t_end - begin) / PARTS as f64;
+    let mut values = Vec::new();
+    let mut errors = Vec::new();
+    for sums in &growth.sums {
+        let rates: Vec<f64> = sums.iter().map(|s| s / part).collect();
+        let from = growth.from.unwrap_or(begin);
+        let mean = sums.iter().sum::<f64>() / (options.t_end - from);
+        let variance = rates.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>() / (PARTS - 1) as f64;
+        values.push(mean);
+        errors.push(if mean.is_finite() { STUDENT * (variance / PARTS as f64).sqrt() } else { 0.0 });
+    }
+    Ok(Exponents { values, errors, times: (begin, options.t_end) })
+}
+
+/// The growth of tangent vectors, by parts of a run.
+#[derive(Clone, Debug)]
+pub(super) struct Growth {
+    begin: f64,
+    end: f64,
+    from: Option<f64>,
+    sums: Vec<Vec<f64>>,
+}
+
+impl Follower<'_> {
+    /// Makes the tangent vectors orthonormal again and notes by how much they grew until `t`.
+    pub(super) fn note_growth(&mut self, t: f64) {
+        let (Some(growth), Some(tangents)) = (&mut self.growth, &mut self.tangents) else { return };
+        let part =
+            ((t - growth.begin) / (growth.end - growth.begin) * PARTS as f64).clamp(0.0, PARTS as f64 - 1.0) as usize;
+        for i in 0..tangents.vectors.len() {
+            let (done, open) = tangents.vectors.split_at_mut(i);
+            let y = &mut open[0];
+            let size_before = y.iter().map(|v| v * v).sum::<f64>().sqrt();
+            for other in done.iter() {
+                let dot: f64 = other.iter().zip(y.iter()).map(|(a, b)| a * b).sum();
+                y.iter_mut().zip(other).for_each(|(y, o)| *y -= dot * o);
+            }
+            let size = y.iter().map(|v| v * v).sum::<f64>().sqrt();
+            let gone = !(size > 1e-13 * size_before);
+            if growth.from.is_some() {
+                growth.sums[i][part] += if gone { f64::NEG_INFINITY } else { ln(size) };
+            }
+            if gone {
+                // Sliding has taken this direction away.
+                y.fill(0.0);
+            } else {
+                y.iter_mut().for_each(|v| *v /= size);
+            }
+        }
+        // The mean begins with the first step that ends after the transient.
+        if t >= growth.begin {
+            growth.from = growth.from.or(Some(t));
+        }
+    }
+}
+
+/// When an orbit has closed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Return {
+    /// After this time: a system with this period.
+    Period(f64),
+    /// At the n-th rising crossing of the section in [`Options::record`].
+    Crossings(usize),
+}
+
+/// A closed orbit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClosedOrbit {
+    /// A state on it.
+    pub x: Vec<f64>,
+    /// Its period.
+    pub period: f64,
+    /// Its Floquet multipliers, largest first (real and imaginary parts); of an autonomous system without the one that is 1.
+    pub multipliers: Vec<[f64; 2]>,
+    /// How far it is from closed, in the largest of its states' sizes.
+    pub gap: f64,
+}
+
+/// Finds a closed orbit near the start of `options` by Newton's method on the return map, whose derivative is carried along with saltation matrices.
+///
+/// # Errors
+/// As [`follow`](super::follow); also if there is no return, or the iteration does not settle.
+pub fn closed_orbit(model: &Model, options: &Options, after: &Return) -> Result<ClosedOrbit, HybridError> {
+    let n = model.coordinates().len();
+    let mut x = match &options.start {
+        Some(x) => x.clone(),
+        None => model.start().map_err(crate::equation::EquationError::from)?.unwrap_or_default(),
+    };
+    if let Return::Crossings(_) = after {
+        // The search begins on the section.
+        x = turn(model, options, &Return::Crossings(1), &x, false)?.1;
+    }
+    let mut best = f64::INFINITY;
+    for _ in 0..30 {
+        let (time, end, mut matrix, section) = turn(model, options, after, &x, true)?;
+        // On a section neighbours come back at other times: what is along the field goes.
+        if let Some((gradient, field)) = &section {
+            let speed: f64 = gradient.iter().zip(field).map(|(g, f)| g * f).sum();
+            for j in 0..n {
+                let late: f64 = (0..n).map(|i| gradient[i] * matrix[i * n + j]).sum::<f64>() / speed;
+                (0..n).for_each(|i| matrix[i * n + j] -= field[i] * late);
+            }
+        }
+        let size = x.iter().chain(&end).fold(0.0_f64, |a, v| a.max(v.abs()));
+        let gap: Vec<f64> = end.iter().zip(&x).map(|(e, x)| e - x).collect();
+        let off = gap.iter().fold(0.0_f64, |a, v| a.max(v.abs())) / size.max(f64::MIN_POSITIVE);
+        if off <= 1e-11 || (off >= best && best <= 1e-8) {
+            let mut multipliers = eigenvalues(&matrix, n).unwrap_or_default();
+            multipliers.sort_by(|a, b| (b[0] * b[0] + b[1] * b[1]).total_cmp(&(a[0] * a[0] + a[1] * a[1])));
+            if section.is_some() {
+                // The return map has an eigenvalue 0 along the field, which is none of the orbit's.
+                multipliers.pop();
+            }
+            return Ok(ClosedOrbit { x, period: time, multipliers, gap: off });
+        }
+        best = best.min(off);
+        let mut system = vec![0.0; n * n];
+        for i in 0..n {
+            for j in 0..n {
+                system[i * n + j] = f64::from(u8::from(i == j)) - matrix[i * n + j];
+            }
+        }
+        let Some(change) = solve_any(&system, &gap, 0.0) else { break };
+        x.iter_mut().zip(&change).for_each(|(x, c)| *x += c);
+    }
+    Err(HybridError::Bad(format!(
+        "Newton's method found no closed orbit (the best return was {best:e} off): start nearer (--start), or let the motion settle longer"
+    )))
+}
+
+/// Once around: time, end, derivative row by row, and of a section its gradient and the field there.
+type Turn = (f64, Vec<f64>, Vec<f64>, Option<(Vec<f64>, Vec<f64>)>);
+
+/// `on_section`: the start is on the section, whatever rounding says.
+fn turn(model: &Model, options: &Options, after: &Return, x: &[f64], on_section: bool) -> Result<Turn, HybridError> {
+    let n = x.len();
+    let mut settings = Options { start: Some(x.to_vec()), ..options.clone() };
+    let mut wanted = usize::MAX;
+    match after {
+        Return::Period(period) => {
+            settings.t_end = settings.t_start + period;
+            settings.record = Record::Times { every: f64::INFINITY };
+        }
+        Return::Crossings(count) => wanted = *count,
+    }
+    let mut follower = Follower::new(model, &settings)?;
+    if on_section && matches!(after, Return::Crossings(_)) {
+        follower.begin_watching(follower.equation.watched.len() - 1, true);
+    }
+    let unit = |j: usize| {
+        let mut v = vec![0.0; n];
+        v[j] = 1.0;
+        v
+    };
+    follower.tangents = Some(Tangents { vectors: (0..n).map(unit).collect(), reset: None });
+    let mut crossings = 0;
+    let (outcome, mut follower) = follower.run_whole(&mut |point| {
+        crossings += usize::from(point.direction.is_some_and(|d| d > 0.0));
+        crossings < wanted
+    })?;
+    let back = match after {
+        Return::Period(_) => outcome.ending == Ending::Finished,
+        Return::Crossings(_) => crossings >= wanted,
+    };
+    if !back {
+        let why = format!(
+            "the orbit does not come back to the section by t = {} ({:?}): give a later end (--t-end), another section or start",
+            outcome.t, outcome.ending
+        );
+        return Err(HybridError::Bad(why));
+    }
+    let vectors = follower.tangents.take().map(|t| t.vectors).unwrap_or_default();
+    let mut matrix = vec![0.0; n * n];
+    for (j, column) in vectors.iter().enumerate() {
+        for i in 0..n {
+            matrix[i * n + j] = column[i];
+        }
+    }
+    let section = match after {
+        Return::Period(_) => None,
+        Return::Crossings(_) => {
+            let section = follower.equation.watched.len() - 1;
+            follower.tangents = Some(Tangents::default());
+            let before = follower.before(&[Sought::Watched(section)])?;
+            before.map(|b| (b.gradient, b.field))
+        }
+    };
+    Ok((outcome.t - settings.t_start, outcome.x, matrix, section))
+}
