@@ -40,5 +40,6 @@ mod step;
 mod tests;
 
 pub use definition::Definition;
+pub use equation::Equation;
 pub use model::Model;
 pub use motion::{Ending, HybridError, Options, Point, follow};

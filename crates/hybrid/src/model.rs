@@ -131,6 +131,11 @@ impl Model {
         crate::equation::has_switches(&self.definition)
     }
 
+    /// Whether its fields depend on the time, by themselves or through a table.
+    pub fn depends_on_time(&self) -> bool {
+        crate::Equation::new(self, None).is_ok_and(|equation| equation.depends_on_time())
+    }
+
     /// What decides the system's numbers, as data: what the file says, with these values, and the tables' points.
     pub fn json(&self) -> Value {
         let mut document = serde_json::to_value(&self.definition.document).unwrap_or_default();

@@ -1621,7 +1621,7 @@ impl<'a> Follower<'a> {
             .collect();
         let off: Vec<f64> =
             self.sliding.iter().zip(&boundary).map(|(g, b)| active_value(&self.compiled, &values, *g) - b).collect();
-        if off.iter().all(|v| *v == 0.0) {
+        if off.iter().all(|v| *v == 0.0) && self.tangents.is_none() {
             return;
         }
         let mut rows = vec![vec![0.0; self.n]; k];
@@ -1640,12 +1640,16 @@ impl<'a> Follower<'a> {
         for a in &rows {
             gram.extend(rows.iter().map(|b| dot(a, b)));
         }
-        if let Some(weights) = solve_any(&gram, &off, 0.0) {
-            for (row, weight) in rows.iter().zip(&weights) {
-                for i in 0..self.n {
-                    self.x[i] -= weight * row[i];
-                }
+        let onto = |v: &mut [f64], off: &[f64]| {
+            for (row, weight) in rows.iter().zip(solve_any(&gram, off, 0.0).unwrap_or_default()) {
+                v.iter_mut().zip(row).for_each(|(v, r)| *v -= weight * r);
             }
+        };
+        onto(&mut self.x, &off);
+        // Rounding carries tangent vectors off the surface, where nothing shrinks them.
+        for y in self.tangents.iter_mut().flat_map(|t| &mut t.vectors) {
+            let off: Vec<f64> = rows.iter().map(|row| dot(row, y)).collect();
+            onto(y, &off);
         }
     }
 

@@ -394,6 +394,16 @@ fn tangent_vectors_pass_switches_by_saltation_matrices() {
     let found = exponents(&relay, &Options { t_end: 400.0, ..Options::default() }, 40.0, 2).unwrap();
     near(found.values[0], -0.1, 2e-3);
     near(found.values[0] + found.values[1], -0.2, 1e-6);
+    // On the line of a sliding control neighbours approach at lambda; across it sliding takes them away.
+    let control = shipped("sliding-mode-control");
+    let found = exponents(&control, &Options { t_end: 60.0, ..Options::default() }, 3.0, 2).unwrap();
+    near(found.values[0], -1.0, 1e-6);
+    assert_eq!(found.values[1], f64::NEG_INFINITY);
+    // Giaouris, Maity, Banerjee, Pickert & Zahawi (2008), sec. V: -0.8211 +- 0.0708i at 24 V.
+    let options = Options { start: Some(vec![12.0222, 0.6065]), ..Options::default() };
+    let orbit = closed_orbit(&shipped("buck-ramp"), &options, &Return::Period(400e-6)).unwrap();
+    near(orbit.multipliers[0][0], -0.8211, 5e-5);
+    near(orbit.multipliers[0][1].abs(), 0.0708, 5e-5);
     // A forced oscillator's multipliers over one period are exp of its eigenvalues times the period.
     let period = 2.0 * std::f64::consts::PI;
     let options = Options { start: Some(vec![0.3, 0.2]), ..Options::default() };

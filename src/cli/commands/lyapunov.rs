@@ -5,10 +5,13 @@ use serde_json::json;
 use crate::analyse::lyapunov::{Exponent, LyapunovOptions, Sign};
 use crate::cli::ending;
 use crate::cli::flags::{RunFlags, Use};
+use crate::cli::general;
 use crate::cli::progress::Progress;
 use crate::cli::speak::{Delivery, deliver, try_delivery};
 use crate::cli::{CliError, Exit};
+use crate::hybrid::motion::tangent::exponents;
 use crate::integrate::StepCap;
+use crate::job::general::GeneralRun;
 use crate::job::{Executor, JobError, LargestExponent, Question, Stop, encode};
 use crate::num::elementary::log10;
 
@@ -44,6 +47,9 @@ enum Format {
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
+    if let Some(run) = general::run_of(&arguments.flags)? {
+        return of_general(arguments, run);
+    }
     let spec = arguments.flags.spec(Use::Exponent)?;
     let transient = arguments.transient.unwrap_or(0.1 * spec.t_end);
     if !(transient >= 0.0 && transient < spec.t_end) {
@@ -101,4 +107,62 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         }
         _ => Ok(Exit::Fine),
     }
+}
+
+/// Most exponents of a general system that are computed.
+const MOST_EXPONENTS: usize = 12;
+
+/// The exponents of a general system, by saltation matrices through its switches and resets.
+fn of_general(arguments: &Arguments, mut run: GeneralRun) -> Result<Exit, CliError> {
+    for flag in ["--section", "--chord", "--every"] {
+        if arguments.flags.given().contains(&flag) {
+            return Err(CliError::no_effect(flag, "an exponent is an average along the whole orbit; leave it out"));
+        }
+    }
+    if arguments.flags.t_end.is_none() {
+        run.options.t_end = run.options.t_start + 10_000.0;
+    }
+    let length = run.options.t_end - run.options.t_start;
+    let transient = arguments.transient.unwrap_or(0.1 * length);
+    if !(transient >= 0.0 && transient < length) {
+        let text = format!("--transient is {transient}: give a time from 0 to below the run's length, {length}");
+        return Err(CliError::Usage(text));
+    }
+    let out = arguments.delivery.out.as_deref();
+    let format = ending::format(out, arguments.format, Format::Text)?;
+    try_delivery(out)?;
+    let count = run.model.coordinates().len().min(MOST_EXPONENTS);
+    let found = exponents(&run.model, &run.options, transient, count).map_err(general::failed)?;
+    let (from, until) = found.times;
+    let pairs = || found.values.iter().zip(&found.errors);
+    let bytes = match format {
+        Format::Json => {
+            let list: Vec<_> = pairs()
+                .map(|(value, error)| json!({ "value": value.is_finite().then_some(value), "half_width": error }))
+                .collect();
+            let about = json!({ "kind": "general-exponents", "question": run.json(), "transient": transient });
+            let mut bytes =
+                serde_json::to_vec_pretty(&json!({ "about": about, "from": from, "to": until, "exponents": list }))
+                    .expect("plain data: string keys, no failing serialisers");
+            bytes.push(b'\n');
+            bytes
+        }
+        Format::Text => {
+            let mut text = String::new();
+            for (i, (value, error)) in pairs().enumerate() {
+                let meaning = match () {
+                    () if *value == f64::NEG_INFINITY => "sliding takes this direction away",
+                    () if value.abs() <= *error => "not distinguishable from zero",
+                    () if *value > 0.0 => "neighbours part",
+                    () => "neighbours approach",
+                };
+                let mean =
+                    if i == 0 { format!("; mean over t = {from} to {until}, 95 % interval") } else { String::new() };
+                text += &format!("{value:.6} +- {error:.1e} per unit time ({meaning}{mean})\n");
+            }
+            text.into_bytes()
+        }
+    };
+    deliver(out, &bytes)?;
+    Ok(Exit::Fine)
 }

@@ -9,9 +9,14 @@ use crate::analyse::floquet::ReturnPlane;
 use crate::cli::ending;
 use crate::cli::exit::part_of;
 use crate::cli::flags::{RunFlags, Use};
+use crate::cli::general;
 use crate::cli::progress::Progress;
 use crate::cli::speak::{Delivery, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
+use crate::hybrid::motion::Record;
+use crate::hybrid::motion::tangent::{Return, closed_orbit};
+use crate::hybrid::{Options, follow};
+use crate::job::general::GeneralRun;
 use crate::job::orbit::Along;
 use crate::job::rest::{Rest, Stability as RestStability};
 use crate::job::spec::Observation;
@@ -46,6 +51,9 @@ pub struct Arguments {
     /// Follow the orbit along a parameter of the system, or eps, from one value to another, in at least so many steps [default: 40].
     #[arg(long, value_name = "NAME=FROM..TO[:STEPS]", allow_hyphen_values = true, help_heading = "Orbit")]
     along: Option<String>,
+    /// Period of a general system that depends on the time, instead of --section.
+    #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Orbit")]
+    period: Option<f64>,
     /// Output format [default: what the name of --out ends in, else text].
     #[arg(long, value_enum)]
     format: Option<Format>,
@@ -67,6 +75,13 @@ enum Format {
 const MOST_ORBITS: usize = 10_000;
 
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
+    if let Some(run) = general::run_of(&arguments.flags)? {
+        return of_general(arguments, run);
+    }
+    if arguments.period.is_some() {
+        let why = "equations with h, plus and minus do not see the time; leave it out, and give --section";
+        return Err(CliError::no_effect("--period", why));
+    }
     let spec = arguments.flags.spec(Use::Orbit)?;
     let Observation::Section { coordinate, value } = spec.observe else {
         return Err(CliError::Usage(
@@ -124,6 +139,103 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             exit,
         });
     }
+    deliver(out, &bytes)?;
+    Ok(Exit::Fine)
+}
+
+/// A closed orbit of a general system, through a section or over its period.
+fn of_general(arguments: &Arguments, mut run: GeneralRun) -> Result<Exit, CliError> {
+    let given = arguments.flags.given();
+    let refused = [
+        ("--along", arguments.along.is_some()),
+        ("--downward", arguments.downward),
+        ("--chord", given.contains(&"--chord")),
+        ("--every", given.contains(&"--every")),
+        ("--t-end", given.contains(&"--t-end")),
+    ];
+    if let Some((flag, _)) = refused.iter().find(|(_, given)| *given) {
+        return Err(CliError::no_effect(
+            *flag,
+            "it has none on orbits of general systems; leave it out (a section's other side is -(...)=0)",
+        ));
+    }
+    let driven = run.model.depends_on_time();
+    let after = match (arguments.period, &run.options.record) {
+        (Some(_), Record::Section(_)) => {
+            return Err(CliError::no_effect(
+                "--period",
+                "--section says where an orbit closes; leave one of the two out",
+            ));
+        }
+        (Some(period), _) if period.is_finite() && period > 0.0 => Return::Period(period),
+        (Some(period), _) => return Err(CliError::Usage(format!("--period is {period}: give a time above 0"))),
+        (None, Record::Section(_)) if driven => {
+            return Err(CliError::Usage(
+                "the equations depend on the time: give their period (--period) instead of --section".into(),
+            ));
+        }
+        (None, Record::Section(_)) => Return::Crossings(arguments.returns.unwrap_or(1)),
+        (None, _) => {
+            return Err(CliError::Usage(format!(
+                "an orbit needs a place or time to close: give --section, such as {}=0, or --period of equations that depend on the time",
+                run.model.coordinates()[0]
+            )));
+        }
+    };
+    let settle = arguments.settle.unwrap_or(200.0);
+    if !(settle.is_finite() && settle >= 0.0) {
+        return Err(CliError::Usage(format!("--settle is {settle}: give a time 0 or more")));
+    }
+    let out = arguments.delivery.out.as_deref();
+    let format = ending::format(out, arguments.format, Format::Text)?;
+    if let Format::Csv = format {
+        return Err(CliError::Usage("--format csv: of a general system's orbit give text or json".into()));
+    }
+    try_delivery(out)?;
+    // The phase of a drive is kept: whole periods.
+    let settle = match after {
+        Return::Period(period) => (settle / period).ceil() * period,
+        Return::Crossings(_) => settle,
+    };
+    if settle > 0.0 {
+        let t_end = run.options.t_start + settle;
+        let settling = Options { t_end, record: Record::Times { every: f64::INFINITY }, ..run.options.clone() };
+        let end = follow(&run.model, &settling, &mut |_| true).map_err(general::failed)?;
+        run.options.start = Some(end.x);
+    }
+    run.options.t_end = run.options.t_start + arguments.longest_return;
+    let found = closed_orbit(&run.model, &run.options, &after).map_err(general::failed)?;
+    let largest = found.multipliers.first().map_or(0.0, |[re, im]| (re * re + im * im).sqrt());
+    let names = run.model.coordinates();
+    let bytes = match format {
+        Format::Json => {
+            let about = json!({ "kind": "general-orbit", "question": run.json() });
+            let value = json!({
+                "about": about, "states": names, "point": found.x, "period": found.period,
+                "multipliers": found.multipliers, "gap": found.gap,
+            });
+            let mut bytes = serde_json::to_vec_pretty(&value).expect("plain data: string keys, no failing serialisers");
+            bytes.push(b'\n');
+            bytes
+        }
+        _ => {
+            let mut text = String::new();
+            let mut line = |label: &str, what: String| {
+                let _ = writeln!(text, "{label:<13} {what}");
+            };
+            line("period", format!("{}", found.period));
+            line("point", names.iter().zip(&found.x).map(|(n, x)| format!("{n} = {x}")).collect::<Vec<_>>().join(", "));
+            line("multipliers", complex(&found.multipliers));
+            let stability = match () {
+                () if (largest - 1.0).abs() < 1e-6 => "neutral: a multiplier is on the unit circle within its error",
+                () if largest < 1.0 => "attracts",
+                () => "repels",
+            };
+            line("stability", stability.into());
+            line("closed to", format!("{:.1e} of the largest state", found.gap));
+            text.into_bytes()
+        }
+    };
     deliver(out, &bytes)?;
     Ok(Exit::Fine)
 }
