@@ -913,18 +913,16 @@ impl<'a> Follower<'a> {
                 let scale = scale_now(follower, &step);
                 let error = step.error(&|i| scale[i]);
                 if error <= 1.0 {
-                    match follower.unseen(&step, &scale) {
-                        None => break error,
-                        // What the step did not see begins there: it is made to end before.
-                        Some(theta) => {
-                            rejected += 1;
-                            wanted *= theta.clamp(0.05, 0.9);
-                            if follower.t + wanted == follower.t || rejected > 200 {
-                                break error;
-                            }
-                            continue;
-                        }
+                    // What the step did not see begins there: it is made to end before.
+                    let shorter = follower.unseen(&step, &scale).map(|theta| theta.clamp(0.05, 0.9));
+                    let shorter = shorter.or_else(|| follower.too_long_for_tangents(&step));
+                    let Some(factor) = shorter else { break error };
+                    rejected += 1;
+                    wanted *= factor;
+                    if follower.t + wanted == follower.t || rejected > 200 {
+                        break error;
                     }
+                    continue;
                 }
                 rejected += 1;
                 let factor = if error.is_nan() { 0.1 } else { (0.9 * rough_pow(error, -0.2)).clamp(0.1, 0.9) };
@@ -934,7 +932,8 @@ impl<'a> Follower<'a> {
                 }
             };
             let stopped = to_stop && rejected == 0;
-            let h_next = wanted * if error > 0.0 { (0.9 * rough_pow(error, -0.2)).clamp(0.2, 5.0) } else { 5.0 };
+            let most = if rejected > 0 { 1.2 } else { 5.0 };
+            let h_next = wanted * if error > 0.0 { (0.9 * rough_pow(error, -0.2)).clamp(0.2, most) } else { most };
             // The first thing that is met.
             let list = self.sought();
             let mut found: Vec<(f64, Sought)> = Vec::new();

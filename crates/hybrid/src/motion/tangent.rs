@@ -9,11 +9,14 @@
 
 use super::{Ending, Follower, HybridError, Options, Record, Sought};
 use crate::Model;
-use crate::step::{A, Step};
+use crate::step::{A, C, E, Step};
 use twofold_num::Dual;
-use twofold_num::elementary::ln;
+use twofold_num::elementary::{ln, rough_pow};
 use twofold_num::linear::{eigenvalues, solve_any};
 use twofold_system::Expression;
+
+/// Local error of a tangent vector, relative to itself.
+const TANGENT_TOLERANCE: f64 = 1e-9;
 
 type D = Dual<f64, 1>;
 type DD = Dual<D, 1>;
@@ -35,12 +38,15 @@ pub(super) struct Before {
 }
 
 impl Follower<'_> {
-    /// Carries the tangent vectors through a step, by the derivative of its stages.
-    pub(super) fn carry(&mut self, step: &Step) {
-        let Some(mut tangents) = self.tangents.take() else { return };
+    /// Carries the tangent vectors through a step, by the derivative of its stages; gives the largest error that the embedded formula estimates,
+    /// relative to the vector.
+    pub(super) fn carry(&mut self, step: &Step) -> f64 {
+        let Some(mut tangents) = self.tangents.take() else { return 0.0 };
         let n = self.n;
+        let mut worst = 0.0_f64;
         for y in &mut tangents.vectors {
             let mut k: Vec<Vec<f64>> = Vec::with_capacity(7);
+            let mut end = Vec::new();
             for s in 0..7 {
                 let (mut x, mut v) = (step.x.clone(), y.clone());
                 for (a, (kx, kv)) in A[s].iter().zip(step.k.iter().zip(&k)) {
@@ -49,15 +55,26 @@ impl Follower<'_> {
                         v[i] += step.h * a * kv[i];
                     }
                 }
-                if s == 6 {
-                    *y = v;
-                    break;
-                }
-                let t = step.t + crate::step::C[s] * step.h;
-                k.push(self.slope_along(t, &x, &v));
+                k.push(self.slope_along(step.t + C[s] * step.h, &x, &v));
+                end = v;
             }
+            let size = y.iter().chain(&end).fold(0.0_f64, |most, v| most.max(v.abs()));
+            for i in 0..n {
+                let error: f64 = E.iter().zip(&k).map(|(e, k)| e * k[i]).sum::<f64>() * step.h;
+                worst = worst.max(error.abs() / size.max(f64::MIN_POSITIVE));
+            }
+            *y = end;
         }
         self.tangents = Some(tangents);
+        worst
+    }
+
+    /// Whether a step is too long for the tangent vectors: by which factor it should be shorter.
+    pub(super) fn too_long_for_tangents(&mut self, step: &Step) -> Option<f64> {
+        let kept = self.tangents.clone()?;
+        let error = self.carry(step) / (TANGENT_TOLERANCE.max(self.options.rtol));
+        self.tangents = Some(kept);
+        (error > 1.0).then(|| (0.9 * rough_pow(error, -0.2)).clamp(0.1, 0.9))
     }
 
     /// The derivative of the field in the direction `v`, sliding included.
