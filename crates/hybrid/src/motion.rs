@@ -928,9 +928,15 @@ impl<'a> Follower<'a> {
                 let factor = if error.is_nan() { 0.1 } else { (0.9 * rough_pow(error, -0.2)).clamp(0.1, 0.9) };
                 wanted *= factor;
                 if self.t + wanted == self.t || rejected > 200 {
-                    return Err(self.left_domain(self.t + wanted, &step.x.clone()));
+                    break f64::NAN;
                 }
             };
+            if error.is_nan() {
+                if self.land_at_an_edge()? {
+                    continue;
+                }
+                return Err(self.left_domain(self.t + wanted, &step.x.clone()));
+            }
             let stopped = to_stop && rejected == 0;
             let most = if rejected > 0 { 1.2 } else { 5.0 };
             let h_next = wanted * if error > 0.0 { (0.9 * rough_pow(error, -0.2)).clamp(0.2, most) } else { most };
@@ -997,7 +1003,9 @@ impl<'a> Follower<'a> {
             self.t = end;
             self.x.copy_from_slice(&step.y);
             self.note_growth(end);
-            self.clear_fresh(&list, &list_values[4], earliest.is_finite());
+            if progress {
+                self.clear_fresh(&list, &list_values[4], earliest.is_finite());
+            }
             h = if earliest.is_finite() {
                 // Where things happen often, steps are about as long as what is between them.
                 let between = std::mem::replace(&mut last_met, self.t);
@@ -1108,6 +1116,51 @@ impl<'a> Follower<'a> {
         HybridError::Domain { t, x: x.to_vec(), what }
     }
 
+    /// Where an expression's domain ends at a switch, as that of |x|^0.5 does on either side, no step goes across. Very near to it the state is put
+    /// onto the switch, and what holds there is decided; false if no switch is so near.
+    fn land_at_an_edge(&mut self) -> Result<bool, HybridError> {
+        let n = self.n;
+        let (t, x) = (self.t, self.x.clone());
+        let mut field = vec![0.0; n];
+        self.rhs(t, &x, &mut field);
+        let values = self.watched_values();
+        let rates = Self::along(&self.compiled, &self.variables, &field);
+        let mut nearest: Option<(f64, usize, usize)> = None;
+        for (place, guard) in self.compiled.active.iter().enumerate() {
+            let left = -values[place] / rates[place];
+            let closer = nearest.is_none_or(|(best, ..)| left < best);
+            let open = !self.sliding.contains(guard) && !self.equation.guards[*guard].whole;
+            if open && left > 0.0 && left <= 1e-9 * (self.options.t_end - self.options.t_start) && closer {
+                nearest = Some((left, place, *guard));
+            }
+        }
+        let Some((left, place, guard)) = nearest else { return Ok(false) };
+        let gradient: Vec<f64> = (0..n)
+            .map(|i| {
+                let mut unit = vec![0.0; n];
+                unit[i] = 1.0;
+                let mut still = self.variables.clone();
+                still[n] = t;
+                let with_time = Self::along(&self.compiled, &still, &unit)[place];
+                with_time - Self::along(&self.compiled, &still, &vec![0.0; n])[place]
+            })
+            .collect();
+        for i in 0..n {
+            self.x[i] += left * field[i];
+        }
+        self.t += left;
+        let off = self.watched_values()[place];
+        let size: f64 = gradient.iter().map(|g| g * g).sum();
+        if off != 0.0 && size > 0.0 {
+            self.x.iter_mut().zip(&gradient).for_each(|(x, g)| *x -= off * g / size);
+        }
+        self.outcome.switches += 1;
+        let mut zero = self.sliding.clone();
+        zero.push(guard);
+        self.settle(&zero)?;
+        Ok(true)
+    }
+
     /// Hairer, Norsett & Wanner (1993), sec. II.4, with the file's own scales.
     fn first_step(&mut self, field: &[f64]) -> f64 {
         let (rtol, atol) = (self.options.rtol, self.options.atol.unwrap_or(0.0));
@@ -1195,6 +1248,9 @@ impl<'a> Follower<'a> {
 
     fn clear_fresh(&mut self, list: &[(Sought, f64)], end: &[f64], cut: bool) {
         if cut {
+            // Time has passed: what left zero at the step's beginning is away from it, but for what is met here, which is marked anew.
+            self.fresh_guard.fill(false);
+            self.fresh_watch.fill(false);
             return;
         }
         for ((sought, _), value) in list.iter().zip(end) {

@@ -24,6 +24,10 @@ fn bernstein(v: &[f64; 5]) -> [f64; 5] {
 
 /// Whether the polynomial through these values stays on its side of zero, where it may begin at zero.
 pub(crate) fn stays(v: &[f64; 5], side: f64) -> bool {
+    // What is zero all along passes it nowhere.
+    if v.iter().all(|v| *v == 0.0) {
+        return true;
+    }
     let b = bernstein(v);
     b[1..].iter().all(|c| c * side > 0.0) && b[0] * side >= 0.0
 }

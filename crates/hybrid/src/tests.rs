@@ -453,3 +453,29 @@ fn tangent_vectors_agree_with_finite_differences() {
     near(a[0] + b[0], trace, 1e-5);
     near(a[0] * b[0] - a[1] * b[1], determinant, 1e-5);
 }
+
+/// What left zero at one event is not zero at the next: a ball above another meets the floor and the other by turns.
+#[test]
+fn events_that_follow_each_other_are_told_apart() {
+    let text = "states = ['x1', 'v1', 'x2', 'v2']\nstart = [1, 0, 2, 0]\nf = ['v1', '-9.81', 'v2', '-9.81']\n\
+        [[event]]\nname = 'floor'\nwhen = 'x1'\ndirection = 'down'\nset = { v1 = '-v1' }\n\
+        [[event]]\nname = 'collide'\nwhen = 'x2 - x1'\ndirection = 'down'\nset = { v1 = 'v2', v2 = 'v1' }";
+    let (events, outcome) = run(&model(text), 20.0);
+    let x = outcome.unwrap().x;
+    // Energy stays what it was, and the balls keep their order.
+    near(0.5 * (x[1] * x[1] + x[3] * x[3]) + 9.81 * (x[0] + x[2]), 9.81 * 3.0, 1e-8);
+    assert!(x[0] >= -1e-12 && x[2] >= x[0] - 1e-12 && events.len() > 60, "{x:?} {}", events.len());
+}
+
+/// Roots that are written for one side of a switch each: motion comes to the edge and goes on.
+#[test]
+fn a_domain_may_end_at_a_switch() {
+    // A tank runs empty at t = 2 and stays so.
+    let x = end("states = ['h']\nstart = [1]\nf = ['-sqrt(max(h, 0))']", 5.0);
+    near(x[0], 0.0, 1e-12);
+    // |x|^0.5 on both sides: x' = -1.5 sqrt(|x|) sign(x) - 1 from 1 crosses 0 at t = 4/3 (1 - 2/3 ln(5/2)).
+    let x = end("states = ['x', 't0']\nstart = [1, 0]\nf = ['-1.5*abs(x)^0.5*sign(x) - 1', 'x > 0']", 3.0);
+    near(x[1], 4.0 / 3.0 * (1.0 - 2.0 / 3.0 * 2.5_f64.ln()), 1e-8);
+    // It tends to where 1.5 sqrt(-x) = 1.
+    near(end("states = ['x']\nstart = [1]\nf = ['-1.5*abs(x)^0.5*sign(x) - 1']", 30.0)[0], -4.0 / 9.0, 1e-8);
+}
