@@ -208,12 +208,31 @@ const INSTEAD: [(&str, &str); 30] = [
     ("hypot", "hypot(a, b) = sqrt(a^2 + b^2)"),
     ("heaviside", "heaviside(x) = (1 + sign(x))/2; better: make x the switching function h"),
     ("step", "step(x) = (1 + sign(x))/2; better: make x the switching function h"),
-    ("if", "expressions do not branch: f+ and f- are given apart, h says which one holds"),
+    ("if", BRANCH),
     ("sat", "the saturation of x at -1 and 1 is (abs(x + 1) - abs(x - 1))/2"),
     ("clip", "x between a and b: (a + b + abs(x - a) - abs(x - b))/2"),
 ];
+const BRANCH: &str = "expressions do not branch: f+ and f- are given apart, h says which one holds";
 const PHASE: &str =
     "carry a phase as two states, its cosine c and sine s (c' = -w*s, s' = w*c); the angle is 2*atan(s/(1 + c))";
+
+/// The same in general systems, which have most of them.
+const INSTEAD_IN_GENERAL: [(&str, &str); 14] = [
+    ("fmod", "write mod(a, b), which has the sign of b"),
+    ("rem", "write mod(a, b), which has the sign of b"),
+    ("ceil", "ceil(x) = -floor(-x)"),
+    ("round", "round(x) = floor(x + 0.5)"),
+    ("log2", "log2(x) = ln(x)/ln(2)"),
+    ("arctan", "write atan(x)"),
+    ("arcsin", "write asin(x)"),
+    ("arccos", "write acos(x)"),
+    ("sgn", "write sign(x)"),
+    ("signum", "write sign(x)"),
+    ("fabs", "write abs(x)"),
+    ("pow", "powers are written x^p"),
+    ("step", "write heaviside(x)"),
+    ("sat", "write clip(x, -1, 1)"),
+];
 
 /// Whether `name` means something in every expression.
 pub fn is_reserved(name: &str) -> bool {
@@ -535,12 +554,14 @@ fn tokens(text: &str, dialect: Dialect) -> Result<Vec<(Token, Range<usize>)>, Ex
             _ => {
                 let c = text[at..].chars().next().unwrap_or(' ');
                 let help = match c {
+                    '|' | '&' if dialect == Dialect::General => {
+                        Some("write abs(x) for |x|; conditions are joined by `and` and `or`")
+                    }
+                    '?' if dialect == Dialect::General => Some("write if(condition, a, b)"),
                     '|' => Some("write abs(x) for |x|"),
                     '\'' => Some("components are given in the order of the states; write no derivatives"),
                     '[' | ']' | '{' | '}' => Some("only round parentheses group"),
-                    '<' | '>' | '=' | '?' => {
-                        Some("expressions do not branch: f+ and f- are given apart, h says which one holds")
-                    }
+                    '<' | '>' | '=' | '?' => Some(BRANCH),
                     '·' | '×' => Some("products are written a*b"),
                     '−' => Some("this is a typographic minus; write -"),
                     'π' => Some("write pi"),
@@ -850,25 +871,42 @@ impl Parser<'_> {
             return Ok(Expression::Name(name.into()));
         }
         if self.peek() == &Token::Open {
-            let functions = Function::ALL.map(|(n, _)| n);
-            let list = format!("supported functions are {}", functions.join(", "));
-            let lower = name.to_ascii_lowercase();
-            let help = match (INSTEAD.iter().find(|(n, _)| *n == lower), nearest(name, &functions)) {
-                (Some((_, instead)), _) => format!("{name} is not supported: {instead}; {list}"),
-                (None, Some(near)) => format!("did you mean `{near}`? {list}"),
-                (None, None) => list,
-            };
-            return error(format!("there is no function `{name}`"), Some(help));
+            return error(format!("there is no function `{name}`"), Some(self.function_help(name)));
         }
         let help = match nearest(name, self.names) {
             Some(near) => format!("did you mean `{near}`?"),
             None if name == "t" => {
-                "equations do not see the time; a forced system carries it as a state with derivative 1".into()
+                "equations do not see the time; a forced system carries it as a state with derivative 1, or is written as f = [...]"
+                    .into()
             }
             None if name == "e" => "write exp(1) for the base of natural logarithms".into(),
             None => format!("known here: {}", self.names.join(", ")),
         };
         error(format!("unknown name `{name}`"), Some(help))
+    }
+
+    /// Advice for a function that there is not.
+    fn function_help(&self, name: &str) -> String {
+        let general = self.dialect == Dialect::General;
+        let mut functions: Vec<&str> = Function::ALL.iter().map(|(n, _)| *n).collect();
+        if general {
+            functions.extend(General::ALL.iter().map(|(n, ..)| *n));
+        }
+        let list = format!("supported functions are {}", functions.join(", "));
+        let lower = name.to_ascii_lowercase();
+        let among = |table: &'static [(&str, &'static str)]| table.iter().find(|(n, _)| *n == lower).map(|(_, i)| *i);
+        let instead = match general {
+            true => among(&INSTEAD_IN_GENERAL).or_else(|| among(&INSTEAD).filter(|_| General::entry(&lower).is_none())),
+            false => among(&INSTEAD),
+        };
+        match (instead, nearest(name, &functions)) {
+            (Some(instead), _) if !general && General::entry(&lower).is_some() => {
+                format!("{name} is not supported here: {instead}; a system written as f = [...] has {lower}; {list}")
+            }
+            (Some(instead), _) => format!("{name} is not supported: {instead}; {list}"),
+            (None, Some(near)) => format!("did you mean `{near}`? {list}"),
+            (None, None) => list,
+        }
     }
 
     /// The arguments of a function of general systems.
@@ -1047,6 +1085,76 @@ mod tests {
         }
     }
 
+    /// (text, how it is printed)
+    const GENERAL: [(&str, &str); 20] = [
+        ("max(x, 0, alpha)", "max(x, 0, alpha)"),
+        ("x < 1", "1 > x"),
+        ("x >= 1", "x > 1"),
+        ("x <= 1", "1 > x"),
+        ("not x > 0 and t < 1 or alpha > 0", "not x > 0 and 1 > t or alpha > 0"),
+        ("not (x > 0 and (t < 1 or alpha > 0))", "not (x > 0 and (1 > t or alpha > 0))"),
+        ("(x > 0)*(1 - x)", "(x > 0)*(1 - x)"),
+        ("x + 1 > alpha*2", "x + 1 > alpha*2"),
+        ("if((x > 0), 1, -1)", "if(x > 0, 1, -1)"),
+        ("if(x > 0, if(t > 1, 2, 3), 4)", "if(x > 0, if(t > 1, 2, 3), 4)"),
+        ("mod(t/2, 1)", "mod(t/2, 1)"),
+        ("clip(x, -1, 1)^2", "clip(x, -1, 1)^2"),
+        ("x^alpha", "x^alpha"),
+        ("x^-0.5", "x^-0.5"),
+        ("x^(1/3)", "x^(1/3)"),
+        ("x^alpha^2", "x^alpha^2"),
+        ("-x^0.5", "-x^0.5"),
+        ("atan2(x, alpha) - log10(x)*log(x)", "atan2(x, alpha) - log10(x)*log(x)"),
+        ("sinh(x) + cosh(x) + asin(x) + acos(x)", "sinh(x) + cosh(x) + asin(x) + acos(x)"),
+        ("heaviside(floor(x) - min(t, 1))", "heaviside(floor(x) - min(t, 1))"),
+    ];
+
+    #[test]
+    fn general_expressions_are_read_and_printed() {
+        for (text, want) in GENERAL {
+            let parsed = Expression::parse_general(text, &NAMES).unwrap_or_else(|e| panic!("{text}: {e}"));
+            assert_eq!(parsed.to_string(), want);
+            assert_eq!(Expression::parse_general(want, &NAMES), Ok(parsed));
+        }
+    }
+
+    /// (text, marked part, message, help)
+    const WRONG_IN_GENERAL: [(&str, &str, &str, &str); 19] = [
+        ("x > 0 && t > 1", "&", "no meaning", "`and`"),
+        ("x > 0 ? 1 : 2", "?", "no meaning", "if(condition, a, b)"),
+        ("if(x == 0, 1, 2)", "=", "equality", "[[event]]"),
+        ("if(x, 1, 2)", "x", "a condition is wanted", "x > 0"),
+        ("if(x > 0, 1)", "if", "3 arguments; 2 given", "if(x > 0, a, b)"),
+        ("not x", "x", "a condition is wanted", "x > 0"),
+        ("x > 0 and alpha", "alpha", "a condition is wanted", "x > 0"),
+        ("x or alpha > 0", "x", "a condition is wanted", "x > 0"),
+        ("0 < x < 1", "<", "two comparisons", "0 < x and x < 1"),
+        ("max(x)", "max", "2 arguments or more; 1 given", ""),
+        ("mod(x, 1, 2)", "mod", "2 arguments; 3 given", ""),
+        ("floor + 1", "floor", "needs its arguments", "floor(...)"),
+        ("clip(x, 0, 1", "(", "never closed", "add a `)`"),
+        ("Max(x, 0)", "Max", "no function `Max`", "did you mean `max`?"),
+        ("ceil(x)", "ceil", "no function `ceil`", "-floor(-x)"),
+        ("step(x)", "step", "no function `step`", "heaviside(x)"),
+        ("cbrt(x)", "cbrt", "no function `cbrt`", "exp(ln(abs(x))/3)"),
+        ("frob(x)", "frob", "no function `frob`", "heaviside"),
+        ("x^65", "65", "too large", ""),
+    ];
+
+    #[test]
+    fn errors_in_general_expressions_point_and_advise() {
+        for (text, marked, message, help) in WRONG_IN_GENERAL {
+            let error = Expression::parse_general(text, &NAMES).expect_err(text);
+            assert_eq!(&text[error.span.clone()], marked, "{text}: {error:?}");
+            assert!(error.message.contains(message), "{text}: {error:?}");
+            assert!(error.help.clone().unwrap_or_default().contains(help), "{text}: {error:?}");
+        }
+        for name in ["max", "min", "mod", "floor", "if", "heaviside", "clip"] {
+            let help = Expression::parse(&format!("{name}(x)"), &NAMES).unwrap_err().help.unwrap();
+            assert!(help.contains(&format!("a system written as f = [...] has {name}")), "{help}");
+        }
+    }
+
     #[test]
     fn bounds() {
         let message = |text: &str| Expression::parse(text, &NAMES).unwrap_err().message;
@@ -1083,6 +1191,38 @@ mod tests {
         })
     }
 
+    /// Also what only general systems may say.
+    fn any_general_expression() -> impl Strategy<Value = Expression> {
+        let condition = |e: Expression| match e.is_condition() {
+            true => Box::new(e),
+            false => Box::new(Expression::Greater(Box::new(e), Box::new(Expression::Pi))),
+        };
+        let leaf = prop_oneof![any_expression(), Just(Expression::Name("t".into()))];
+        leaf.prop_recursive(4, 60, 4, move |inner| {
+            let pair = (inner.clone(), inner.clone());
+            let function = (0..General::ALL.len(), prop::collection::vec(inner.clone(), 5), 0..3_usize);
+            prop_oneof![
+                pair.clone().prop_map(|(a, b)| Expression::Greater(Box::new(a), Box::new(b))),
+                pair.clone().prop_map(move |(a, b)| Expression::And(condition(a), condition(b))),
+                pair.clone().prop_map(move |(a, b)| Expression::Or(condition(a), condition(b))),
+                inner.clone().prop_map(move |a| Expression::Not(condition(a))),
+                pair.clone().prop_map(|(a, b)| Expression::Mul(Box::new(a), Box::new(b))),
+                pair.clone().prop_map(|(a, b)| Expression::Sub(Box::new(a), Box::new(b))),
+                // A whole exponent is another kind of power.
+                pair.prop_filter("whole", |(_, b)| whole(b).is_none())
+                    .prop_map(|(a, b)| Expression::RealPower(Box::new(a), Box::new(b))),
+                function.prop_map(move |(i, mut list, more)| {
+                    let (_, function, counts) = General::ALL[i].clone();
+                    list.truncate((counts.start + more).min(counts.end - 1));
+                    if function == General::If {
+                        list[0] = *condition(list[0].clone());
+                    }
+                    Expression::Apply(function, list)
+                }),
+            ]
+        })
+    }
+
     fn tape(expression: &Expression) -> Tape {
         Tape::record(1, |x| {
             let mut name = |n: &str| if n == "x" { x[0] } else { Recorded::parameter(n, &0.5.into()) };
@@ -1100,6 +1240,13 @@ mod tests {
         }
 
         #[test]
+        fn printing_and_parsing_give_the_general_expression_back(expression in any_general_expression()) {
+            let text = expression.to_string();
+            prop_assume!(text.len() <= MAX_LENGTH);
+            prop_assert_eq!(Expression::parse_general(&text, &NAMES), Ok(expression), "{}", text);
+        }
+
+        #[test]
         fn the_tape_gives_the_bits_of_plain_evaluation(expression in any_expression(), x in -3.0..3.0_f64) {
             let mut name = |n: &str| if n == "x" { x } else { 0.5 };
             let want = expression.evaluate(&mut name, &Decimal::value);
@@ -1110,7 +1257,7 @@ mod tests {
 
         #[test]
         fn no_text_panics(text in "[-+*/^()x0-9.e|a-z ]{0,60}|\\PC{0,30}") {
-            if let Err(error) = Expression::parse(&text, &NAMES) {
+            for error in [Expression::parse(&text, &NAMES), Expression::parse_general(&text, &NAMES)].into_iter().filter_map(Result::err) {
                 prop_assert!(text.get(error.span).is_some());
             }
         }
