@@ -516,24 +516,15 @@ impl Definition {
         }
         let names = names(d)?;
         let all: Vec<&str> = names.iter().map(|(_, n)| *n).collect();
+        let conditions = conditions(d, &all);
         let parse = |place: Place, text: &str, known: &[&str]| {
-            Expression::parse_general(text, known).map_err(|error: ExpressionError| Problem {
+            let parsed = Expression::parse_general_with(text, known, &conditions);
+            parsed.map_err(|error: ExpressionError| Problem {
                 place,
                 within: Some((text.to_owned(), error.span)),
                 message: error.message,
                 help: error.help,
             })
-        };
-        let number = |place: Place, text: &str, known: &[&str]| {
-            let parsed = parse(place.clone(), text, known)?;
-            if parsed.is_condition() {
-                return problem(
-                    place,
-                    "a condition stands where a number is wanted",
-                    Some("if(condition, 1, 0) makes it one"),
-                );
-            }
-            Ok(parsed)
         };
         let n = d.states.len();
         let list = |place: Place, texts: &[Constant]| -> Result<Vec<Expression>, Problem> {
@@ -542,7 +533,7 @@ impl Definition {
                 let message = format!("{} expressions for {n} states ({})", texts.len(), names.join(", "));
                 return problem(place, message, Some("give one for each state, in their order"));
             }
-            texts.iter().enumerate().map(|(i, c)| number(item(&place, i), &c.text(), &all)).collect()
+            texts.iter().enumerate().map(|(i, c)| parse(item(&place, i), &c.text(), &all)).collect()
         };
         let mut parameters: Vec<Parameter> = Vec::new();
         for (name, entry) in &d.parameters.0 {
@@ -554,7 +545,7 @@ impl Definition {
                     (value, About { meaning: meaning.clone(), unit: unit.clone() }, (*above, *below))
                 }
             };
-            let value = number(place.clone(), &value.text(), &known)?;
+            let value = parse(place.clone(), &value.text(), &known)?;
             if value.names().contains(&"t") {
                 return problem(place, "a parameter does not depend on the time", Some("put it into [let]"));
             }
@@ -568,7 +559,7 @@ impl Definition {
         let modes = match (&d.f, &d.h, d.modes.0.is_empty()) {
             (Some(f), None, true) => vec![Mode { name: String::new(), field: list(key("f"), f)? }],
             (None, Some(h), true) => {
-                let switching = number(key("h"), h, &all)?;
+                let switching = parse(key("h"), h, &all)?;
                 let missing = || problem(key("h"), "h needs both `plus` and `minus`", None);
                 let Some(plus) = &d.plus else { return missing() };
                 let Some(minus) = &d.minus else { return missing() };
@@ -625,7 +616,8 @@ impl Definition {
                 (Some(text), None, None) => {
                     let at = inside(&place, "when");
                     let parsed = parse(at.clone(), text, &all)?;
-                    if parsed.is_condition() {
+                    let named = matches!(&parsed, Expression::Name(name) if conditions.contains(&name.as_str()));
+                    if parsed.is_condition() || named {
                         if entry.direction.is_some() {
                             let help = "leave direction out, or give an expression whose zero is met";
                             return problem(
@@ -644,10 +636,10 @@ impl Definition {
                         Constants::One(one) => vec![one.clone()],
                         Constants::List(list) => list.clone(),
                     };
-                    let read = times.iter().map(|c| number(inside(&place, "at"), &c.text(), &constants));
+                    let read = times.iter().map(|c| parse(inside(&place, "at"), &c.text(), &constants));
                     When::At(read.collect::<Result<_, _>>()?)
                 }
-                (None, None, Some(period)) => When::Every(number(inside(&place, "every"), &period.text(), &constants)?),
+                (None, None, Some(period)) => When::Every(parse(inside(&place, "every"), &period.text(), &constants)?),
                 (None, None, None) => {
                     return problem(place, "it is not said when the event fires", Some("give when, at or every"));
                 }
@@ -671,7 +663,7 @@ impl Definition {
                         .map_or(format!("states are {}", known.join(", ")), |n| format!("did you mean `{n}`?"));
                     return problem(at, format!("there is no state `{name}` to set"), Some(&help));
                 };
-                set.push((state, number(at, &value.text(), &all)?));
+                set.push((state, parse(at, &value.text(), &all)?));
             }
             let mode = mode_named(inside(&place, "mode"), &entry.mode)?;
             let from = mode_named(inside(&place, "from"), &entry.from)?;
@@ -697,7 +689,7 @@ impl Definition {
             }
             Some(start) => {
                 let known: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
-                let read = start.iter().enumerate().map(|(i, c)| number(item(&key("start"), i), &c.text(), &known));
+                let read = start.iter().enumerate().map(|(i, c)| parse(item(&key("start"), i), &c.text(), &known));
                 Some(read.collect::<Result<_, _>>()?)
             }
         };
@@ -720,6 +712,28 @@ impl Definition {
         let tables = d.tables.0.clone();
         Ok(Self { states, parameters, start, axes, terms, modes, events, tables, document })
     }
+}
+
+/// The names in `[let]` that stand for conditions.
+fn conditions<'a>(d: &'a Document, names: &[&str]) -> Vec<&'a str> {
+    // Read as if every term were a condition where one is wanted: what a term is does not depend on that.
+    let terms: Vec<&str> = d.terms.0.iter().map(|(n, _)| n.as_str()).collect();
+    let read = |text: &Constant| Expression::parse_general_with(&text.text(), names, &terms).ok();
+    let parsed: Vec<Option<Expression>> = d.terms.0.iter().map(|(_, text)| read(text)).collect();
+    let mut found: Vec<&str> = Vec::new();
+    for _ in 0..=terms.len() {
+        for (name, e) in terms.iter().zip(&parsed) {
+            let holds = match e {
+                Some(Expression::Name(other)) => found.contains(&other.as_str()),
+                Some(e) => e.is_condition(),
+                None => false,
+            };
+            if holds && !found.contains(name) {
+                found.push(name);
+            }
+        }
+    }
+    found
 }
 
 /// All names that expressions may use, each sound and given once, with its place.

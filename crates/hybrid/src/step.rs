@@ -24,6 +24,9 @@ const D: [f64; 7] = [
     69_997_945.0 / 29_380_423.0,
 ];
 
+/// Writes the derivatives at a time and state.
+pub(crate) type RightHandSide<'a> = dyn FnMut(f64, &[f64], &mut [f64]) + 'a;
+
 /// A step and the room for it.
 #[derive(Clone, Debug)]
 pub(crate) struct Step {
@@ -56,7 +59,7 @@ impl Step {
     }
 
     /// Makes a step of length `h` from where it begins; `rhs` writes the derivatives.
-    pub fn take(&mut self, h: f64, rhs: &mut dyn FnMut(f64, &[f64], &mut [f64])) {
+    pub fn take(&mut self, h: f64, rhs: &mut RightHandSide<'_>) {
         self.h = h;
         let n = self.x.len();
         for s in 1..7 {

@@ -479,3 +479,14 @@ fn a_domain_may_end_at_a_switch() {
     // It tends to where 1.5 sqrt(-x) = 1.
     near(end("states = ['x']\nstart = [1]\nf = ['-1.5*abs(x)^0.5*sign(x) - 1']", 30.0)[0], -4.0 / 9.0, 1e-8);
 }
+
+/// A condition may have a name.
+#[test]
+fn conditions_have_names() {
+    let x = end(
+        "states = ['x']\nstart = [0]\nf = ['if(late and not cold, 2, 1) + late']\n[let]\nlate = 't > 1'\ncold = 'early'\nearly = 't < 2'",
+        3.0,
+    );
+    // 1 to t = 1, 2 to t = 2, 3 to t = 3.
+    near(x[0], 6.0, 1e-10);
+}

@@ -304,7 +304,7 @@ impl Expression {
     /// # Errors
     /// If the text is no expression, names something unknown, or is beyond the bounds of this module.
     pub fn parse(text: &str, names: &[&str]) -> Result<Self, ExpressionError> {
-        Self::parse_in(text, names, Dialect::Smooth)
+        Self::parse_in(text, names, &[], Dialect::Smooth)
     }
 
     /// Reads an expression of a general system, in which names, `t`, [`General`] functions, comparisons and `and`, `or`, `not` may appear.
@@ -318,10 +318,23 @@ impl Expression {
     /// assert_eq!(clamped.to_string(), "if(x > 0 and 1 > t, min(x, 1), -x^0.5)");
     /// ```
     pub fn parse_general(text: &str, names: &[&str]) -> Result<Self, ExpressionError> {
-        Self::parse_in(text, names, Dialect::General)
+        Self::parse_in(text, names, &[], Dialect::General)
     }
 
-    fn parse_in(text: &str, names: &[&str], dialect: Dialect) -> Result<Self, ExpressionError> {
+    /// As [`Expression::parse_general`], where some of the names stand for conditions.
+    ///
+    /// # Errors
+    /// As [`Expression::parse_general`].
+    pub fn parse_general_with(text: &str, names: &[&str], conditions: &[&str]) -> Result<Self, ExpressionError> {
+        Self::parse_in(text, names, conditions, Dialect::General)
+    }
+
+    fn parse_in(
+        text: &str,
+        names: &[&str],
+        conditions: &[&str],
+        dialect: Dialect,
+    ) -> Result<Self, ExpressionError> {
         if text.len() > MAX_LENGTH {
             return Err(ExpressionError {
                 message: format!("an expression of {} bytes; the limit is {MAX_LENGTH}", text.len()),
@@ -329,7 +342,7 @@ impl Expression {
                 help: Some("name parts of it in [let]".into()),
             });
         }
-        let mut parser = Parser { text, tokens: tokens(text, dialect)?, at: 0, depth: 0, terms: 0, names, dialect };
+        let mut parser = Parser { text, tokens: tokens(text, dialect)?, at: 0, depth: 0, terms: 0, names, conditions, dialect };
         if parser.peek() == &Token::End {
             return Err(parser.error("an empty expression", Some("write 0 for a component that vanishes".into())));
         }
@@ -590,6 +603,8 @@ struct Parser<'a> {
     depth: usize,
     terms: usize,
     names: &'a [&'a str],
+    /// Those that stand for conditions.
+    conditions: &'a [&'a str],
     dialect: Dialect,
 }
 
@@ -650,7 +665,7 @@ impl Parser<'_> {
         let start = self.span().start;
         let found = read(self)?;
         let end = self.tokens[self.at.saturating_sub(1)].1.end;
-        if condition && !found.is_condition() {
+        if condition && !self.is_condition(&found) {
             return Err(ExpressionError {
                 message: "a condition is wanted here, not a number".into(),
                 span: start..end,
@@ -684,8 +699,12 @@ impl Parser<'_> {
         Ok(left)
     }
 
+    fn is_condition(&self, e: &Expression) -> bool {
+        e.is_condition() || matches!(e, Expression::Name(name) if self.conditions.contains(&name.as_str()))
+    }
+
     fn must_be_condition(&self, left: &Expression, start: usize) -> Result<(), ExpressionError> {
-        if left.is_condition() {
+        if self.is_condition(left) {
             return Ok(());
         }
         Err(ExpressionError {

@@ -290,16 +290,16 @@ fn solve_duals(mut a: Vec<D>, mut b: Vec<D>) -> Vec<D> {
             let factor = a[r * k + c] / a[c * k + c];
             for j in c..k {
                 let less = factor * a[c * k + j];
-                a[r * k + j] = a[r * k + j] - less;
+                a[r * k + j] -= less;
             }
             let less = factor * b[c];
-            b[r] = b[r] - less;
+            b[r] -= less;
         }
     }
     for r in (0..k).rev() {
         let mut sum = b[r];
         for j in r + 1..k {
-            sum = sum - a[r * k + j] * b[j];
+            sum -= a[r * k + j] * b[j];
         }
         b[r] = sum / a[r * k + r];
     }

@@ -1,0 +1,76 @@
+//! Times at which something is known to happen.
+
+use super::*;
+
+/// Times at which something is known to happen: events' and tables' knots.
+pub(super) struct Clock {
+    /// Times to come, latest first, each with its event.
+    once: Vec<(f64, Option<usize>)>,
+    /// Period, next multiple, event.
+    periodic: Vec<(f64, f64, usize)>,
+}
+
+impl Clock {
+    pub(super) fn new(follower: &Follower) -> Result<Self, HybridError> {
+        let constant =
+            |e: &Expression| crate::model::evaluate(e, &|name| follower.equation.values().get(name).copied());
+        let mut clock = Self { once: Vec::new(), periodic: Vec::new() };
+        for (i, event) in follower.model.definition().events().iter().enumerate() {
+            match &event.when {
+                When::At(times) => {
+                    for time in times {
+                        let time = constant(time);
+                        if !time.is_finite() {
+                            return Err(HybridError::Bad(format!(
+                                "{}: `at` is {time}; give a finite time",
+                                event.name
+                            )));
+                        }
+                        if time > follower.t || time == follower.options.t_start {
+                            clock.once.push((time, Some(i)));
+                        }
+                    }
+                }
+                When::Every(period) => {
+                    let period = constant(period);
+                    if !(period.is_finite() && period > 0.0) {
+                        return Err(HybridError::Bad(format!(
+                            "{}: `every` is {period}; give a time above 0",
+                            event.name
+                        )));
+                    }
+                    clock.periodic.push((period, (follower.t / period).floor() + 1.0, i));
+                }
+                _ => {}
+            }
+        }
+        for table in &follower.equation.tables {
+            clock.once.extend(table.knots.iter().filter(|k| **k > follower.t).map(|k| (*k, None)));
+        }
+        clock.once.sort_by(|a, b| b.0.total_cmp(&a.0));
+        Ok(clock)
+    }
+
+    pub(super) fn next(&self) -> Option<f64> {
+        let once = self.once.last().map(|(t, _)| *t);
+        let periodic = self.periodic.iter().map(|(p, k, _)| p * k).fold(f64::INFINITY, f64::min);
+        Some(once.unwrap_or(f64::INFINITY).min(periodic)).filter(|t| t.is_finite())
+    }
+
+    /// The events that happen by `t`, in the file's order.
+    pub(super) fn take(&mut self, t: f64) -> Vec<usize> {
+        let mut happening = Vec::new();
+        while let Some((_, event)) = self.once.pop_if(|(time, _)| *time <= t) {
+            happening.extend(event);
+        }
+        for (period, multiple, event) in &mut self.periodic {
+            while *period * *multiple <= t {
+                *multiple += 1.0;
+                happening.push(*event);
+            }
+        }
+        happening.sort_unstable();
+        happening.dedup();
+        happening
+    }
+}

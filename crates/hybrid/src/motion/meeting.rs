@@ -1,0 +1,349 @@
+//! What happens at a point that is met: crossings, events, resets, contacts.
+
+use super::*;
+
+impl Follower<'_> {
+    // What happens at a point that is met.
+
+    pub(super) fn meet(
+        &mut self,
+        definition: &crate::Definition,
+        met: &[Sought],
+        due: &[usize],
+        observe: &mut dyn FnMut(&Point) -> bool,
+    ) -> Result<Option<Ending>, HybridError> {
+        let mut zero = self.sliding.clone();
+        let mut fired = due.to_vec();
+        let mut passed = Vec::new();
+        let mut crossed = Vec::new();
+        let mut leave = Vec::new();
+        for sought in met {
+            match *sought {
+                Sought::Guard { guard, .. } => {
+                    if !zero.contains(&guard) {
+                        zero.push(guard);
+                    }
+                    crossed.push(guard);
+                }
+                Sought::Watched(i) => {
+                    let side = self.watch_side[i];
+                    passed.push(i);
+                    match self.event_of[i] {
+                        None => {
+                            let (mode, signs, direction) = (self.config.mode, &self.signs, Some(-side));
+                            let point = Point { t: self.t, x: &self.x, mode, signs, event: None, direction };
+                            if !observe(&point) {
+                                return Ok(Some(Ending::Interrupted));
+                            }
+                        }
+                        Some(event) => {
+                            let When::Zero(_, direction) = &definition.events()[event].when else { continue };
+                            let wanted = match direction {
+                                Direction::Both => true,
+                                Direction::Up => side < 0.0,
+                                Direction::Down => side > 0.0,
+                            };
+                            if wanted {
+                                fired.push(event);
+                            }
+                        }
+                    }
+                }
+                Sought::Leave { place, plus } => leave.push((self.sliding[place], plus)),
+                Sought::Repelling => {
+                    let zero = self.sliding.clone();
+                    match self.options.exit {
+                        Exit::Undecided => {
+                            return Err(self.undecided(
+                                &zero,
+                                "sliding ceases to attract: it may go on, or leave at any time to either side",
+                            ));
+                        }
+                        rule => zero.iter().for_each(|g| leave.push((*g, rule == Exit::Plus))),
+                    }
+                }
+                Sought::Release => {
+                    if let Some(contact) = self.contact.take() {
+                        self.watch_side[contact.watched] = contact.above;
+                        self.fresh_watch[contact.watched] = true;
+                        self.trains[contact.event] = Train::default();
+                    }
+                }
+            }
+        }
+        if !leave.is_empty() {
+            self.outcome.switches += 1;
+            let mut config = self.config.clone();
+            for (guard, plus) in &leave {
+                config.sides[*guard] =
+                    if *plus { self.high(*guard, &self.config) } else { self.low(*guard, &self.config) };
+                self.fresh_guard[*guard] = true;
+                zero.retain(|g| g != guard);
+            }
+            self.ask_new(&mut config);
+            let rest: Vec<usize> = self.sliding.iter().copied().filter(|g| zero.contains(g)).collect();
+            self.adopt(config, rest);
+        }
+        if !crossed.is_empty() {
+            self.outcome.switches += 1;
+            self.settle(&zero)?;
+            for guard in crossed {
+                if let Some((t, error)) = self.switch_trains[guard].note(self.t).filter(|_| fired.is_empty()) {
+                    let surfaces = self.names(&[guard]);
+                    return Err(HybridError::Accumulation { t, error, x: self.x.clone(), surfaces });
+                }
+            }
+            self.watch_jumps(definition, &mut passed, &mut fired);
+        }
+        for i in passed {
+            let old = self.watch_side[i];
+            self.watch_side[i] = -old;
+            self.fresh_watch[i] = true;
+        }
+        for (i, event) in definition.events().iter().enumerate() {
+            if let When::Becomes(e) = &event.when {
+                let now = self.equation.holds(e, &self.config);
+                if now && !self.holds[i] {
+                    fired.push(i);
+                }
+                self.holds[i] = now;
+            }
+        }
+        fired.sort_unstable();
+        self.happen(definition, &fired, &zero, observe)
+    }
+
+    /// Lets events happen, in the file's order.
+    pub(super) fn happen(
+        &mut self,
+        definition: &crate::Definition,
+        fired: &[usize],
+        zero: &[usize],
+        observe: &mut dyn FnMut(&Point) -> bool,
+    ) -> Result<Option<Ending>, HybridError> {
+        let fired: Vec<usize> = fired
+            .iter()
+            .copied()
+            .filter(|i| definition.events()[*i].from.is_none_or(|mode| mode == self.config.mode))
+            .collect();
+        if fired.is_empty() {
+            return Ok(None);
+        }
+        let quiet = matches!(self.options.record, Record::Section(_));
+        let mut stop = None;
+        let mut zeno = None;
+        let old = self.x.clone();
+        let mut new = self.x.clone();
+        let mut mode = None;
+        for i in &fired {
+            let event = &definition.events()[*i];
+            self.outcome.events += 1;
+            if !quiet && !self.emit(self.t, Some(&event.name), observe) {
+                return Ok(Some(Ending::Interrupted));
+            }
+            match &self.equation.resets[*i] {
+                Some(program) => {
+                    self.variables[..self.n].copy_from_slice(&old);
+                    self.variables[self.n] = self.t;
+                    let mut values = vec![0.0; event.set.len()];
+                    program.evaluate(&self.variables, &mut values);
+                    event.set.iter().zip(values).for_each(|((state, _), value)| new[*state] = value);
+                }
+                None => {
+                    for (state, value) in &event.set {
+                        new[*state] = self.equation.value(value, self.t, &old);
+                    }
+                }
+            }
+            mode = event.mode.or(mode);
+            if event.stop {
+                stop = Some(Ending::Stopped(event.name.clone()));
+            }
+            let resets = matches!(event.when, When::Zero(..) | When::Becomes(_)) && !event.set.is_empty();
+            if resets && let Some((t, error)) = self.trains[*i].note(self.t) {
+                zeno = Some((*i, t, error));
+            }
+        }
+        if !new.iter().all(|v| v.is_finite()) {
+            let names: Vec<&str> = fired.iter().map(|i| definition.events()[*i].name.as_str()).collect();
+            let why = format!("`set` of {} gives {new:?}, which is no finite state", names.join(", "));
+            return Err(HybridError::Stuck { t: self.t, x: old, why });
+        }
+        let changed = new != old;
+        let set: Vec<(usize, &Expression)> =
+            fired.iter().flat_map(|i| &definition.events()[*i].set).map(|(state, e)| (*state, e)).collect();
+        if !set.is_empty() {
+            self.note_reset(&set, &old);
+        }
+        self.x = new;
+        if changed || mode.is_some() {
+            if let Some(mode) = mode {
+                self.config.mode = mode;
+            }
+            // Expressions that were zero and that the reset leaves alone are zero still.
+            let value = |e: &Expression, x: &[f64]| self.equation.value(e, self.t, x);
+            let stays_zero = |e: &Expression| {
+                let (a, b) = (value(e, &old), value(e, &self.x));
+                (a - b).abs() <= 1e-12 * self.magnitude(e)
+            };
+            let zero: Vec<usize> =
+                zero.iter().copied().filter(|g| stays_zero(&self.equation.guards[*g].expression)).collect();
+            let watched: Vec<usize> = (0..self.watch_side.len())
+                .filter(|i| self.fresh_watch[*i] && stays_zero(&self.equation.watched[*i]))
+                .collect();
+            self.contact = None;
+            if mode.is_some() || !self.equation.guards.is_empty() {
+                self.settle_afresh(&zero)?;
+            }
+            for i in 0..self.watch_side.len() {
+                self.begin_watching(i, watched.contains(&i));
+            }
+            for i in &watched {
+                let Some(event) = self.event_of[*i] else { continue };
+                let When::Zero(_, direction) = definition.events()[event].when else { continue };
+                // Back into the surface at once: infinitely many in no time.
+                let into = match direction {
+                    Direction::Down => self.watch_side[*i] < 0.0,
+                    Direction::Up => self.watch_side[*i] > 0.0,
+                    Direction::Both => false,
+                };
+                if into && fired.contains(&event) && !definition.events()[event].set.is_empty() {
+                    zeno = Some((event, self.t, 4.0 * f64::EPSILON * self.t.abs()));
+                }
+            }
+            self.note_conditions();
+            let setting = fired.iter().rev().find(|i| !definition.events()[**i].set.is_empty());
+            let name = &definition.events()[*setting.unwrap_or(&fired[fired.len() - 1])].name;
+            if !quiet && !self.emit(self.t, Some(name), observe) {
+                return Ok(Some(Ending::Interrupted));
+            }
+        }
+        if stop.is_some() {
+            return Ok(stop);
+        }
+        if let Some((i, t, error)) = zeno {
+            let event = &definition.events()[i];
+            if event.sticks
+                && let Record::Times { every } = self.options.record
+            {
+                while self.next_record <= t {
+                    if !self.emit(self.next_record, None, observe) {
+                        return Ok(Some(Ending::Interrupted));
+                    }
+                    self.next_record = ((self.next_record / every).round() + 1.0) * every;
+                }
+            }
+            let sticks = event.sticks && self.stick(definition, i, t);
+            if !sticks {
+                if !quiet {
+                    self.t = t;
+                    self.emit(t, Some(&event.name), observe);
+                }
+                return Ok(Some(Ending::Zeno { event: event.name.clone(), t, error }));
+            }
+            if !quiet && !self.emit(self.t, Some(&format!("{} at rest", event.name)), observe) {
+                return Ok(Some(Ending::Interrupted));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Puts motion at rest on an event's surface from `t` on; false if the set state does not move the expression's derivative.
+    pub(super) fn stick(&mut self, definition: &crate::Definition, event: usize, t: f64) -> bool {
+        let Some(watched) = self.event_of.iter().position(|e| *e == Some(event)) else { return false };
+        let When::Zero(_, direction) = definition.events()[event].when else { return false };
+        let Some((state, _)) = definition.events()[event].set.first() else { return false };
+        let above = match direction {
+            Direction::Up => -1.0,
+            Direction::Down => 1.0,
+            Direction::Both => {
+                if self.watch_side[watched] >= 0.0 {
+                    1.0
+                } else {
+                    -1.0
+                }
+            }
+        };
+        let contact = Contact { event, watched, state: *state, above };
+        let (config, sliding) = (self.config.clone(), self.sliding.clone());
+        self.adopt(config, sliding);
+        let mut field = vec![0.0; self.n];
+        self.compiled.field.evaluate(&self.variables, &mut field);
+        let (_, grip) = self.contact_forces(contact, &field);
+        if !grip.is_finite() || grip == 0.0 {
+            return false;
+        }
+        self.contact = Some(contact);
+        self.project();
+        // What is left of the time that infinitely many take.
+        let (now, x, mut rate) = (self.t, self.x.clone(), vec![0.0; self.n]);
+        self.rhs(now, &x, &mut rate);
+        for i in 0..self.n {
+            self.x[i] += (t - now) * rate[i];
+        }
+        self.t = t;
+        self.project();
+        true
+    }
+
+    /// Puts the state back onto the surfaces that are slid upon, and a contact's derivative to zero.
+    pub(super) fn project(&mut self) {
+        if let Some(contact) = self.contact {
+            self.variables[..self.n].copy_from_slice(&self.x);
+            self.variables[self.n] = self.t;
+            let mut field = vec![0.0; self.n];
+            self.compiled.field.evaluate(&self.variables, &mut field);
+            let slope =
+                Self::along(&self.compiled, &self.variables, &field)[self.compiled.active.len() + contact.watched];
+            let (_, grip) = self.contact_forces(contact, &field);
+            let correction = slope / grip;
+            if correction.is_finite() {
+                self.x[contact.state] -= correction;
+            }
+            return;
+        }
+        let k = self.sliding.len();
+        self.variables[..self.n].copy_from_slice(&self.x);
+        self.variables[self.n] = self.t;
+        let outputs = self.compiled.active.len() + self.equation.watched.len();
+        let mut values = vec![0.0; outputs];
+        self.compiled.watched.evaluate(&self.variables, &mut values);
+        let boundary: Vec<f64> = self
+            .sliding
+            .iter()
+            .map(|g| if self.equation.guards[*g].whole { self.config.sides[*g] + 1.0 } else { 0.0 })
+            .collect();
+        let off: Vec<f64> =
+            self.sliding.iter().zip(&boundary).map(|(g, b)| active_value(&self.compiled, &values, *g) - b).collect();
+        if off.iter().all(|v| *v == 0.0) && self.tangents.is_none() {
+            return;
+        }
+        let mut rows = vec![vec![0.0; self.n]; k];
+        let mut out = vec![Dual::<f64, 1>::constant(0.0); outputs];
+        for i in 0..self.n {
+            let mut duals: Vec<Dual<f64, 1>> = self.variables.iter().map(|v| Dual::constant(*v)).collect();
+            duals[i].partials = [1.0];
+            self.compiled.watched.evaluate(&duals, &mut out);
+            for (row, guard) in self.sliding.iter().enumerate() {
+                let place = self.compiled.active.iter().position(|g| g == guard);
+                rows[row][i] = place.map_or(0.0, |p| out[p].partials[0]);
+            }
+        }
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let mut gram = Vec::with_capacity(k * k);
+        for a in &rows {
+            gram.extend(rows.iter().map(|b| dot(a, b)));
+        }
+        let onto = |v: &mut [f64], off: &[f64]| {
+            for (row, weight) in rows.iter().zip(solve_any(&gram, off, 0.0).unwrap_or_default()) {
+                v.iter_mut().zip(row).for_each(|(v, r)| *v -= weight * r);
+            }
+        };
+        onto(&mut self.x, &off);
+        // Rounding carries tangent vectors off the surface, where nothing shrinks them.
+        for y in self.tangents.iter_mut().flat_map(|t| &mut t.vectors) {
+            let off: Vec<f64> = rows.iter().map(|row| dot(row, y)).collect();
+            onto(y, &off);
+        }
+    }
+}

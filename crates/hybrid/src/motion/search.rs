@@ -1,0 +1,319 @@
+//! What a step is searched for, and what it may have jumped over.
+
+use super::*;
+
+impl Follower<'_> {
+    // What a step is searched for.
+
+    pub(super) fn sought(&self) -> Vec<(Sought, f64)> {
+        let mut list = Vec::new();
+        for guard in &self.compiled.active {
+            if self.sliding.contains(guard) {
+                continue;
+            }
+            if self.equation.guards[*guard].whole {
+                list.push((Sought::Guard { guard: *guard, upper: false }, 1.0));
+                list.push((Sought::Guard { guard: *guard, upper: true }, 1.0));
+            } else {
+                list.push((Sought::Guard { guard: *guard, upper: false }, self.config.sides[*guard]));
+            }
+        }
+        for (i, side) in self.watch_side.iter().enumerate() {
+            if *side != 0.0 && !self.contact.is_some_and(|c| c.watched == i) {
+                list.push((Sought::Watched(i), *side));
+            }
+        }
+        for place in 0..self.sliding.len() {
+            list.push((Sought::Leave { place, plus: false }, 1.0));
+            list.push((Sought::Leave { place, plus: true }, 1.0));
+        }
+        if !self.sliding.is_empty() {
+            list.push((Sought::Repelling, 1.0));
+        }
+        if self.contact.is_some() {
+            list.push((Sought::Release, 1.0));
+        }
+        list
+    }
+
+    /// The values of all that is sought at a point.
+    pub(super) fn measure(&mut self, list: &[(Sought, f64)], t: f64, x: &[f64], out: &mut Vec<f64>) {
+        let n = self.n;
+        self.variables[..n].copy_from_slice(x);
+        self.variables[n] = t;
+        let compiled = self.compiled.clone();
+        let active = compiled.active.len();
+        let mut values = std::mem::take(&mut self.rhs_room[0]);
+        values.resize(active + self.equation.watched.len(), 0.0);
+        compiled.watched.evaluate(&self.variables, &mut values);
+        let mut weights = Vec::new();
+        let mut determinant = f64::NAN;
+        if !self.sliding.is_empty() {
+            let mut field0 = vec![0.0; n];
+            compiled.field.evaluate(&self.variables, &mut field0);
+            if self.separate.is_some() {
+                let jumps;
+                (weights, jumps, _) = self.separate_weights(t, x, &field0);
+                // Each attracts by itself: the one that is nearest to doing so no more counts.
+                determinant = jumps.iter().map(|j| -j).fold(f64::INFINITY, f64::min);
+            } else {
+                let (a, matrix) = self.sliding_equations(t, x, &field0);
+                let k = a.len();
+                let b: Vec<f64> = a.iter().map(|v| -v).collect();
+                weights = solve_any(&matrix, &b, 0.0).unwrap_or_else(|| vec![f64::NAN; k]);
+                // Attracting where minus the matrix has a positive determinant, which a single surface's jump of speed is.
+                determinant = determinant_of_negative(matrix, k);
+            }
+        }
+        out.clear();
+        for (sought, _) in list {
+            out.push(match *sought {
+                Sought::Guard { guard, upper } => {
+                    let value = active_value(&compiled, &values, guard);
+                    match (self.equation.guards[guard].whole, upper) {
+                        (false, _) => value,
+                        (true, false) => value - self.config.sides[guard],
+                        (true, true) => self.config.sides[guard] + 1.0 - value,
+                    }
+                }
+                Sought::Watched(i) => values[active + i],
+                Sought::Leave { place, plus: false } => weights[place],
+                Sought::Leave { place, plus: true } => 1.0 - weights[place],
+                Sought::Repelling => determinant,
+                Sought::Release => {
+                    let contact = self.contact.expect("sought with a contact only");
+                    let mut field = vec![0.0; n];
+                    compiled.field.evaluate(&self.variables, &mut field);
+                    let (pull, _) = self.contact_forces(contact, &field);
+                    -contact.above * pull
+                }
+            });
+        }
+        self.rhs_room[0] = values;
+    }
+    /// The place in a step before which all is as the step saw it, if there is something that it did not see: an operation that is flat at the step's stages
+    /// and steep between them. Where arguments move far, the field along the continuous extension is compared with the extension's own derivative (the
+    /// defect: Enright 1989).
+    pub(super) fn unseen(&mut self, step: &Step, scale: &[f64]) -> Option<f64> {
+        let compiled = self.compiled.clone();
+        if compiled.gates.is_empty() || step.h == 0.0 {
+            return None;
+        }
+        let n = self.n;
+        let (mut x, mut out) = (vec![0.0; n], vec![0.0; compiled.gates.len()]);
+        let mut arguments = |follower: &mut Self, theta: f64| {
+            step.at(theta, &mut x);
+            follower.variables[..n].copy_from_slice(&x);
+            follower.variables[n] = step.t + theta * step.h;
+            compiled.gate_arguments.evaluate(&follower.variables, &mut out);
+            out.clone()
+        };
+        let mut open = vec![(0.0, 1.0, 0, arguments(self, 0.0), arguments(self, 1.0))];
+        let mut looked = 0;
+        let (mut at, mut slope, mut field) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        while let Some((a, b, depth, first, last)) = open.pop() {
+            let middle = 0.5 * (a + b);
+            let between = arguments(self, middle);
+            let quiet = compiled.gates.iter().enumerate().all(|(i, gate)| {
+                let (p, q, r) = (first[i], between[i], last[i]);
+                // A parabola's reach beyond its three points.
+                let bend = (0.5 * (p + r) - q).abs() * 0.5;
+                gate.is_quiet(p.min(q).min(r) - bend, p.max(q).max(r) + bend)
+            });
+            if quiet && depth == 0 {
+                return None;
+            }
+            step.at(middle, &mut at);
+            step.slope_at(middle, &mut slope);
+            self.rhs(step.t + middle * step.h, &at, &mut field);
+            looked += 1;
+            let defect =
+                (0..n).map(|i| ((field[i] - slope[i]) * step.h * (b - a) / scale[i]).abs()).fold(0.0, f64::max);
+            if !(defect <= 1e3) {
+                return Some(a.max(0.05));
+            }
+            if !quiet && depth < 14 && looked < 4096 {
+                open.push((middle, b, depth + 1, between.clone(), last));
+                open.push((a, middle, depth + 1, first, between));
+            }
+        }
+        None
+    }
+
+    /// Makes the step end where `sought` is zero, near `h`: Newton's method on steps of their own length.
+    pub(super) fn land(&mut self, step: &mut Step, h: f64, longest: f64, sought: Sought) {
+        let mut room = vec![0.0; self.n];
+        let (mut low, mut high) = (Vec::new(), Vec::new());
+        let one = [(sought, 1.0)];
+        let delta = 1e-4;
+        let (a, b) = ((h / longest - delta).max(0.0), (h / longest + delta).min(1.0));
+        step.at(a, &mut room);
+        self.measure(&one, self.t + a * longest, &room, &mut low);
+        step.at(b, &mut room);
+        self.measure(&one, self.t + b * longest, &room, &mut high);
+        let slope = (high[0] - low[0]) / ((b - a) * longest);
+        let mut length = h;
+        for correction in 0.. {
+            let follower = &mut *self;
+            step.take(length, &mut |t, x, out| follower.rhs(t, x, out));
+            if correction == 3 {
+                break;
+            }
+            self.measure(&one, self.t + length, &step.y, &mut low);
+            let correction = low[0] / slope;
+            // Where the function only touches zero, or is none at all, the first place stays.
+            let rounding = 2.0 * f64::EPSILON * (self.t + length).abs();
+            let wanted = (length - correction).clamp(0.0, longest);
+            if !correction.is_finite()
+                || correction.abs() > 1e-3 * longest
+                || correction.abs() <= rounding
+                || wanted == length
+            {
+                break;
+            }
+            length = wanted;
+        }
+    }
+
+    /// Hairer, Norsett & Wanner (1993), sec. II.4, with the file's own scales.
+    pub(super) fn first_step(&mut self, field: &[f64]) -> f64 {
+        let (rtol, atol) = (self.options.rtol, self.options.atol.unwrap_or(0.0));
+        let span = self.options.t_end - self.t;
+        let scale: Vec<f64> = self
+            .x
+            .iter()
+            .zip(field)
+            .zip(&self.size)
+            .map(|((x, f), size)| {
+                atol + rtol * x.abs().max(0.01 * size).max(1e-3 * f.abs() * span.min(1.0)) + f64::MIN_POSITIVE
+            })
+            .collect();
+        let norm =
+            |v: &[f64]| (v.iter().zip(&scale).map(|(v, s)| (v / s) * (v / s)).sum::<f64>() / v.len() as f64).sqrt();
+        let (d0, d1) = (norm(&self.x), norm(field));
+        let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 * span } else { 0.01 * d0 / d1 }.min(0.01 * span);
+        let ahead: Vec<f64> = self.x.iter().zip(field).map(|(x, f)| x + h0 * f).collect();
+        let mut there = vec![0.0; self.n];
+        let t = self.t + h0;
+        self.rhs(t, &ahead, &mut there);
+        let difference: Vec<f64> = there.iter().zip(field).map(|(a, b)| a - b).collect();
+        let d = d1.max(norm(&difference) / h0);
+        let h1 = if d <= 1e-15 { h0 * 1e3 } else { rough_pow(0.01 / d, 0.2) };
+        let h = if h1.is_finite() { (100.0 * h0).min(h1) } else { h0 };
+        h.min(span)
+    }
+
+    /// Where an expression's domain ends at a switch, as that of |x|^0.5 does on either side, no step goes across. Very near to it the state is put
+    /// onto the switch, and what holds there is decided; false if no switch is so near.
+    pub(super) fn land_at_an_edge(&mut self) -> Result<bool, HybridError> {
+        let n = self.n;
+        let (t, x) = (self.t, self.x.clone());
+        let mut field = vec![0.0; n];
+        self.rhs(t, &x, &mut field);
+        let values = self.watched_values();
+        let rates = Self::along(&self.compiled, &self.variables, &field);
+        let mut nearest: Option<(f64, usize, usize)> = None;
+        for (place, guard) in self.compiled.active.iter().enumerate() {
+            let left = -values[place] / rates[place];
+            let closer = nearest.is_none_or(|(best, ..)| left < best);
+            let open = !self.sliding.contains(guard) && !self.equation.guards[*guard].whole;
+            if open && left > 0.0 && left <= 1e-9 * (self.options.t_end - self.options.t_start) && closer {
+                nearest = Some((left, place, *guard));
+            }
+        }
+        let Some((left, place, guard)) = nearest else { return Ok(false) };
+        let gradient: Vec<f64> = (0..n)
+            .map(|i| {
+                let mut unit = vec![0.0; n];
+                unit[i] = 1.0;
+                let mut still = self.variables.clone();
+                still[n] = t;
+                let with_time = Self::along(&self.compiled, &still, &unit)[place];
+                with_time - Self::along(&self.compiled, &still, &vec![0.0; n])[place]
+            })
+            .collect();
+        for i in 0..n {
+            self.x[i] += left * field[i];
+        }
+        self.t += left;
+        let off = self.watched_values()[place];
+        let size: f64 = gradient.iter().map(|g| g * g).sum();
+        if off != 0.0 && size > 0.0 {
+            self.x.iter_mut().zip(&gradient).for_each(|(x, g)| *x -= off * g / size);
+        }
+        self.outcome.switches += 1;
+        let mut zero = self.sliding.clone();
+        zero.push(guard);
+        self.settle(&zero)?;
+        Ok(true)
+    }
+
+    pub(super) fn left_domain(&mut self, t: f64, x: &[f64]) -> HybridError {
+        self.variables[..self.n].copy_from_slice(x);
+        self.variables[self.n] = t;
+        // Looked for a little ahead, where the field's own numbers are broken.
+        let mut what = self.equation.broken(&self.compiled, &self.variables);
+        if what.is_none() {
+            let mut field = vec![0.0; self.n];
+            self.compiled.field.evaluate(&self.variables, &mut field);
+            let longest =
+                x.iter().zip(&field).map(|(x, f)| x.abs() / f.abs().max(f64::MIN_POSITIVE)).fold(1.0, f64::max);
+            let mut ahead = 1e-12 * longest;
+            while what.is_none() && ahead < 10.0 * longest {
+                for i in 0..self.n {
+                    self.variables[i] = x[i] + ahead * field[i];
+                }
+                self.variables[self.n] = t + ahead;
+                what = self.equation.broken(&self.compiled, &self.variables);
+                ahead *= 4.0;
+            }
+        }
+        let what = what.unwrap_or_else(|| {
+            "steps become too short to move: a singularity, or a solution that grows without bound".into()
+        });
+        HybridError::Domain { t, x: x.to_vec(), what }
+    }
+
+    pub(super) fn is_fresh(&self, sought: Sought) -> bool {
+        match sought {
+            Sought::Guard { guard, .. } => self.fresh_guard[guard],
+            Sought::Watched(i) => self.fresh_watch[i],
+            _ => false,
+        }
+    }
+
+    pub(super) fn clear_fresh(&mut self, list: &[(Sought, f64)], end: &[f64], cut: bool) {
+        if cut {
+            // Time has passed: what left zero at the step's beginning is away from it, but for what is met here, which is marked anew.
+            self.fresh_guard.fill(false);
+            self.fresh_watch.fill(false);
+            return;
+        }
+        for ((sought, _), value) in list.iter().zip(end) {
+            match *sought {
+                Sought::Guard { guard, .. } if *value != 0.0 => self.fresh_guard[guard] = false,
+                Sought::Watched(i) if *value != 0.0 => self.fresh_watch[i] = false,
+                _ => {}
+            }
+        }
+        // A watched expression that stayed at zero may have left it.
+        let n = self.compiled.active.len();
+        if self.watch_side.contains(&0.0) {
+            let mut values = vec![0.0; n + self.equation.watched.len()];
+            self.variables[..self.n].copy_from_slice(&self.x);
+            self.variables[self.n] = self.t;
+            self.compiled.watched.evaluate(&self.variables, &mut values);
+            for i in 0..self.watch_side.len() {
+                let value = values[n + i];
+                if self.watch_side[i] == 0.0 && value.abs() > 1e-13 * self.magnitude(&self.equation.watched[i]) {
+                    self.watch_side[i] = value.signum();
+                }
+            }
+        }
+    }
+}
+
+/// The value of a guard among those of a compiled structure.
+pub(super) fn active_value(compiled: &Compiled, values: &[f64], guard: usize) -> f64 {
+    compiled.active.iter().position(|g| *g == guard).map_or(f64::NAN, |i| values[i])
+}

@@ -1,0 +1,370 @@
+//! Sides of switching functions, and where motion goes from points where they are zero.
+
+use std::collections::HashMap;
+
+use super::*;
+
+/// A configuration, where its guards stand, and what they do there.
+type Vertex = (Configuration, Vec<Option<usize>>, Rates);
+
+impl Follower<'_> {
+    // Sides.
+
+    /// The size of the terms that an expression is a sum of, at the present point.
+    pub(super) fn magnitude(&self, e: &Expression) -> f64 {
+        match e {
+            Expression::Add(a, b) | Expression::Sub(a, b) => self.magnitude(a) + self.magnitude(b),
+            Expression::Neg(a) => self.magnitude(a),
+            other => self.equation.value(other, self.t, &self.x).abs(),
+        }
+    }
+
+    /// Which side a guard's value is on; none if it is zero to rounding.
+    pub(super) fn side_of(&self, guard: usize) -> Option<f64> {
+        let g = &self.equation.guards[guard];
+        let value = self.equation.value(&g.expression, self.t, &self.x);
+        if value.is_nan() {
+            return Some(if g.whole { 0.0 } else { 1.0 });
+        }
+        let small = 1e-14 * self.magnitude(&g.expression);
+        if g.whole {
+            let near = value.round();
+            let at_boundary = (value - near).abs() <= small.max(1e-14 * near.abs());
+            return if at_boundary { None } else { Some(value.floor()) };
+        }
+        if value.abs() <= small { None } else { Some(value.signum()) }
+    }
+
+    /// Finds all sides anew; those in `zero` are zero.
+    pub(super) fn settle_afresh(&mut self, zero: &[usize]) -> Result<(), HybridError> {
+        let mut at_zero = zero.to_vec();
+        for guard in 0..self.equation.guards.len() {
+            if zero.contains(&guard) {
+                continue;
+            }
+            match self.side_of(guard) {
+                Some(side) => self.config.sides[guard] = side,
+                None => {
+                    self.config.sides[guard] =
+                        self.low(guard, &self.config) + if self.equation.guards[guard].whole { 1.0 } else { 2.0 };
+                    at_zero.push(guard);
+                }
+            }
+        }
+        self.adopt(self.config.clone(), Vec::new());
+        self.settle(&at_zero)
+    }
+
+    /// Sides of guards that a configuration asks and the present one does not.
+    pub(super) fn ask_new(&mut self, config: &mut Configuration) {
+        for _ in 0..8 {
+            let compiled = self.equation.compiled(config);
+            let mut changed = false;
+            for guard in &compiled.active {
+                if !self.compiled.active.contains(guard)
+                    && let Some(side) = self.side_of(*guard)
+                    && config.sides[*guard] != side
+                {
+                    config.sides[*guard] = side;
+                    changed = true;
+                }
+            }
+            if !changed {
+                return;
+            }
+        }
+    }
+
+    pub(super) fn names(&self, guards: &[usize]) -> String {
+        let names: Vec<String> = guards
+            .iter()
+            .map(|g| {
+                format!(
+                    "{} = {}",
+                    self.equation.guards[*g].expression,
+                    if self.equation.guards[*g].whole { "a whole number" } else { "0" }
+                )
+            })
+            .collect();
+        names.join(" and ")
+    }
+
+    pub(super) fn undecided(&self, zero: &[usize], ways: &str) -> HybridError {
+        HybridError::Undecided { t: self.t, x: self.x.clone(), surfaces: self.names(zero), ways: ways.into() }
+    }
+
+    /// Decides where motion goes from a point at which the functions in `zero` are zero.
+    pub(super) fn settle(&mut self, zero: &[usize]) -> Result<(), HybridError> {
+        // Only what the equations ask here; what they do not ask keeps its side until it is asked.
+        let zero: Vec<usize> = zero.iter().copied().filter(|g| self.compiled.active.contains(g)).collect();
+        if zero.is_empty() {
+            let config = self.config.clone();
+            self.adopt(config, Vec::new());
+            return Ok(());
+        }
+        let lows: Vec<f64> = zero.iter().map(|g| self.low(*g, &self.config)).collect();
+        let highs: Vec<f64> = zero.iter().map(|g| self.high(*g, &self.config)).collect();
+        let vertex = |follower: &mut Self, plus: &dyn Fn(usize) -> bool| {
+            let mut config = follower.config.clone();
+            for (i, guard) in zero.iter().enumerate() {
+                config.sides[*guard] = if plus(i) { highs[i] } else { lows[i] };
+            }
+            follower.ask_new(&mut config);
+            let (compiled, rates) = follower.rates(&config);
+            let place: Vec<Option<usize>> = zero.iter().map(|g| compiled.active.iter().position(|a| a == g)).collect();
+            (config, place, rates)
+        };
+        let k = zero.len();
+        // Which functions depend on each other.
+        let sets = if k == 1 {
+            vec![vec![0]]
+        } else {
+            let (_, place0, base) = vertex(self, &|_| false);
+            let mut coupled = vec![false; k * k];
+            for j in 0..k {
+                let (_, place, rates) = vertex(self, &|i| i == j);
+                for i in 0..k {
+                    let (Some(a), Some(b)) = (place0[i], place[i]) else {
+                        coupled[i * k + j] = i != j;
+                        continue;
+                    };
+                    let scale = base.terms[a] + rates.terms[b];
+                    coupled[i * k + j] = i != j && (base.first[a] - rates.first[b]).abs() > 1e-12 * scale;
+                }
+            }
+            groups(k, |i, j| coupled[i * k + j])
+        };
+        let mut ways = vec![Way::Plus; k];
+        for set in &sets {
+            if set.len() > MOST_TOGETHER {
+                let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
+                let why = format!(
+                    "{} surfaces that depend on each other meet ({}); up to {MOST_TOGETHER} are resolved",
+                    set.len(),
+                    self.names(&names)
+                );
+                return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
+            }
+            let mut cache: HashMap<Vec<bool>, Vertex> = Default::default();
+            let mut at = |follower: &mut Self, plus: Vec<bool>| {
+                if !cache.contains_key(&plus) {
+                    let all = |i: usize| set.iter().position(|s| *s == i).is_some_and(|p| plus[p]);
+                    let made = vertex(follower, &all);
+                    cache.insert(plus.clone(), made);
+                }
+                let (_, place, rates) = &cache[&plus];
+                let first: Vec<f64> = set.iter().map(|i| place[*i].map_or(f64::NAN, |p| rates.first[p])).collect();
+                let direction: Vec<f64> = set.iter().map(|i| place[*i].map_or(0.0, |p| rates.direction(p))).collect();
+                (rates.field.clone(), first, direction)
+            };
+            // Fields that are the same on both sides decide nothing and need nothing decided.
+            if set.len() == 1 {
+                let (low, _, d0) = at(self, vec![false]);
+                let (high, _, d1) = at(self, vec![true]);
+                if same(&low, &high) {
+                    let side = if d1[0] != 0.0 { d1[0] } else { d0[0] };
+                    let present = self.config.sides[zero[set[0]]];
+                    let plus = if side != 0.0 { side > 0.0 } else { present == highs[set[0]] };
+                    ways[set[0]] = if plus { Way::Plus } else { Way::Minus };
+                    continue;
+                }
+            }
+            let mut not_affine = false;
+            let found = possibilities(set.len(), |assignment| {
+                let slides: Vec<usize> = (0..set.len()).filter(|i| assignment[*i] == Way::Stay).collect();
+                let plus: Vec<bool> = assignment.iter().map(|w| *w == Way::Plus).collect();
+                let (field0, base, direction) = at(self, plus.clone());
+                let goes = |i: usize, d: f64| match assignment[i] {
+                    Way::Plus => d > 0.0,
+                    Way::Minus => d < 0.0,
+                    Way::Stay => true,
+                };
+                if slides.is_empty() {
+                    return (0..set.len()).all(|i| goes(i, direction[i]));
+                }
+                let mut columns = Vec::new();
+                for s in &slides {
+                    let mut flipped = plus.clone();
+                    flipped[*s] = true;
+                    columns.push(at(self, flipped));
+                }
+                let m = slides.len();
+                let mut matrix = vec![0.0; m * m];
+                for (c, (_, rates, _)) in columns.iter().enumerate() {
+                    for (r, s) in slides.iter().enumerate() {
+                        matrix[r * m + c] = rates[*s] - base[*s];
+                    }
+                }
+                let b: Vec<f64> = slides.iter().map(|s| -base[*s]).collect();
+                let Some(weights) = solve_any(&matrix, &b, 0.0) else { return false };
+                if m == 1 {
+                    // On both sides towards or away from the surface, to second order.
+                    let (d0, d1) = (direction[slides[0]], columns[0].2[slides[0]]);
+                    if d0 * d1 >= 0.0 {
+                        return false;
+                    }
+                } else if weights.iter().any(|w| !(*w > 0.0 && *w < 1.0)) {
+                    return false;
+                }
+                if m > 1 {
+                    let mut all = plus.clone();
+                    slides.iter().for_each(|s| all[*s] = true);
+                    let (corner, ..) = at(self, all);
+                    let predicted: Vec<f64> = (0..field0.len())
+                        .map(|i| field0[i] + columns.iter().map(|(f, ..)| f[i] - field0[i]).sum::<f64>())
+                        .collect();
+                    let size = corner.iter().chain(&field0).fold(0.0_f64, |a, v| a.max(v.abs()));
+                    if predicted.iter().zip(&corner).any(|(p, c)| (p - c).abs() > 1e-9 * size) {
+                        not_affine = true;
+                    }
+                }
+                (0..set.len()).filter(|i| !slides.contains(i)).all(|i| {
+                    let rate =
+                        base[i] + columns.iter().zip(&weights).map(|((_, r, _), w)| w * (r[i] - base[i])).sum::<f64>();
+                    goes(i, rate)
+                })
+            });
+            let chosen = match found.as_slice() {
+                [] => {
+                    let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
+                    return Err(self.undecided(&names, "no way is consistent to first and second order"));
+                }
+                [one] if not_affine && one.iter().filter(|w| **w == Way::Stay).count() > 1 => {
+                    let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
+                    return Err(self.undecided(
+                        &names,
+                        "sliding on all of them, where mixtures of the fields have different velocities",
+                    ));
+                }
+                [one] => one.clone(),
+                several => {
+                    let wanted = match self.options.exit {
+                        Exit::Undecided => None,
+                        Exit::Plus => several.iter().find(|w| w.iter().all(|w| *w == Way::Plus)),
+                        Exit::Minus => several.iter().find(|w| w.iter().all(|w| *w == Way::Minus)),
+                    };
+                    match wanted {
+                        Some(chosen) => chosen.clone(),
+                        None => {
+                            let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
+                            let words: Vec<String> =
+                                several.iter().map(|w| w.iter().map(|w| w.sign()).collect()).collect();
+                            let all = format!("signs {}", words.join(" or "));
+                            return Err(self.undecided(&names, &all));
+                        }
+                    }
+                }
+            };
+            for (i, way) in set.iter().zip(chosen) {
+                ways[*i] = way;
+            }
+        }
+        let mut config = self.config.clone();
+        let mut sliding = Vec::new();
+        for (i, guard) in zero.iter().enumerate() {
+            match ways[i] {
+                Way::Plus => config.sides[*guard] = highs[i],
+                Way::Minus => config.sides[*guard] = lows[i],
+                Way::Stay => {
+                    config.sides[*guard] = lows[i];
+                    sliding.push(*guard);
+                }
+            }
+            self.fresh_guard[*guard] = true;
+        }
+        self.ask_new(&mut config);
+        sliding.sort_unstable();
+        self.adopt(config, sliding);
+        self.follow_jumps(&zero)
+    }
+
+    /// A switch may make other switching functions jump: they are on the side where they arrive.
+    pub(super) fn follow_jumps(&mut self, zero: &[usize]) -> Result<(), HybridError> {
+        for _ in 0..MOST_JUMPS {
+            let mut config = self.config.clone();
+            let mut values = vec![0.0; self.compiled.outputs];
+            self.compiled.watched.evaluate(&self.variables, &mut values);
+            let mut jumped = false;
+            for (i, guard) in self.compiled.active.clone().into_iter().enumerate() {
+                if zero.contains(&guard) || self.fresh_guard[guard] {
+                    continue;
+                }
+                let g = &self.equation.guards[guard];
+                let side = if g.whole { values[i].floor() } else { values[i].signum() };
+                let small = 1e-12 * self.magnitude(&g.expression);
+                let off = if g.whole { (values[i] - values[i].round()).abs() } else { values[i].abs() };
+                if side != config.sides[guard] && off > small && side.is_finite() {
+                    config.sides[guard] = side;
+                    jumped = true;
+                }
+            }
+            if !jumped {
+                return Ok(());
+            }
+            self.ask_new(&mut config);
+            let sliding = self.sliding.clone();
+            self.adopt(config, sliding);
+        }
+        let why = "switches make each other jump without end: no side of theirs is consistent".into();
+        Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why })
+    }
+
+    /// Watched expressions that a switch made jump over zero have passed it.
+    pub(super) fn watch_jumps(
+        &mut self,
+        definition: &crate::Definition,
+        passed: &mut Vec<usize>,
+        fired: &mut Vec<usize>,
+    ) {
+        let mut values = vec![0.0; self.compiled.outputs];
+        self.compiled.watched.evaluate(&self.variables, &mut values);
+        let active = self.compiled.active.len();
+        for i in 0..self.watch_side.len() {
+            let (value, side) = (values[active + i], self.watch_side[i]);
+            let rests = self.contact.is_some_and(|c| c.watched == i) || passed.contains(&i) || side == 0.0;
+            if rests || value * side >= 0.0 || value.abs() <= 1e-12 * self.magnitude(&self.equation.watched[i]) {
+                continue;
+            }
+            passed.push(i);
+            let Some(event) = self.event_of[i] else { continue };
+            let When::Zero(_, direction) = definition.events()[event].when else { continue };
+            if direction == Direction::Both || (direction == Direction::Up) == (side < 0.0) {
+                fired.push(event);
+            }
+        }
+    }
+
+    /// Finds the side of a watched expression; `zero`: it is zero here, whatever rounding says.
+    pub(super) fn begin_watching(&mut self, i: usize, zero: bool) {
+        let place = self.compiled.active.len() + i;
+        if !zero {
+            let value = self.watched_values()[place];
+            if value.abs() > 1e-14 * self.magnitude(&self.equation.watched[i]) {
+                self.watch_side[i] = value.signum();
+                self.fresh_watch[i] = false;
+                return;
+            }
+        }
+        let config = self.config.clone();
+        let (_, rates) = self.rates(&config);
+        self.watch_side[i] = rates.direction(place);
+        self.fresh_watch[i] = true;
+    }
+
+    /// The values of guards and watched expressions at the present point.
+    pub(super) fn watched_values(&mut self) -> Vec<f64> {
+        let mut values = vec![0.0; self.compiled.outputs];
+        self.variables[..self.n].copy_from_slice(&self.x);
+        self.variables[self.n] = self.t;
+        self.compiled.watched.evaluate(&self.variables, &mut values);
+        values
+    }
+
+    pub(super) fn note_conditions(&mut self) {
+        for (i, event) in self.model.definition().events().iter().enumerate() {
+            if let When::Becomes(e) = &event.when {
+                self.holds[i] = self.equation.holds(e, &self.config);
+            }
+        }
+    }
+}

@@ -1,0 +1,314 @@
+//! The field that moves a state: one side's, a mixture on surfaces that are slid upon, or that of a contact; and its derivatives.
+
+use std::rc::Rc;
+
+use super::*;
+
+impl Follower<'_> {
+    // What programs read.
+
+    pub(super) fn load(&mut self, config: &Configuration) -> Vec<f64> {
+        let n = self.n;
+        let mut v = vec![0.0; self.equation.variables()];
+        v[..n].copy_from_slice(&self.x);
+        v[n] = self.t;
+        v[n + 1..n + 1 + config.sides.len()].copy_from_slice(&config.sides);
+        for (i, (table, piece)) in self.equation.tables.iter().zip(&config.pieces).enumerate() {
+            let first = n + 1 + config.sides.len() + 5 * i;
+            v[first] = table.knots[*piece];
+            v[first + 1..first + 5].copy_from_slice(&table.pieces[*piece]);
+        }
+        v
+    }
+
+    /// Takes over the configuration: programs, variables, and what sliding needs.
+    pub(super) fn adopt(&mut self, config: Configuration, sliding: Vec<usize>) {
+        let mut config = config;
+        for guard in &sliding {
+            config.sides[*guard] = self.low(*guard, &config);
+        }
+        self.sliding = sliding;
+        self.compiled = self.equation.compiled(&config);
+        self.variables = self.load(&config);
+        self.config = config;
+        self.separate = self.separate();
+        self.base = Vec::new();
+        if self.separate.is_none() {
+            for guard in self.sliding.clone() {
+                let mut flipped = self.config.clone();
+                flipped.sides[guard] = self.high(guard, &self.config);
+                let variables = self.load(&flipped);
+                self.base.push((self.equation.compiled(&flipped), variables));
+            }
+        }
+        self.signs = self
+            .equation
+            .guards
+            .iter()
+            .enumerate()
+            .map(|(i, guard)| match () {
+                () if !self.compiled.active.contains(&i) => '.',
+                () if self.sliding.contains(&i) => '0',
+                () if guard.whole => '#',
+                () if self.config.sides[i] > 0.0 => '+',
+                () => '-',
+            })
+            .collect();
+    }
+
+    /// For several surfaces slid upon of which none changes another's speed: which of them each derivative depends on.
+    pub(super) fn separate(&self) -> Option<Vec<Option<usize>>> {
+        let k = self.sliding.len();
+        if k < 2 || self.sliding.iter().any(|g| self.equation.chooses(*g)) {
+            return None;
+        }
+        let n = self.n;
+        let variable = |place: usize| n + 1 + self.sliding[place];
+        let mut owner = vec![None; n];
+        for (i, owner) in owner.iter_mut().enumerate() {
+            let mut owners = (0..k).filter(|place| self.compiled.depends(i, variable(*place)));
+            *owner = owners.next();
+            if owners.next().is_some() {
+                return None;
+            }
+        }
+        for place in 0..k {
+            let active = self.compiled.active.iter().position(|g| *g == self.sliding[place])?;
+            let strange = (0..n).any(|i| self.compiled.depends(n + active, i) && owner[i].is_some_and(|o| o != place));
+            let asks = (0..k).any(|other| self.compiled.depends(n + active, variable(other)));
+            if strange || asks {
+                return None;
+            }
+        }
+        Some(owner)
+    }
+
+    /// Weights of surfaces that know nothing of each other, what each adds to its own speed, and the field on all positive sides.
+    pub(super) fn separate_weights(&mut self, t: f64, x: &[f64], field0: &[f64]) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+        let n = self.n;
+        self.variables[..n].copy_from_slice(x);
+        self.variables[n] = t;
+        let low = Self::along(&self.compiled, &self.variables, field0);
+        let sides = |follower: &mut Self, add: f64| {
+            for guard in &follower.sliding {
+                // On the positive side of a sign 1, of a whole part one more.
+                follower.variables[n + 1 + guard] +=
+                    if follower.equation.guards[*guard].whole { 0.5 * add } else { add };
+            }
+        };
+        sides(self, 2.0);
+        let mut field1 = vec![0.0; n];
+        self.compiled.field.evaluate(&self.variables, &mut field1);
+        let high = Self::along(&self.compiled, &self.variables, &field1);
+        sides(self, -2.0);
+        let mut jumps = Vec::with_capacity(self.sliding.len());
+        let weight = |guard: &usize| {
+            let place = self.compiled.active.iter().position(|g| g == guard);
+            let (a, b) = place.map_or((f64::NAN, f64::NAN), |p| (low[p], high[p]));
+            jumps.push(b - a);
+            -a / (b - a)
+        };
+        let weights = self.sliding.iter().map(weight).collect();
+        (weights, jumps, field1)
+    }
+
+    /// The answers on both sides of a guard's zero.
+    pub(super) fn low(&self, guard: usize, config: &Configuration) -> f64 {
+        if self.equation.guards[guard].whole { self.boundary(guard, config) - 1.0 } else { -1.0 }
+    }
+
+    pub(super) fn high(&self, guard: usize, config: &Configuration) -> f64 {
+        if self.equation.guards[guard].whole { self.boundary(guard, config) } else { 1.0 }
+    }
+
+    /// The whole number that a guard's value is at.
+    pub(super) fn boundary(&self, guard: usize, config: &Configuration) -> f64 {
+        let value = self.equation.value(&self.equation.guards[guard].expression, self.t, &self.x);
+        let _ = config;
+        value.round()
+    }
+
+    // The field.
+
+    pub(super) fn rhs(&mut self, t: f64, x: &[f64], out: &mut [f64]) {
+        let n = self.n;
+        self.variables[..n].copy_from_slice(x);
+        self.variables[n] = t;
+        self.compiled.field.evaluate(&self.variables, out);
+        if let Some(owner) = self.separate.clone() {
+            let (weights, _, field1) = self.separate_weights(t, x, out);
+            for i in 0..n {
+                if let Some(place) = owner[i] {
+                    out[i] += weights[place] * (field1[i] - out[i]);
+                }
+            }
+        } else if !self.sliding.is_empty() {
+            let weights = self.weights(t, x, out);
+            let field0 = out.to_vec();
+            for (place, weight) in weights.iter().enumerate() {
+                let other = &self.rhs_room_of(place, t, x);
+                for i in 0..n {
+                    out[i] += weight * (other[i] - field0[i]);
+                }
+            }
+        }
+        if let Some(contact) = self.contact {
+            let (pull, grip) = self.contact_forces(contact, out);
+            out[contact.state] -= pull / grip;
+        }
+    }
+
+    /// The field on the positive side of a surface slid upon.
+    pub(super) fn rhs_room_of(&mut self, place: usize, t: f64, x: &[f64]) -> Vec<f64> {
+        let n = self.n;
+        let (compiled, variables) = &mut self.base[place];
+        variables[..n].copy_from_slice(x);
+        variables[n] = t;
+        let mut out = vec![0.0; n];
+        compiled.field.evaluate(variables, &mut out);
+        out
+    }
+
+    /// Derivatives along `field` of the watched values of a configuration.
+    pub(super) fn along(compiled: &Compiled, variables: &[f64], field: &[f64]) -> Vec<f64> {
+        let n = field.len();
+        let mut duals: Vec<Dual<f64, 1>> = variables.iter().map(|v| Dual::constant(*v)).collect();
+        for (dual, slope) in duals.iter_mut().zip(field) {
+            dual.partials = [*slope];
+        }
+        duals[n].partials = [1.0];
+        let mut out = vec![Dual::constant(0.0); compiled.outputs];
+        compiled.watched.evaluate(&duals, &mut out);
+        out.iter().map(|d| d.partials[0]).collect()
+    }
+
+    /// Weights of the positive sides in sliding; not-a-number where there are none.
+    pub(super) fn weights(&mut self, t: f64, x: &[f64], field0: &[f64]) -> Vec<f64> {
+        let (a, matrix) = self.sliding_equations(t, x, field0);
+        let b: Vec<f64> = a.iter().map(|v| -v).collect();
+        solve_any(&matrix, &b, 0.0).unwrap_or_else(|| vec![f64::NAN; b.len()])
+    }
+
+    /// The derivatives of the functions slid upon on all negative sides, and what each positive side adds, row by row.
+    pub(super) fn sliding_equations(&mut self, t: f64, x: &[f64], field0: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let k = self.sliding.len();
+        let n = self.n;
+        self.variables[..n].copy_from_slice(x);
+        self.variables[n] = t;
+        let place = |compiled: &Compiled, guard: usize| compiled.active.iter().position(|g| *g == guard);
+        let rates = Self::along(&self.compiled, &self.variables, field0);
+        let of =
+            |rates: &[f64], compiled: &Compiled, guard: usize| place(compiled, guard).map_or(f64::NAN, |i| rates[i]);
+        let a: Vec<f64> = self.sliding.iter().map(|g| of(&rates, &self.compiled, *g)).collect();
+        let mut matrix = vec![0.0; k * k];
+        for column in 0..k {
+            let field = self.rhs_room_of(column, t, x);
+            let (compiled, variables) = &self.base[column];
+            let rates = Self::along(compiled, variables, &field);
+            for row in 0..k {
+                matrix[row * k + column] = of(&rates, compiled, self.sliding[row]) - a[row];
+            }
+        }
+        (a, matrix)
+    }
+
+    /// The second derivative of a contact's expression under `field`, and how much the contact's state moves it.
+    pub(super) fn contact_forces(&mut self, contact: Contact, field: &[f64]) -> (f64, f64) {
+        let rates = self.second_along(field, None);
+        let grip = self.second_along(field, Some(contact.state));
+        let place = self.compiled.active.len() + contact.watched;
+        (rates[place], grip[place])
+    }
+
+    /// Second derivatives of the watched values along the field; or the derivatives of their first ones by a state.
+    pub(super) fn second_along(&self, field: &[f64], by: Option<usize>) -> Vec<f64> {
+        let n = self.n;
+        let mut direction = vec![0.0; self.variables.len()];
+        match by {
+            Some(state) => direction[state] = 1.0,
+            None => {
+                direction[..n].copy_from_slice(field);
+                direction[n] = 1.0;
+            }
+        }
+        let duals: Vec<Dual<f64, 1>> =
+            self.variables.iter().zip(&direction).map(|(v, d)| Dual { value: *v, partials: [*d] }).collect();
+        let mut slopes = vec![Dual::constant(0.0); n];
+        self.compiled.field.evaluate(&duals, &mut slopes);
+        let nested: Vec<Nested> = (0..self.variables.len())
+            .map(|i| {
+                let inner = Dual { value: self.variables[i], partials: [direction[i]] };
+                let outer = match i {
+                    i if i < n => Dual { value: field[i], partials: slopes[i].partials },
+                    i if i == n => Dual::constant(1.0),
+                    _ => Dual::constant(0.0),
+                };
+                Dual { value: inner, partials: [outer] }
+            })
+            .collect();
+        let outputs = self.compiled.active.len() + self.equation.watched.len();
+        let mut out = vec![Nested::constant(Dual::constant(0.0)); outputs];
+        self.compiled.watched.evaluate(&nested, &mut out);
+        out.iter().map(|d| d.partials[0].partials[0]).collect()
+    }
+
+    /// What the watched values of a configuration do at the present point.
+    pub(super) fn rates(&mut self, config: &Configuration) -> (Rc<Compiled>, Rates) {
+        let compiled = self.equation.compiled(config);
+        let variables = self.load(config);
+        let n = self.n;
+        let mut field = vec![0.0; n];
+        compiled.field.evaluate(&variables, &mut field);
+        let outputs = compiled.active.len() + self.equation.watched.len();
+        let (mut slopes, mut terms) = (vec![0.0; outputs], vec![0.0; outputs]);
+        const WIDE: usize = 4;
+        let mut out = vec![Dual::<f64, WIDE>::constant(0.0); outputs];
+        for from in (0..=n).step_by(WIDE) {
+            let mut duals: Vec<Dual<f64, WIDE>> = variables.iter().map(|v| Dual::constant(*v)).collect();
+            for j in 0..WIDE.min(n + 1 - from) {
+                duals[from + j].partials[j] = 1.0;
+            }
+            compiled.watched.evaluate(&duals, &mut out);
+            for (o, d) in out.iter().enumerate() {
+                for j in 0..WIDE.min(n + 1 - from) {
+                    let speed = if from + j == n { 1.0 } else { field[from + j] };
+                    slopes[o] += d.partials[j] * speed;
+                    terms[o] += (d.partials[j] * speed).abs();
+                }
+            }
+        }
+        // Second derivatives matter where first ones are zero; they are asked of the present programs.
+        let mut second = vec![0.0; outputs];
+        if (0..outputs).any(|i| !(slopes[i].abs() > 1e-11 * terms[i])) {
+            let kept = (
+                std::mem::replace(&mut self.variables, variables),
+                std::mem::replace(&mut self.compiled, compiled.clone()),
+            );
+            second = self.second_along(&field, None);
+            (self.variables, self.compiled) = kept;
+        }
+        (compiled, Rates { field, first: slopes, second, terms })
+    }
+}
+
+/// The determinant of -a, of k rows, by elimination with pivots.
+pub(super) fn determinant_of_negative(mut a: Vec<f64>, k: usize) -> f64 {
+    let mut product = 1.0;
+    for column in 0..k {
+        let size = |i: &usize| a[*i * k + column].abs();
+        let pivot = (column..k).max_by(|i, j| size(i).total_cmp(&size(j))).unwrap_or(column);
+        if pivot != column {
+            (0..k).for_each(|j| a.swap(column * k + j, pivot * k + j));
+            product = -product;
+        }
+        let diagonal = a[column * k + column];
+        product *= -diagonal;
+        for row in column + 1..k {
+            let factor = a[row * k + column] / diagonal;
+            for j in column..k {
+                a[row * k + j] -= factor * a[column * k + j];
+            }
+        }
+    }
+    product
+}
