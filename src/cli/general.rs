@@ -5,7 +5,7 @@ use std::path::Path;
 use super::CliError;
 use super::flags::RunFlags;
 use crate::hybrid::definition::is_general;
-use crate::hybrid::motion::{Exit as Side, Record};
+use crate::hybrid::motion::{Exit as Side, Method, Record};
 use crate::hybrid::{Definition, HybridError, Model, Options};
 use crate::job::JobError;
 use crate::job::general::GeneralRun;
@@ -110,11 +110,15 @@ pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
         };
         return Err(CliError::no_effect(flag, why));
     }
-    if let Some(method) = flags.method
-        && method != super::words::Method::Dopri5
-    {
-        return Err(usage("--method: general systems are followed by dopri5; leave it out".into()));
-    }
+    let method = match flags.method {
+        None | Some(super::words::Method::Dopri5) => Method::Dopri5,
+        Some(super::words::Method::Radau5) => Method::Radau5,
+        Some(_) => {
+            return Err(usage(
+                "--method: general systems are followed by dopri5, or radau5 where they are stiff".into(),
+            ));
+        }
+    };
     let positive = |flag: &str, value: Option<f64>| match value {
         Some(v) if !(v.is_finite() && v > 0.0) => Err(usage(format!("{flag} {v}: give a finite number above 0"))),
         other => Ok(other),
@@ -171,6 +175,7 @@ pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
         max_steps: flags.max_steps.unwrap_or(defaults.max_steps),
         record,
         exit,
+        method,
     };
     Ok(Some(GeneralRun { model, options }))
 }

@@ -57,6 +57,26 @@ pub enum Exit {
     Minus,
 }
 
+/// How steps are made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// Dormand & Prince, explicit.
+    #[default]
+    Dopri5,
+    /// Radau IIA, implicit: for motion that is stiff between switches or in sliding.
+    Radau5,
+}
+
+impl Method {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Dopri5 => "dopri5",
+            Method::Radau5 => "radau5",
+        }
+    }
+}
+
 /// How a system is followed.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -78,6 +98,8 @@ pub struct Options {
     pub record: Record,
     /// What is done where motion is not decided.
     pub exit: Exit,
+    /// How steps are made.
+    pub method: Method,
 }
 
 impl Default for Options {
@@ -92,6 +114,7 @@ impl Default for Options {
             max_steps: 400_000_000,
             record: Record::Path { chord: 1e-3 },
             exit: Exit::Undecided,
+            method: Method::Dopri5,
         }
     }
 }
@@ -530,6 +553,9 @@ impl<'a> Follower<'a> {
             step.k[0].copy_from_slice(&room);
             if !room.iter().all(|v| v.is_finite()) {
                 return Err(self.left_domain(t, &x));
+            }
+            if self.options.method == Method::Radau5 {
+                step.jacobian = Some(self.jacobian(t, &x));
             }
             if h == 0.0 {
                 h = self.first_step(&room);

@@ -1,5 +1,7 @@
-//! Steps of Dormand & Prince's method of order 5 (1980) for any number of states, with the continuous extension of order 4 (Hairer, Norsett &
-//! Wanner 1993, sec. II.6).
+//! Steps for any number of states: Dormand & Prince's method of order 5 (1980) with the continuous extension of order 4 (Hairer, Norsett & Wanner 1993,
+//! sec. II.6), and for stiff motion Radau IIA of order 5 with its collocation polynomial (Hairer & Wanner 1996, sec. IV.8).
+
+use twofold_num::linear::solve_any;
 
 /// Nodes, coefficients row by row, and the error estimate.
 pub(crate) const C: [f64; 7] = [0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0];
@@ -24,6 +26,9 @@ const D: [f64; 7] = [
     69_997_945.0 / 29_380_423.0,
 ];
 
+/// The real eigenvalue of the inverse of Radau IIA's matrix.
+const REAL_EIGENVALUE: f64 = 3.637_834_252_744_496;
+
 /// Writes the derivatives at a time and state.
 pub(crate) type RightHandSide<'a> = dyn FnMut(f64, &[f64], &mut [f64]) + 'a;
 
@@ -42,6 +47,10 @@ pub(crate) struct Step {
     pub y: Vec<f64>,
     extension: [Vec<f64>; 4],
     stage: Vec<f64>,
+    /// The Jacobian where it begins, row by row: the step is then one of Radau IIA.
+    pub jacobian: Option<Vec<f64>>,
+    /// The error estimate of an implicit step.
+    estimate: Vec<f64>,
 }
 
 impl Step {
@@ -55,6 +64,8 @@ impl Step {
             y: zeros(),
             extension: [zeros(), zeros(), zeros(), zeros()],
             stage: zeros(),
+            jacobian: None,
+            estimate: zeros(),
         }
     }
 
@@ -62,6 +73,13 @@ impl Step {
     pub fn take(&mut self, h: f64, rhs: &mut RightHandSide<'_>) {
         self.h = h;
         let n = self.x.len();
+        if let Some(jacobian) = self.jacobian.take() {
+            if !self.take_implicit(h, &jacobian, rhs) {
+                self.y.fill(f64::NAN);
+            }
+            self.jacobian = Some(jacobian);
+            return;
+        }
         for s in 1..7 {
             let (done, open) = self.k.split_at_mut(s);
             for i in 0..n {
@@ -89,6 +107,92 @@ impl Step {
         }
     }
 
+    /// A step of Radau IIA: simplified Newton iterations for the three stages at once; false if they do not settle.
+    fn take_implicit(&mut self, h: f64, jacobian: &[f64], rhs: &mut RightHandSide<'_>) -> bool {
+        let n = self.x.len();
+        let root = 6.0_f64.sqrt();
+        let c = [0.1 * (4.0 - root), 0.1 * (4.0 + root), 1.0];
+        let a = [
+            [(88.0 - 7.0 * root) / 360.0, (296.0 - 169.0 * root) / 1800.0, (-2.0 + 3.0 * root) / 225.0],
+            [(296.0 + 169.0 * root) / 1800.0, (88.0 + 7.0 * root) / 360.0, (-2.0 - 3.0 * root) / 225.0],
+            [(16.0 - root) / 36.0, (16.0 + root) / 36.0, 1.0 / 9.0],
+        ];
+        let m = 3 * n;
+        let mut matrix = vec![0.0; m * m];
+        for (p, row) in a.iter().enumerate() {
+            for (q, a) in row.iter().enumerate() {
+                for i in 0..n {
+                    for j in 0..n {
+                        let one = if p == q && i == j { 1.0 } else { 0.0 };
+                        matrix[(p * n + i) * m + q * n + j] = one - h * a * jacobian[i * n + j];
+                    }
+                }
+            }
+        }
+        let mut z = vec![0.0; m];
+        let (mut f, mut last, mut settled) = (vec![vec![0.0; n]; 3], f64::INFINITY, false);
+        for _ in 0..12 {
+            for s in 0..3 {
+                for i in 0..n {
+                    self.stage[i] = self.x[i] + z[s * n + i];
+                }
+                rhs(self.t + c[s] * h, &self.stage, &mut f[s]);
+            }
+            let mut right = vec![0.0; m];
+            for p in 0..3 {
+                for i in 0..n {
+                    let sum: f64 = (0..3).map(|q| a[p][q] * f[q][i]).sum();
+                    right[p * n + i] = h * sum - z[p * n + i];
+                }
+            }
+            let Some(change) = solve_any(&matrix, &right, 0.0) else { return false };
+            let mut size = 0.0_f64;
+            for (k, (z, d)) in z.iter_mut().zip(&change).enumerate() {
+                *z += d;
+                let scale = self.x[k % n].abs().max(z.abs()).max(f64::MIN_POSITIVE);
+                size = size.max(d.abs() / scale);
+            }
+            if size <= 1e-14 || (size <= 1e-11 && size >= 0.5 * last) {
+                settled = true;
+                break;
+            }
+            if size.is_nan() || size > 2.0 * last {
+                return false;
+            }
+            last = size;
+        }
+        if !settled {
+            return false;
+        }
+        for i in 0..n {
+            self.y[i] = self.x[i] + z[2 * n + i];
+        }
+        // The cubic through the three stages and the beginning: theta (p + theta (q + theta r)).
+        let nodes: Vec<f64> = c.iter().flat_map(|c| [*c, c * c, c * c * c]).collect();
+        for i in 0..n {
+            let values = [z[i], z[n + i], z[2 * n + i]];
+            let Some(p) = solve_any(&nodes, &values, 0.0) else { return false };
+            for (extension, p) in self.extension.iter_mut().zip(p) {
+                extension[i] = p;
+            }
+        }
+        let gamma = 1.0 / REAL_EIGENVALUE;
+        let e = [gamma / 3.0 * (-13.0 - 7.0 * root), gamma / 3.0 * (-13.0 + 7.0 * root), -gamma / 3.0];
+        let (mut system, mut right) = (vec![0.0; n * n], vec![0.0; n]);
+        for i in 0..n {
+            right[i] = gamma * h * self.k[0][i] + (0..3).map(|s| e[s] * z[s * n + i]).sum::<f64>();
+            for j in 0..n {
+                system[i * n + j] = if i == j { 1.0 } else { 0.0 } - gamma * h * jacobian[i * n + j];
+            }
+        }
+        let Some(estimate) = solve_any(&system, &right, 0.0) else { return false };
+        self.estimate = estimate;
+        for s in 1..7 {
+            self.k[s].copy_from_slice(&f[2]);
+        }
+        true
+    }
+
     /// The error estimate in units of `scale`, the root of the mean square; not-a-number if the step is none.
     pub fn error(&self, scale: &dyn Fn(usize) -> f64) -> f64 {
         let n = self.x.len();
@@ -98,7 +202,7 @@ impl Step {
             for (c, k) in E.iter().zip(&self.k) {
                 e += c * k[i];
             }
-            let e = self.h * e / scale(i);
+            let e = if self.jacobian.is_some() { self.estimate[i] } else { self.h * e } / scale(i);
             sum += e * e;
         }
         if self.y.iter().all(|y| y.is_finite()) { (sum / n as f64).sqrt() } else { f64::NAN }
@@ -108,6 +212,12 @@ impl Step {
     pub fn slope_at(&self, theta: f64, out: &mut [f64]) {
         let rest = 1.0 - theta;
         let [a, b, c, d] = &self.extension;
+        if self.jacobian.is_some() {
+            for i in 0..out.len() {
+                out[i] = (a[i] + theta * (2.0 * b[i] + theta * 3.0 * c[i])) / self.h;
+            }
+            return;
+        }
         for i in 0..out.len() {
             let inner = c[i] + rest * d[i];
             let middle = b[i] + theta * inner;
@@ -121,6 +231,12 @@ impl Step {
     pub fn at(&self, theta: f64, out: &mut [f64]) {
         let rest = 1.0 - theta;
         let [a, b, c, d] = &self.extension;
+        if self.jacobian.is_some() {
+            for i in 0..out.len() {
+                out[i] = self.x[i] + theta * (a[i] + theta * (b[i] + theta * c[i]));
+            }
+            return;
+        }
         for i in 0..out.len() {
             out[i] = self.x[i] + theta * (a[i] + rest * (b[i] + theta * (c[i] + rest * d[i])));
         }

@@ -490,3 +490,32 @@ fn conditions_have_names() {
     // 1 to t = 1, 2 to t = 2, 3 to t = 3.
     near(x[0], 6.0, 1e-10);
 }
+
+/// Stiff modes and stiff sliding by the implicit method: a few steps where an explicit one needs a million.
+#[test]
+fn stiff_motion_is_followed_by_the_implicit_method() {
+    use crate::motion::Method;
+    for (f, t_end, want) in [
+        // x follows cos t to 1e-6; y switches where x does, at pi/2.
+        (
+            "'-1e6*(x - cos(t))', 'sign(x) - y'",
+            3.0,
+            2.0 * (-(3.0 - std::f64::consts::FRAC_PI_2)).exp() - 1.0 - (-3.0_f64).exp(),
+        ),
+        // Sliding on x = 0 with a fast state behind it: y -> 1/2 there.
+        ("'-sign(x) + y', '-1e6*(y - 0.5)'", 3.0, 0.5),
+    ] {
+        let model = model(&format!("states = ['x', 'y']\nstart = [1, 0]\nf = [{f}]"));
+        let options = Options { t_end, method: Method::Radau5, ..Options::default() };
+        let outcome = follow(&model, &options, &mut |_| true).unwrap();
+        near(outcome.x[1], want, 2e-6);
+        assert!(outcome.steps < 3000, "{} steps", outcome.steps);
+    }
+    // Its order and its accuracy on a smooth motion.
+    let circle = model("states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-x']");
+    let end = |rtol: f64| {
+        let options = Options { t_end: 10.0, rtol, method: Method::Radau5, ..Options::default() };
+        (follow(&circle, &options, &mut |_| true).unwrap().x[0] - 10.0_f64.cos()).abs()
+    };
+    assert!(end(1e-8) < 1e-8 && end(1e-11) < 1e-11, "{} {}", end(1e-8), end(1e-11));
+}

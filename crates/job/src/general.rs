@@ -28,7 +28,7 @@ impl GeneralRun {
             "t_start": o.t_start,
             "t_end": o.t_end,
             "start": o.start,
-            "method": { "name": "dopri5", "rtol": o.rtol, "atol": o.atol, "max_step": o.max_step.is_finite().then_some(o.max_step), "max_steps": o.max_steps },
+            "method": { "name": o.method.name(), "rtol": o.rtol, "atol": o.atol, "max_step": o.max_step.is_finite().then_some(o.max_step), "max_steps": o.max_steps },
             "observe": match &o.record {
                 Record::Path { chord } => json!({ "path": { "chord": chord } }),
                 Record::Times { every } => json!({ "times": { "every": every } }),

@@ -236,9 +236,10 @@ fn draw_general(arguments: &Arguments, mut run: GeneralRun, format: Format) -> R
     let reached = |_: f64| progress.asked_to_stop().is_none();
     let answer = run.compute(&reached).map_err(general::failed)?;
     let mut small_print = vec![format!(
-        "*t* = {} … {}, followed exactly, dopri5, rtol {}",
+        "*t* = {} … {}, followed exactly, {}, rtol {}",
         number(run.options.t_start),
         number(run.options.t_end),
+        run.options.method.name(),
         number(run.options.rtol)
     )];
     if answer.stop == Stop::Interrupted {
@@ -249,7 +250,7 @@ fn draw_general(arguments: &Arguments, mut run: GeneralRun, format: Format) -> R
         .provenance("Software", concat!("twofold ", env!("CARGO_PKG_VERSION")))
         .provenance("Picture", format!("plot-{}", look.kind.word()))
         .provenance("Reading", "none")
-        .provenance("Method", "dopri5")
+        .provenance("Method", run.options.method.name())
         .provenance("Spec-SHA256", record::Hash::of_json(&run.about()).as_str())
         .provenance("Data-SHA256", record::Hash::of(&encode::bits(&answer.tables)).as_str());
     sheet.searchable_svg = arguments.searchable;

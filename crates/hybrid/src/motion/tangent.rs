@@ -77,6 +77,20 @@ impl Follower<'_> {
         (error > 1.0).then(|| (0.9 * rough_pow(error, -0.2)).clamp(0.1, 0.9))
     }
 
+    /// The derivative of the field by the state, row by row.
+    pub(super) fn jacobian(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
+        let n = self.n;
+        let mut matrix = vec![0.0; n * n];
+        for j in 0..n {
+            let mut unit = vec![0.0; n];
+            unit[j] = 1.0;
+            for (i, slope) in self.slope_along(t, x, &unit).into_iter().enumerate() {
+                matrix[i * n + j] = slope;
+            }
+        }
+        matrix
+    }
+
     /// The derivative of the field in the direction `v`, sliding included.
     fn slope_along(&mut self, t: f64, x: &[f64], v: &[f64]) -> Vec<f64> {
         let n = self.n;
@@ -306,6 +320,16 @@ fn solve_duals(mut a: Vec<D>, mut b: Vec<D>) -> Vec<D> {
     b
 }
 
+/// Tangent vectors are carried by the stages of explicit steps.
+fn explicit(options: &Options) -> Result<(), HybridError> {
+    match options.method {
+        super::Method::Dopri5 => Ok(()),
+        other => {
+            Err(HybridError::Bad(format!("tangent vectors are carried by dopri5; leave --method {} out", other.name())))
+        }
+    }
+}
+
 /// Lyapunov exponents.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exponents {
@@ -328,6 +352,7 @@ const STUDENT: f64 = 2.093;
 /// # Errors
 /// As [`follow`](super::follow); also where tangent vectors end: at a grazing, at two surfaces at once, at rest after accumulated impacts.
 pub fn exponents(model: &Model, options: &Options, transient: f64, count: usize) -> Result<Exponents, HybridError> {
+    explicit(options)?;
     let begin = options.t_start + transient;
     if !(transient >= 0.0 && begin < options.t_end) {
         return Err(HybridError::Bad(format!(
@@ -440,6 +465,7 @@ pub struct ClosedOrbit {
 /// # Errors
 /// As [`follow`](super::follow); also if there is no return, or the iteration does not settle.
 pub fn closed_orbit(model: &Model, options: &Options, after: &Return) -> Result<ClosedOrbit, HybridError> {
+    explicit(options)?;
     let n = model.coordinates().len();
     let mut x = match &options.start {
         Some(x) => x.clone(),
