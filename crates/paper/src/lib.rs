@@ -33,6 +33,7 @@ pub mod drawing;
 pub mod effects;
 pub mod pipeline;
 pub mod report;
+pub mod similarity;
 pub mod standing;
 pub mod study;
 pub mod verdict;
