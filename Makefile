@@ -117,9 +117,13 @@ capture-rest: ## what the study of methods leaves out for its cost: Radau IIA in
 	@$(CARGO) build --release --locked --bin twofold
 	@$(SWEEP) $(CAPTURE) 2015 --method radau5 $(RECONSTRUCTED) $(STARTS) --random 200 --out $(K)/radau5-reconstructed.csv
 
-.PHONY: delay-growth
-delay-growth: ## how a disturbance grows in a passage of the two-fold when the switch acts late (a minute)
-	@$(CARGO) run --release --locked --quiet --example delay_growth
+.PHONY: delay-data
+delay-data: ## the data of figures/delay: passages, and a hundred runs of each rule to compare (an hour; a stopped call goes on)
+	@$(CARGO) build --release --locked --quiet --example delay_growth --example delay_runs
+	@target/release/examples/delay_growth growth > target/delay-growth.csv && mv target/delay-growth.csv figures/delay/growth.csv
+	@target/release/examples/delay_growth exits > target/delay-exits.csv && mv target/delay-exits.csv figures/delay/exits.csv
+	@target/release/examples/delay_runs sections > target/delay-sections.csv && mv target/delay-sections.csv figures/delay/sections.csv
+	@target/release/examples/delay_runs figures/delay/runs.csv
 
 .PHONY: returns
 returns: ## how many orbits that leave the repelling sliding region come back to the two-fold (minutes)

@@ -44,6 +44,7 @@ figures! {
     digits: "digits/figure.rs", "digits/expected.json";
     convergence: "convergence/figure.rs", "convergence/expected.json";
     law: "law/figure.rs", "law/expected.json";
+    delay: "delay/figure.rs", "delay/expected.json";
     census: "census/figure.rs", "census/expected.json";
     audit: "audit/figure.rs", "audit/expected.json";
     basin: "basin/figure.rs", "basin/expected.json";

@@ -1,10 +1,17 @@
 //! The delayed switch against programs that share nothing with this one but the equations.
 
+#[allow(dead_code)] // the examples' own main functions
 #[path = "../../examples/delay_growth.rs"]
 mod delay_growth;
+#[allow(dead_code)]
+#[path = "../../examples/delay_runs.rs"]
+mod delay_runs;
 
 use std::process::Command;
 
+use crate::claims::Reads;
+use twofold::analyse::delay::LateRule;
+use twofold::analyse::passage::Predicted;
 use twofold::analyse::{Crossing, Direction};
 use twofold::integrate::delay::History;
 use twofold::integrate::{Kick, KickLaw, Schedule, StepCap, Tolerance};
@@ -12,6 +19,9 @@ use twofold::job::recording::Data;
 use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::job::{Executor, Run};
+use twofold::paper::claims::claims;
+use twofold::paper::similarity::{Rule, Similar, WAYS};
+use twofold::paper::{Reading, figures};
 use twofold::system::{Caricature, Transition};
 
 fn spec(alpha: f64, switch: SwitchSpec, method: Method, tolerance: f64, t_end: f64) -> RunSpec {
@@ -165,8 +175,9 @@ fn the_chatters_mean_tends_to_filippovs_motion() {
 /// three decades.
 #[test]
 fn growth_in_a_passage_is_of_order_one_in_inner_units() {
-    let found: Vec<_> =
-        [1e-2, 3e-3, 1e-3].map(|d| (d, delay_growth::growth(d, &delay_growth::STARTS[..3]).unwrap())).into();
+    let found: Vec<_> = [1e-2, 3e-3, 1e-3]
+        .map(|d| (d, delay_growth::growth(LateRule::Sharp { delay: d }, &delay_growth::STARTS[..3]).unwrap()))
+        .into();
     let [across, along, carried_in] = delay_growth::exponents(&found).map(|(slope, _)| slope);
     assert!((across + 1.0).abs() < 0.3 && along.abs() < 0.1 && carried_in.abs() < 0.3, "{across} {along} {carried_in}");
     for (delay, growth) in &found {
@@ -177,6 +188,82 @@ fn growth_in_a_passage_is_of_order_one_in_inner_units() {
             assert!(inner.iter().zip(bounds).all(|(v, (low, high))| (low..high).contains(v)), "{delay}: {g:?}");
         }
     }
+}
+
+/// The committed powers, each near the one that the chatter's phase explains: across, along and carried in.
+#[test]
+fn committed_growth_has_the_powers_of_the_chatters_phase() {
+    let growth = figures::delay::growth().unwrap();
+    let are = |powers: [(f64, f64); 3], expected: [f64; 3], within: f64| {
+        let near = powers.iter().zip(expected).all(|((power, _), e)| (power - e).abs() < within);
+        assert!(near, "{powers:?} and not {expected:?}");
+        assert!(powers.iter().all(|(_, error)| *error > 0.0 && *error < within), "{powers:?}");
+    };
+    are(figures::delay::sharp_powers(&growth, "sharp"), [-1.0, 0.0, 0.0], 0.05);
+    are(figures::delay::sharp_powers(&growth, "relay"), [-0.5, 0.0, -0.5], 0.03);
+    // The smooth rule: smoothing's powers, and order one in inner units.
+    let law = Predicted::of(-1.2, -1.4);
+    let smoothing = [law.across(), law.along(), law.carried()];
+    are(figures::delay::smooth_powers(&growth, figures::delay::SMALL, figures::delay::SMALL_EPS), smoothing, 0.15);
+    are(figures::delay::smooth_powers(&growth, figures::delay::LARGE, 1e-2), [-0.5, 0.0, 0.0], 0.1);
+}
+
+/// Over a uniform phase the exits' distribution does not depend on the delay, or a small band, while the phase of each exit does. One exit of a
+/// distribution is 0.0043.
+#[test]
+fn committed_exits_have_a_limit_distribution() {
+    let exits = figures::delay::exits().unwrap();
+    let gaps = ["sharp", "relay"].map(|rule| figures::delay::exit_gaps(&exits, rule));
+    assert!(gaps[0].iter().chain(&gaps[1][1..]).all(|gap| *gap < 0.01), "{gaps:?}");
+    let first = [1e-3, 1e-4].map(|delay| figures::delay::one_period(&exits, "sharp", delay)[0][1]);
+    assert!((first[0] - first[1]).abs() > 10.0, "{first:?}");
+}
+
+/// Rows of each committed table, computed anew: to the digits that they have.
+#[test]
+fn committed_data_come_out_the_same() {
+    let [growth, exits, _, runs] = figures::delay::DATA.map(|(_, text)| text);
+    let rules = [
+        ("sharp,NaN,1.0000e-2", LateRule::Sharp { delay: 1e-2 }),
+        ("relay,NaN,1.0000e-2", LateRule::Relay { band: 1e-2 }),
+    ];
+    for (name, rule) in rules {
+        let [_, y, z] = delay_growth::STARTS[0];
+        let found = delay_growth::growth(rule, &delay_growth::STARTS[..1]).unwrap()[0];
+        let row = growth.lines().find(|l| l.starts_with(&format!("{name},{y},{z},"))).unwrap();
+        let said = format!("{:.4e},{:.4e},{:.4e}", found.across, found.along, found.carried_in);
+        assert!(row.contains(&said), "{row}: {said}");
+        let [_, y, z] = delay_growth::exit(rule, delay_growth::start_at(rule, 0.25)).unwrap();
+        let said = format!("1e-2,0.25,{y:.5},{z:.5}");
+        assert!(exits.lines().any(|l| l.ends_with(&said)), "{said}");
+    }
+    let end = claims().similarity.end;
+    for (rule, number) in [(Rule::Smoothed, 1), (Rule::Single, 7), (Rule::DelayedLong, 3)] {
+        let run = delay_runs::run(Reading::Printed, rule, delay_runs::shift(number), end);
+        let (outcome, captured_at) = delay_runs::settles(&delay_runs::followed(&run).unwrap(), end);
+        let said = format!("printed,{},{number},{outcome},{captured_at:.1},", rule.name());
+        assert!(runs.lines().any(|l| l.starts_with(&said)), "{said}");
+    }
+}
+
+/// Sentence 4.8, from the committed runs by the rules that stood before them.
+#[test]
+fn the_effect_is_in_some_ways_similar_to_hysteresis() {
+    let mut reads = Reads::by("delay::the_effect_is_in_some_ways_similar_to_hysteresis");
+    let scores = figures::delay::all_scores().unwrap();
+    let is_similar = |way: usize| {
+        let chosen = scores.iter().filter(|s| s.0 == way && s.2 == Rule::Delayed && s.3 == Rule::Literal);
+        chosen.filter(|s| s.4.similar == Similar::Yes).count() == Reading::ALL.len()
+    };
+    for (_, reading, delayed, hysteresis, score) in &scores {
+        assert_eq!(score.of, claims().similarity.runs, "{reading:?} {delayed:?} {hysteresis:?}");
+    }
+    let ways = (0..WAYS.len()).filter(|way| is_similar(*way)).count();
+    reads.read(
+        "4.8",
+        "ways in which it is similar to literal hysteresis in both readings of the parameters",
+        ways as f64,
+    );
 }
 
 /// What is wrong is said before anything is computed, with exit code 2.
