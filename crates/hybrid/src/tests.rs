@@ -519,3 +519,25 @@ fn stiff_motion_is_followed_by_the_implicit_method() {
     };
     assert!(end(1e-8) < 1e-8 && end(1e-11) < 1e-11, "{} {}", end(1e-8), end(1e-11));
 }
+
+/// Dry friction against a relay: each turn loses a third of the last one's speed squared, and after infinitely many the block rests.
+#[test]
+fn switches_that_accumulate_may_end_in_rest() {
+    // From (1, 0): x'' = -1/2 to v = -1 at x = 0, then -x'' = 3/2 ... the turns' times are a geometric series of ratio 1/sqrt(3).
+    let text = "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-sign(x) - 0.5*sign(v)']";
+    let mut rows = Vec::new();
+    let options = Options { t_end: 12.0, record: Record::Times { every: 1.0 }, ..Options::default() };
+    let outcome = follow(&model(text), &options, &mut |p| {
+        rows.push((p.t, p.x[0], p.x[1], p.signs.to_owned()));
+        true
+    })
+    .unwrap();
+    assert_eq!((outcome.ending, rows.len()), (Ending::Finished, 13));
+    // 2 to x = 0 at speed 1; then turns of duration v (2/3 + 2/sqrt(3)) each, v falling by 1/sqrt(3).
+    let q = 1.0 / 3.0_f64.sqrt();
+    let rest = 2.0 + (2.0 / 3.0 + 2.0 * q) / (1.0 - q);
+    assert!(
+        rows.iter().all(|(t, x, v, signs)| (*t > rest) == (*x == 0.0 && *v == 0.0 && signs == "00")),
+        "{rows:?} {rest}"
+    );
+}

@@ -89,6 +89,13 @@ impl Follower<'_> {
             self.settle(&zero)?;
             for guard in crossed {
                 if let Some((t, error)) = self.switch_trains[guard].note(self.t).filter(|_| fired.is_empty()) {
+                    if self.rests_where_switches_accumulate(t) {
+                        return Ok(if self.emit_rest(observe) {
+                            Some(Ending::Finished)
+                        } else {
+                            Some(Ending::Interrupted)
+                        });
+                    }
                     let surfaces = self.names(&[guard]);
                     return Err(HybridError::Accumulation { t, error, x: self.x.clone(), surfaces });
                 }
@@ -345,5 +352,112 @@ impl Follower<'_> {
             let off: Vec<f64> = rows.iter().map(|row| dot(row, y)).collect();
             onto(y, &off);
         }
+    }
+
+    /// Whether the motion rests from `t` on at the point where its switches accumulate: all functions that are nearly zero there are zero, and a mixture of
+    /// the fields around it vanishes. If so the state is put there.
+    fn rests_where_switches_accumulate(&mut self, t: f64) -> bool {
+        if self.equation.depends_on_time() || !self.equation.tables.is_empty() {
+            return false;
+        }
+        let n = self.n;
+        let values = self.watched_values();
+        let largest = self.size.iter().fold(0.0_f64, |most, s| most.max(*s));
+        let near: Vec<(usize, usize)> = self
+            .compiled
+            .active
+            .iter()
+            .enumerate()
+            .filter(|(place, guard)| !self.equation.guards[**guard].whole && values[*place].abs() <= 1e-6 * largest)
+            .map(|(place, guard)| (place, *guard))
+            .collect();
+        if near.is_empty() || near.len() > MOST_TOGETHER {
+            return false;
+        }
+        // The point where all of them are zero, nearest to the state.
+        let still = vec![0.0; n];
+        let in_time = Self::along(&self.compiled, &self.variables, &still);
+        let mut rows = vec![vec![0.0; n]; near.len()];
+        for i in 0..n {
+            let mut unit = vec![0.0; n];
+            unit[i] = 1.0;
+            let slopes = Self::along(&self.compiled, &self.variables, &unit);
+            for (row, (place, _)) in rows.iter_mut().zip(&near) {
+                row[i] = slopes[*place] - in_time[*place];
+            }
+        }
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let gram: Vec<f64> = rows.iter().flat_map(|a| rows.iter().map(|b| dot(a, b)).collect::<Vec<_>>()).collect();
+        let off: Vec<f64> = near.iter().map(|(place, _)| values[*place]).collect();
+        let Some(weights) = solve_any(&gram, &off, 0.0) else { return false };
+        let mut x = self.x.clone();
+        for (row, weight) in rows.iter().zip(&weights) {
+            x.iter_mut().zip(row).for_each(|(x, r)| *x -= weight * r);
+        }
+        let field = |sides: &dyn Fn(usize) -> f64, follower: &Self| {
+            let mut config = follower.config.clone();
+            near.iter().enumerate().for_each(|(i, (_, guard))| config.sides[*guard] = sides(i));
+            let mut v = follower.load(&config);
+            v[..n].copy_from_slice(&x);
+            let mut f = vec![0.0; n];
+            follower.equation.compiled(&config).field.evaluate(&v, &mut f);
+            f
+        };
+        let low = field(&|_| -1.0, self);
+        let minus = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<f64>>();
+        let columns: Vec<Vec<f64>> =
+            (0..near.len()).map(|j| minus(&field(&|i| if i == j { 1.0 } else { -1.0 }, self), &low)).collect();
+        // Least squares with weights from 0 to 1, one after the other (Hildreth 1957).
+        let (mut weights, mut left) = (vec![0.5; near.len()], low.clone());
+        for column in &columns {
+            left.iter_mut().zip(column).for_each(|(l, c)| *l += 0.5 * c);
+        }
+        for _ in 0..1000 {
+            for (weight, column) in weights.iter_mut().zip(&columns) {
+                let size = dot(column, column);
+                if size > 0.0 {
+                    let new = (*weight - dot(column, &left) / size).clamp(0.0, 1.0);
+                    left.iter_mut().zip(column).for_each(|(l, c)| *l += (new - *weight) * c);
+                    *weight = new;
+                }
+            }
+        }
+        let speed = columns.iter().flatten().chain(&low).fold(0.0_f64, |most, v| most.max(v.abs()));
+        // The fields are sums of what each switch gives, so that mixtures have no other velocities.
+        let corner = minus(&field(&|_| 1.0, self), &low);
+        let sum: Vec<f64> = (0..n).map(|i| columns.iter().map(|c| c[i]).sum()).collect();
+        let affine = corner.iter().zip(&sum).all(|(a, b)| (a - b).abs() <= 1e-9 * speed);
+        if !(affine && left.iter().all(|v| v.abs() <= 1e-6 * speed)) {
+            return false;
+        }
+        self.x = x;
+        self.t = t;
+        self.sliding = near.iter().map(|(_, guard)| *guard).collect();
+        let (config, sliding) = (self.config.clone(), self.sliding.clone());
+        self.adopt(config, sliding);
+        true
+    }
+
+    /// Records a state that rests until the end of the run; says whether more was wanted.
+    fn emit_rest(&mut self, observe: &mut dyn FnMut(&Point) -> bool) -> bool {
+        let end = self.options.t_end;
+        match self.options.record {
+            Record::Section(_) => {}
+            Record::Path { .. } => {
+                if !self.emit(self.t, None, observe) || !self.emit(end, None, observe) {
+                    return false;
+                }
+            }
+            Record::Times { every } => {
+                while self.next_record <= end {
+                    if !self.emit(self.next_record, None, observe) {
+                        return false;
+                    }
+                    self.next_record = ((self.next_record / every).round() + 1.0) * every;
+                }
+            }
+        }
+        self.t = end;
+        true
     }
 }

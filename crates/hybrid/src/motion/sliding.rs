@@ -7,7 +7,7 @@ use super::*;
 impl Follower<'_> {
     // What programs read.
 
-    pub(super) fn load(&mut self, config: &Configuration) -> Vec<f64> {
+    pub(super) fn load(&self, config: &Configuration) -> Vec<f64> {
         let n = self.n;
         let mut v = vec![0.0; self.equation.variables()];
         v[..n].copy_from_slice(&self.x);
