@@ -126,8 +126,15 @@ pub fn runs() -> Result<Vec<similarity::Run>, JobError> {
         .ok_or_else(|| JobError::Other("figures/delay/runs.csv has other columns or rows".into()))
 }
 
+/// A way, an index of [`WAYS`], in a reading of the parameters; the delayed rule and the hysteretic one; and the score.
+pub type Scored = (usize, Reading, Rule, Rule, Score);
+
 /// Every way in each reading of the parameters, for a delay of eps and of eps', against each reading of eq. (10).
-pub fn all_scores() -> Result<Vec<(usize, Reading, Rule, Rule, Score)>, JobError> {
+///
+/// # Errors
+///
+/// As of [`runs`].
+pub fn all_scores() -> Result<Vec<Scored>, JobError> {
     let runs = runs()?;
     let mut all = Vec::new();
     for hysteresis in [Rule::Literal, Rule::Single] {
