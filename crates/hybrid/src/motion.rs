@@ -499,6 +499,7 @@ impl<'a> Follower<'a> {
             follower.begin_watching(watched, false);
         }
         follower.note_conditions();
+        follower.rest_at_start();
         Ok(follower)
     }
 

@@ -541,3 +541,11 @@ fn switches_that_accumulate_may_end_in_rest() {
         "{rows:?} {rest}"
     );
 }
+
+#[test]
+fn a_ball_that_lies_on_the_floor_stays_there() {
+    let ball = "states = ['x', 'v']\nstart = [0, 0]\nf = ['v', '-1']\n[[event]]\nwhen = 'x'\ndirection = 'down'\nset = { v = '-0.5*v' }\nafter_zeno = 'stick'";
+    assert_eq!(end(ball, 5.0), [0.0, 0.0]);
+    // Lifted, it leaves.
+    near(end(&ball.replace("'-1'", "'t - 1'"), 4.0)[0], 4.5, 1e-9);
+}

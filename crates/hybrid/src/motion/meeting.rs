@@ -255,6 +255,28 @@ impl Follower<'_> {
         Ok(None)
     }
 
+    /// A start at rest on a surface on which motion may stick, pressed against it, stays there.
+    pub(super) fn rest_at_start(&mut self) {
+        let definition = self.model.definition().clone();
+        let config = self.config.clone();
+        for i in 0..self.watch_side.len() {
+            let Some(event) = self.event_of[i].filter(|e| definition.events()[*e].sticks) else { continue };
+            let When::Zero(_, direction) = definition.events()[event].when else { continue };
+            let into = match direction {
+                Direction::Down => -1.0,
+                Direction::Up => 1.0,
+                Direction::Both => continue,
+            };
+            let (compiled, rates) = self.rates(&config);
+            let place = compiled.active.len() + i;
+            let rests = self.fresh_watch[i] && rates.first[place].abs() <= 1e-14 * rates.terms[place];
+            if rests && rates.second[place] * into > 0.0 {
+                self.stick(&definition, event, self.t);
+                return;
+            }
+        }
+    }
+
     /// Puts motion at rest on an event's surface from `t` on; false if the set state does not move the expression's derivative.
     pub(super) fn stick(&mut self, definition: &crate::Definition, event: usize, t: f64) -> bool {
         let Some(watched) = self.event_of.iter().position(|e| *e == Some(event)) else { return false };
