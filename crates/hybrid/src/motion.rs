@@ -352,7 +352,8 @@ struct Follower<'a> {
     growth: Option<tangent::Growth>,
     /// The next multiple that is recorded.
     next_record: f64,
-    rhs_room: Vec<Vec<f64>>,
+    /// Room for values.
+    scratch: Vec<f64>,
     outcome: Outcome,
 }
 
@@ -486,7 +487,7 @@ impl<'a> Follower<'a> {
             tangents: None,
             growth: None,
             next_record: f64::INFINITY,
-            rhs_room: vec![vec![0.0; n]; 4],
+            scratch: Vec::new(),
             outcome: Outcome { ending: Ending::Finished, t: t0, x: x.clone(), steps: 0, switches: 0, events: 0 },
             config,
             x,

@@ -75,8 +75,7 @@ impl Follower<'_> {
             self.outcome.switches += 1;
             let mut config = self.config.clone();
             for (guard, plus) in &leave {
-                config.sides[*guard] =
-                    if *plus { self.high(*guard, &self.config) } else { self.low(*guard, &self.config) };
+                config.sides[*guard] = if *plus { self.high(*guard) } else { self.low(*guard) };
                 self.fresh_guard[*guard] = true;
                 zero.retain(|g| g != guard);
             }

@@ -43,7 +43,7 @@ impl Follower<'_> {
         self.variables[n] = t;
         let compiled = self.compiled.clone();
         let active = compiled.active.len();
-        let mut values = std::mem::take(&mut self.rhs_room[0]);
+        let mut values = std::mem::take(&mut self.scratch);
         values.resize(active + self.equation.watched.len(), 0.0);
         compiled.watched.evaluate(&self.variables, &mut values);
         let mut weights = Vec::new();
@@ -89,7 +89,7 @@ impl Follower<'_> {
                 }
             });
         }
-        self.rhs_room[0] = values;
+        self.scratch = values;
     }
     /// The place in a step before which all is as the step saw it, if there is something that it did not see: an operation that is flat at the step's stages
     /// and steep between them. Where arguments move far, the field along the continuous extension is compared with the extension's own derivative (the

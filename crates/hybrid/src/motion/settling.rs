@@ -46,7 +46,7 @@ impl Follower<'_> {
                 Some(side) => self.config.sides[guard] = side,
                 None => {
                     self.config.sides[guard] =
-                        self.low(guard, &self.config) + if self.equation.guards[guard].whole { 1.0 } else { 2.0 };
+                        self.low(guard) + if self.equation.guards[guard].whole { 1.0 } else { 2.0 };
                     at_zero.push(guard);
                 }
             }
@@ -102,8 +102,8 @@ impl Follower<'_> {
             self.adopt(config, Vec::new());
             return Ok(());
         }
-        let lows: Vec<f64> = zero.iter().map(|g| self.low(*g, &self.config)).collect();
-        let highs: Vec<f64> = zero.iter().map(|g| self.high(*g, &self.config)).collect();
+        let lows: Vec<f64> = zero.iter().map(|g| self.low(*g)).collect();
+        let highs: Vec<f64> = zero.iter().map(|g| self.high(*g)).collect();
         let vertex = |follower: &mut Self, plus: &dyn Fn(usize) -> bool| {
             let mut config = follower.config.clone();
             for (i, guard) in zero.iter().enumerate() {

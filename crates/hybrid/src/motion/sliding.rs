@@ -25,7 +25,7 @@ impl Follower<'_> {
     pub(super) fn adopt(&mut self, config: Configuration, sliding: Vec<usize>) {
         let mut config = config;
         for guard in &sliding {
-            config.sides[*guard] = self.low(*guard, &config);
+            config.sides[*guard] = self.low(*guard);
         }
         self.sliding = sliding;
         self.compiled = self.equation.compiled(&config);
@@ -36,7 +36,7 @@ impl Follower<'_> {
         if self.separate.is_none() {
             for guard in self.sliding.clone() {
                 let mut flipped = self.config.clone();
-                flipped.sides[guard] = self.high(guard, &self.config);
+                flipped.sides[guard] = self.high(guard);
                 let variables = self.load(&flipped);
                 self.base.push((self.equation.compiled(&flipped), variables));
             }
@@ -113,18 +113,17 @@ impl Follower<'_> {
     }
 
     /// The answers on both sides of a guard's zero.
-    pub(super) fn low(&self, guard: usize, config: &Configuration) -> f64 {
-        if self.equation.guards[guard].whole { self.boundary(guard, config) - 1.0 } else { -1.0 }
+    pub(super) fn low(&self, guard: usize) -> f64 {
+        if self.equation.guards[guard].whole { self.boundary(guard) - 1.0 } else { -1.0 }
     }
 
-    pub(super) fn high(&self, guard: usize, config: &Configuration) -> f64 {
-        if self.equation.guards[guard].whole { self.boundary(guard, config) } else { 1.0 }
+    pub(super) fn high(&self, guard: usize) -> f64 {
+        if self.equation.guards[guard].whole { self.boundary(guard) } else { 1.0 }
     }
 
     /// The whole number that a guard's value is at.
-    pub(super) fn boundary(&self, guard: usize, config: &Configuration) -> f64 {
+    pub(super) fn boundary(&self, guard: usize) -> f64 {
         let value = self.equation.value(&self.equation.guards[guard].expression, self.t, &self.x);
-        let _ = config;
         value.round()
     }
 
@@ -146,7 +145,7 @@ impl Follower<'_> {
             let weights = self.weights(t, x, out);
             let field0 = out.to_vec();
             for (place, weight) in weights.iter().enumerate() {
-                let other = &self.rhs_room_of(place, t, x);
+                let other = &self.positive_field(place, t, x);
                 for i in 0..n {
                     out[i] += weight * (other[i] - field0[i]);
                 }
@@ -159,7 +158,7 @@ impl Follower<'_> {
     }
 
     /// The field on the positive side of a surface slid upon.
-    pub(super) fn rhs_room_of(&mut self, place: usize, t: f64, x: &[f64]) -> Vec<f64> {
+    pub(super) fn positive_field(&mut self, place: usize, t: f64, x: &[f64]) -> Vec<f64> {
         let n = self.n;
         let (compiled, variables) = &mut self.base[place];
         variables[..n].copy_from_slice(x);
@@ -202,7 +201,7 @@ impl Follower<'_> {
         let a: Vec<f64> = self.sliding.iter().map(|g| of(&rates, &self.compiled, *g)).collect();
         let mut matrix = vec![0.0; k * k];
         for column in 0..k {
-            let field = self.rhs_room_of(column, t, x);
+            let field = self.positive_field(column, t, x);
             let (compiled, variables) = &self.base[column];
             let rates = Self::along(compiled, variables, &field);
             for row in 0..k {
