@@ -261,6 +261,14 @@ bench-cost: ## cost against end time, layer and tolerance: benches/cost.csv, cos
 	@target/release/twofold-cost > benches/cost.csv
 	@python3 benches/cost.py
 
+.PHONY: bench-hybrid
+HYBRID := target/hybrid-peers
+bench-hybrid: ## hybrid systems by us, SciPy and CVODE: error, seconds and lines into benches/hybrid (needs Python 3.11 or newer and PyPI; some minutes)
+	@$(PYTHON) -m venv $(HYBRID)
+	@$(HYBRID)/bin/python -m pip install --quiet --disable-pip-version-check -r benches/hybrid/requirements.txt
+	@[ -n "$$TWOFOLD" ] || $(CARGO) build --release --locked --bin twofold
+	@$(HYBRID)/bin/python benches/hybrid/compare.py $(HYBRID_FLAGS)
+
 bench: ## benchmarks, compared with the last kept ones (make bench-keep)
 	@if ls target/criterion/*/*/kept >/dev/null 2>&1; then flags="--baseline kept"; fi; \
 	$(CARGO) bench --locked -p twofold-benches --bench steppers -- $$flags && $(CARGO) bench --locked -p twofold-benches --bench render -- $$flags
