@@ -549,3 +549,19 @@ fn a_ball_that_lies_on_the_floor_stays_there() {
     // Lifted, it leaves.
     near(end(&ball.replace("'-1'", "'t - 1'"), 4.0)[0], 4.5, 1e-9);
 }
+
+/// Mixtures that differ are refused, also where the surfaces themselves know nothing of each other.
+#[test]
+fn mixtures_with_other_velocities_are_refused() {
+    for f in [
+        "'-sign(x)', '-sign(y)', 'sign(x)*sign(y)'",
+        "'-sign(x) - 0.5*sign(x)*sign(y)', '-sign(y) + 0.3*sign(x)*sign(y)', '0'",
+    ] {
+        let text = format!("states = ['x', 'y', 'z']\nstart = [1, 0.8, 0]\nf = [{f}]");
+        let error = run(&model(&text), 3.0).1.unwrap_err().to_string();
+        assert!(
+            error.contains("x = 0") && error.contains("y = 0") && error.contains("different velocities"),
+            "{error}"
+        );
+    }
+}

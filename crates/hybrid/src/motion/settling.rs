@@ -169,11 +169,10 @@ impl Follower<'_> {
                     continue;
                 }
             }
-            let mut not_affine = false;
             let found = possibilities(set.len(), |assignment| {
                 let slides: Vec<usize> = (0..set.len()).filter(|i| assignment[*i] == Way::Stay).collect();
                 let plus: Vec<bool> = assignment.iter().map(|w| *w == Way::Plus).collect();
-                let (field0, base, direction) = at(self, plus.clone());
+                let (_, base, direction) = at(self, plus.clone());
                 let goes = |i: usize, d: f64| match assignment[i] {
                     Way::Plus => d > 0.0,
                     Way::Minus => d < 0.0,
@@ -206,18 +205,6 @@ impl Follower<'_> {
                 } else if weights.iter().any(|w| !(*w > 0.0 && *w < 1.0)) {
                     return false;
                 }
-                if m > 1 {
-                    let mut all = plus.clone();
-                    slides.iter().for_each(|s| all[*s] = true);
-                    let (corner, ..) = at(self, all);
-                    let predicted: Vec<f64> = (0..field0.len())
-                        .map(|i| field0[i] + columns.iter().map(|(f, ..)| f[i] - field0[i]).sum::<f64>())
-                        .collect();
-                    let size = corner.iter().chain(&field0).fold(0.0_f64, |a, v| a.max(v.abs()));
-                    if predicted.iter().zip(&corner).any(|(p, c)| (p - c).abs() > 1e-9 * size) {
-                        not_affine = true;
-                    }
-                }
                 (0..set.len()).filter(|i| !slides.contains(i)).all(|i| {
                     let rate =
                         base[i] + columns.iter().zip(&weights).map(|((_, r, _), w)| w * (r[i] - base[i])).sum::<f64>();
@@ -228,13 +215,6 @@ impl Follower<'_> {
                 [] => {
                     let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
                     return Err(self.undecided(&names, "no way is consistent to first and second order"));
-                }
-                [one] if not_affine && one.iter().filter(|w| **w == Way::Stay).count() > 1 => {
-                    let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
-                    return Err(self.undecided(
-                        &names,
-                        "sliding on all of them, where mixtures of the fields have different velocities",
-                    ));
                 }
                 [one] => one.clone(),
                 several => {
@@ -257,6 +237,26 @@ impl Follower<'_> {
             };
             for (i, way) in set.iter().zip(chosen) {
                 ways[*i] = way;
+            }
+        }
+        // Surfaces that do not change each other's speeds may still act on other states together.
+        let stay: Vec<usize> = (0..k).filter(|i| ways[*i] == Way::Stay).collect();
+        if stay.len() > 1 {
+            let fields = |follower: &mut Self, on: &dyn Fn(usize) -> bool| {
+                vertex(follower, &|i| ways[i] == Way::Plus || (ways[i] == Way::Stay && on(i))).2.field
+            };
+            let base = fields(self, &|_| false);
+            let corner = fields(self, &|_| true);
+            let mut sum = base.clone();
+            for s in &stay {
+                let one = fields(self, &|i| i == *s);
+                sum.iter_mut().zip(one.iter().zip(&base)).for_each(|(sum, (one, base))| *sum += one - base);
+            }
+            let size = corner.iter().chain(&base).fold(0.0_f64, |most, v| most.max(v.abs()));
+            if sum.iter().zip(&corner).any(|(p, c)| (p - c).abs() > 1e-9 * size) {
+                let names: Vec<usize> = stay.iter().map(|i| zero[*i]).collect();
+                let ways = "sliding on all of them, where mixtures of the fields have different velocities";
+                return Err(self.undecided(&names, ways));
             }
         }
         let mut config = self.config.clone();
