@@ -118,6 +118,9 @@ pub struct RunFlags {
     /// with an error where a choice is needed.
     #[arg(long, value_name = "RULE", allow_hyphen_values = true, help_heading = "Filippov motion")]
     pub exit: Option<String>,
+    /// Which mixture a general system takes on several surfaces at once where mixtures of its fields have different velocities [default: none, an error].
+    #[arg(long, value_enum, help_heading = "Filippov motion")]
+    pub intersection: Option<Intersection>,
     /// Probability of leaving to h > 0 under a random exit rule [default: 0.5].
     #[arg(long, allow_hyphen_values = true, help_heading = "Filippov motion")]
     pub plus_probability: Option<f64>,
@@ -165,6 +168,15 @@ pub enum Switch {
     Delayed,
     /// The discontinuous system itself.
     Filippov,
+}
+
+/// A rule for several surfaces at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Intersection {
+    /// Products of one weight for each surface: what equally steep smoothed switches tend to.
+    Bilinear,
+    /// The shortest velocity of Filippov's hull that stays on the surfaces.
+    HullLeastNorm,
 }
 
 /// What a command makes of a run.
@@ -257,7 +269,7 @@ const OF_EXTENDED: &str =
 const OF_KICKS: &str = "there are no kicks; leave it out, or give --kick-every";
 
 /// The table. Every flag of [`RunFlags`] but --spec stands in it once.
-const EFFECTS: [Effect; 40] = {
+const EFFECTS: [Effect; 41] = {
     const fn always(flag: &'static str, given: fn(&RunFlags) -> bool) -> Effect {
         Effect { flag, given, works: |_, _| true, why: "" }
     }
@@ -352,6 +364,12 @@ const EFFECTS: [Effect; 40] = {
             |f| f.exit.is_some(),
             |f, c| f.filippov() && c.is_a_run(),
             "smoothed and hysteretic motion leaves repelling sliding by itself, and a closed orbit has no repelling sliding; leave it out, or use --switch filippov",
+        ),
+        when(
+            "--intersection",
+            |f| f.intersection.is_some(),
+            |_, _| false,
+            "at the intersection of h and the second h nothing is chosen; leave it out (general systems take it)",
         ),
         when(
             "--plus-probability",
@@ -796,7 +814,7 @@ mod tests {
 
     /// Every flag with a value that no default has and that every run allows on which the flag has an effect; several, if
     /// none differs from every default.
-    const SAMPLES: [(&str, &[&str]); 40] = [
+    const SAMPLES: [(&str, &[&str]); 41] = [
         ("--system", &["wheel", "two-fold"]),
         ("--set", &["alpha=0.3", "omega0=1.1"]),
         ("--switch", &["smoothed", "hysteretic", "delayed", "filippov"]),
@@ -827,6 +845,7 @@ mod tests {
         ("--kick-size", &["0.004"]),
         ("--kick-law", &["cube"]),
         ("--exit", &["at-once:plus", "after-arc:0.2:minus"]),
+        ("--intersection", &["bilinear"]),
         ("--plus-probability", &["0.4"]),
         ("--funnel-times", &["3"]),
         ("--funnel-shortest", &["0.1"]),

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use super::CliError;
-use super::flags::RunFlags;
+use super::flags::{Intersection, RunFlags};
 use crate::hybrid::definition::is_general;
 use crate::hybrid::motion::{Exit as Side, Method, Record};
+use crate::hybrid::selection::Intersection as Rule;
 use crate::hybrid::{Definition, HybridError, Model, Options};
 use crate::job::JobError;
 use crate::job::general::GeneralRun;
@@ -14,7 +15,7 @@ use crate::system::diagnostic::nearest;
 use crate::system::{Expression, library};
 
 /// Flags that have an effect on the run of a general system.
-const WORK: [&str; 12] = [
+const WORK: [&str; 13] = [
     "--system",
     "--set",
     "--start",
@@ -26,6 +27,7 @@ const WORK: [&str; 12] = [
     "--max-step",
     "--max-steps",
     "--exit",
+    "--intersection",
     "--section",
 ];
 
@@ -176,6 +178,11 @@ pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
         record,
         exit,
         method,
+        intersection: match flags.intersection {
+            None => Rule::Undecided,
+            Some(Intersection::Bilinear) => Rule::Bilinear,
+            Some(Intersection::HullLeastNorm) => Rule::HullLeastNorm,
+        },
     };
     Ok(Some(GeneralRun { model, options }))
 }

@@ -26,7 +26,7 @@ use crate::definition::{Direction, When};
 use crate::equation::{Compiled, Configuration, Equation, EquationError};
 use crate::model::Model;
 use crate::roots::{PLACES, first, stays};
-use crate::selection::{MOST_TOGETHER, Way, groups, possibilities};
+use crate::selection::{Intersection, MOST_TOGETHER, Way, groups, mixture, possibilities};
 use crate::step::Step;
 
 /// What is recorded.
@@ -100,6 +100,8 @@ pub struct Options {
     pub exit: Exit,
     /// How steps are made.
     pub method: Method,
+    /// What is done where several mixtures stay on several surfaces.
+    pub intersection: Intersection,
 }
 
 impl Default for Options {
@@ -115,6 +117,7 @@ impl Default for Options {
             record: Record::Path { chord: 1e-3 },
             exit: Exit::Undecided,
             method: Method::Dopri5,
+            intersection: Intersection::Undecided,
         }
     }
 }
@@ -331,6 +334,8 @@ struct Follower<'a> {
     /// Guards that are slid upon, and for each the configuration on its positive side (all others slid upon on their negative one).
     sliding: Vec<usize>,
     base: Vec<(Rc<Compiled>, Vec<f64>)>,
+    /// Where mixtures differ: the fields on all sides of the surfaces slid upon, for the rule that chooses among them.
+    corners: Vec<(Rc<Compiled>, Vec<f64>)>,
     /// Surfaces slid upon that know nothing of each other: the one that each state's derivative depends on.
     separate: Option<Vec<Option<usize>>>,
     contact: Option<Contact>,
@@ -473,6 +478,7 @@ impl<'a> Follower<'a> {
             variables: vec![0.0; equation.variables()],
             sliding: Vec::new(),
             base: Vec::new(),
+            corners: Vec::new(),
             separate: None,
             contact: None,
             watch_side: vec![0.0; watched],

@@ -4,6 +4,8 @@
 //! or stay at zero, where the field is a mixture of those on both sides (Filippov 1988, sec. 4). What is possible is what is consistent: an assignment in which every
 //! function does what it is said to do. One possibility is the motion; several are a motion that is not decided.
 
+use twofold_num::linear::solve_any;
+
 /// What a switching function does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
@@ -28,6 +30,96 @@ impl Way {
 
 /// Most surfaces that depend on each other at one point.
 pub const MOST_TOGETHER: usize = 6;
+
+/// Which mixture of the fields is taken on several surfaces at once where mixtures have different velocities.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Intersection {
+    /// None: the run ends with an error.
+    #[default]
+    Undecided,
+    /// Products of one weight for each surface: what equally steep smoothed switches tend to (Alexander & Seidman 1998).
+    Bilinear,
+    /// The shortest velocity of Filippov's hull that stays on the surfaces (the slow solution: Aubin & Cellina 1984, ch. 2).
+    HullLeastNorm,
+}
+
+/// Weights of the 2^k fields around the meeting of k surfaces (bit i: the positive side of surface i), so that their mixture stays on all of them.
+/// `rates` are the derivatives of the k functions along each field.
+pub(crate) fn mixture(rule: Intersection, fields: &[Vec<f64>], rates: &[Vec<f64>]) -> Option<Vec<f64>> {
+    let k = rates.first()?.len();
+    match rule {
+        Intersection::Undecided => None,
+        Intersection::Bilinear => bilinear(rates, k),
+        Intersection::HullLeastNorm => shortest(fields, rates, k),
+    }
+}
+
+/// Newton's method for the weights of the surfaces.
+fn bilinear(rates: &[Vec<f64>], k: usize) -> Option<Vec<f64>> {
+    let factor = |w: &[f64], vertex: usize, i: usize| if vertex >> i & 1 == 1 { w[i] } else { 1.0 - w[i] };
+    let mut w = vec![0.5; k];
+    for _ in 0..50 {
+        let (mut value, mut jacobian) = (vec![0.0; k], vec![0.0; k * k]);
+        for (vertex, rate) in rates.iter().enumerate() {
+            let all: f64 = (0..k).map(|i| factor(&w, vertex, i)).product();
+            for r in 0..k {
+                value[r] += all * rate[r];
+            }
+            for c in 0..k {
+                let others: f64 = (0..k).filter(|i| *i != c).map(|i| factor(&w, vertex, i)).product();
+                let sign = if vertex >> c & 1 == 1 { 1.0 } else { -1.0 };
+                for r in 0..k {
+                    jacobian[r * k + c] += sign * others * rate[r];
+                }
+            }
+        }
+        let step = solve_any(&jacobian, &value, 0.0)?;
+        w.iter_mut().zip(&step).for_each(|(w, s)| *w = (*w - s).clamp(-1.0, 2.0));
+        if step.iter().all(|s| s.abs() <= 1e-14) {
+            break;
+        }
+    }
+    Some((0..rates.len()).map(|vertex| (0..k).map(|i| factor(&w, vertex, i)).product()).collect())
+}
+
+/// The least square of the mixture's length under the conditions that weights sum to one, are not negative and keep all functions at zero: the
+/// conditions of Karush, Kuhn and Tucker for every set of fields that take part.
+fn shortest(fields: &[Vec<f64>], rates: &[Vec<f64>], k: usize) -> Option<Vec<f64>> {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for set in 1_usize..1 << fields.len() {
+        let part: Vec<usize> = (0..fields.len()).filter(|v| set >> v & 1 == 1).collect();
+        let (p, m) = (part.len(), part.len() + k + 1);
+        let (mut matrix, mut right) = (vec![0.0; m * m], vec![0.0; m]);
+        for (i, a) in part.iter().enumerate() {
+            for (j, b) in part.iter().enumerate() {
+                matrix[i * m + j] = dot(&fields[*a], &fields[*b]);
+            }
+            for r in 0..=k {
+                let value = if r < k { rates[*a][r] } else { 1.0 };
+                matrix[i * m + p + r] = value;
+                matrix[(p + r) * m + i] = value;
+            }
+        }
+        right[m - 1] = 1.0;
+        let Some(solution) = solve_any(&matrix, &right, 0.0) else { continue };
+        let weights = &solution[..p];
+        if weights.iter().any(|w| *w < -1e-12) {
+            continue;
+        }
+        let mut all = vec![0.0; fields.len()];
+        part.iter().zip(weights).for_each(|(v, w)| all[*v] = *w);
+        let n = fields[0].len();
+        let velocity: Vec<f64> = (0..n).map(|i| all.iter().zip(fields).map(|(w, f)| w * f[i]).sum()).collect();
+        let off: f64 = (0..k).map(|r| all.iter().zip(rates).map(|(w, f)| w * f[r]).sum::<f64>().abs()).sum();
+        let size = rates.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let length = dot(&velocity, &velocity);
+        if off <= 1e-10 * size && best.as_ref().is_none_or(|(least, _)| length < *least) {
+            best = Some((length, all));
+        }
+    }
+    best.map(|(_, weights)| weights)
+}
 
 /// All assignments of ways to `k` functions that are consistent; `consistent` says whether one is.
 pub(crate) fn possibilities(k: usize, mut consistent: impl FnMut(&[Way]) -> bool) -> Vec<Vec<Way>> {

@@ -565,3 +565,23 @@ fn mixtures_with_other_velocities_are_refused() {
         );
     }
 }
+
+/// On two relays with z' = 1 + sign(x) sign(y): equal weights give z' = 1, the shortest velocity of the hull is 0.
+#[test]
+fn a_rule_chooses_among_mixtures() {
+    use crate::selection::Intersection;
+    let text = "states = ['x', 'y', 'z']\nstart = [1, 1, 0]\nf = ['-sign(x)', '-sign(y)', '1 + sign(x)*sign(y)']";
+    // z' = 2 until both are met at t = 1.
+    for (intersection, want) in [(Intersection::Bilinear, 2.0 + 2.0), (Intersection::HullLeastNorm, 2.0)] {
+        let options = Options { t_end: 3.0, intersection, ..Options::default() };
+        let x = follow(&model(text), &options, &mut |_| true).unwrap().x;
+        near(x[2], want, 1e-9);
+        assert!(x[0].abs() < 1e-12 && x[1].abs() < 1e-12);
+    }
+    // Coupled: the rule's weights solve the same equations.
+    let text =
+        "states = ['x', 'y']\nstart = [1, 1]\nf = ['-sign(x) - 0.5*sign(x)*sign(y)', '-sign(y) + 0.3*sign(x)*sign(y)']";
+    let options = Options { t_end: 4.0, intersection: Intersection::Bilinear, ..Options::default() };
+    let x = follow(&model(text), &options, &mut |_| true).unwrap().x;
+    assert!(x[0].abs() < 1e-12 && x[1].abs() < 1e-12, "{x:?}");
+}

@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 use twofold_hybrid::motion::{Exit, Record};
+use twofold_hybrid::selection::Intersection;
 use twofold_hybrid::{Ending, HybridError, Model, Options, Point, follow};
 
 use super::answer::{Answer, Stop};
@@ -33,6 +34,11 @@ impl GeneralRun {
                 Record::Path { chord } => json!({ "path": { "chord": chord } }),
                 Record::Times { every } => json!({ "times": { "every": every } }),
                 Record::Section(e) => json!({ "section": e.to_string() }),
+            },
+            "intersection": match o.intersection {
+                Intersection::Undecided => "undecided",
+                Intersection::Bilinear => "bilinear",
+                Intersection::HullLeastNorm => "hull-least-norm",
             },
             "exit": match o.exit {
                 Exit::Undecided => "undecided",

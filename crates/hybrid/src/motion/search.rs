@@ -56,6 +56,11 @@ impl Follower<'_> {
                 (weights, jumps, _) = self.separate_weights(t, x, &field0);
                 // Each attracts by itself: the one that is nearest to doing so no more counts.
                 determinant = jumps.iter().map(|j| -j).fold(f64::INFINITY, f64::min);
+            } else if !self.corners.is_empty() {
+                let (corners, _) = self.corner_weights(t, x);
+                let on = |i: usize| corners.iter().enumerate().filter(move |(vertex, _)| vertex >> i & 1 == 1);
+                weights = (0..self.sliding.len()).map(|i| on(i).map(|(_, w)| w).sum()).collect();
+                determinant = 1.0;
             } else {
                 let (a, matrix) = self.sliding_equations(t, x, &field0);
                 let k = a.len();

@@ -4,6 +4,9 @@ use std::collections::HashMap;
 
 use super::*;
 
+/// Most surfaces on which a rule chooses a mixture.
+const MOST_CORNERS: usize = 3;
+
 /// A configuration, where its guards stand, and what they do there.
 type Vertex = (Configuration, Vec<Option<usize>>, Rates);
 
@@ -196,10 +199,24 @@ impl Follower<'_> {
                 }
                 let b: Vec<f64> = slides.iter().map(|s| -base[*s]).collect();
                 let Some(weights) = solve_any(&matrix, &b, 0.0) else { return false };
+                let by_rule = self.options.intersection != Intersection::Undecided && m > 1;
                 if m == 1 {
                     // On both sides towards or away from the surface, to second order.
                     let (d0, d1) = (direction[slides[0]], columns[0].2[slides[0]]);
                     if d0 * d1 >= 0.0 {
+                        return false;
+                    }
+                } else if by_rule {
+                    let (mut fields, mut speeds) = (Vec::new(), Vec::new());
+                    for vertex in 0..1_usize << m {
+                        let mut on = plus.clone();
+                        slides.iter().enumerate().for_each(|(i, s)| on[*s] = vertex >> i & 1 == 1);
+                        let (field, rates, _) = at(self, on);
+                        fields.push(field);
+                        speeds.push(slides.iter().map(|s| rates[*s]).collect::<Vec<f64>>());
+                    }
+                    let found = mixture(self.options.intersection, &fields, &speeds);
+                    if !found.is_some_and(|w| w.iter().all(|w| (0.0..=1.0).contains(w))) {
                         return false;
                     }
                 } else if weights.iter().any(|w| !(*w > 0.0 && *w < 1.0)) {
@@ -241,6 +258,7 @@ impl Follower<'_> {
         }
         // Surfaces that do not change each other's speeds may still act on other states together.
         let stay: Vec<usize> = (0..k).filter(|i| ways[*i] == Way::Stay).collect();
+        let mut differ = false;
         if stay.len() > 1 {
             let fields = |follower: &mut Self, on: &dyn Fn(usize) -> bool| {
                 vertex(follower, &|i| ways[i] == Way::Plus || (ways[i] == Way::Stay && on(i))).2.field
@@ -253,7 +271,8 @@ impl Follower<'_> {
                 sum.iter_mut().zip(one.iter().zip(&base)).for_each(|(sum, (one, base))| *sum += one - base);
             }
             let size = corner.iter().chain(&base).fold(0.0_f64, |most, v| most.max(v.abs()));
-            if sum.iter().zip(&corner).any(|(p, c)| (p - c).abs() > 1e-9 * size) {
+            differ = sum.iter().zip(&corner).any(|(p, c)| (p - c).abs() > 1e-9 * size);
+            if differ && self.options.intersection == Intersection::Undecided {
                 let names: Vec<usize> = stay.iter().map(|i| zero[*i]).collect();
                 let ways = "sliding on all of them, where mixtures of the fields have different velocities";
                 return Err(self.undecided(&names, ways));
@@ -275,6 +294,21 @@ impl Follower<'_> {
         self.ask_new(&mut config);
         sliding.sort_unstable();
         self.adopt(config, sliding);
+        if differ {
+            if self.sliding.len() > MOST_CORNERS {
+                let why = format!(
+                    "more than {MOST_CORNERS} surfaces meet, where mixtures of the fields have different velocities"
+                );
+                return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
+            }
+            self.take_corners();
+            let (t, x) = (self.t, self.x.clone());
+            let (weights, _) = self.corner_weights(t, &x);
+            if !weights.iter().all(|w| (-1e-9..=1.0 + 1e-9).contains(w)) {
+                let names = self.sliding.clone();
+                return Err(self.undecided(&names, "the rule of --intersection has no mixture there"));
+            }
+        }
         self.follow_jumps(&zero)
     }
 

@@ -33,6 +33,7 @@ impl Follower<'_> {
         self.config = config;
         self.separate = self.separate();
         self.base = Vec::new();
+        self.corners = Vec::new();
         if self.separate.is_none() {
             for guard in self.sliding.clone() {
                 let mut flipped = self.config.clone();
@@ -141,6 +142,11 @@ impl Follower<'_> {
                     out[i] += weights[place] * (field1[i] - out[i]);
                 }
             }
+        } else if !self.corners.is_empty() {
+            let (weights, fields) = self.corner_weights(t, x);
+            for i in 0..n {
+                out[i] = weights.iter().zip(&fields).map(|(w, f)| w * f[i]).sum();
+            }
         } else if !self.sliding.is_empty() {
             let weights = self.weights(t, x, out);
             let field0 = out.to_vec();
@@ -155,6 +161,38 @@ impl Follower<'_> {
             let (pull, grip) = self.contact_forces(contact, out);
             out[contact.state] -= pull / grip;
         }
+    }
+
+    /// Prepares the fields on all sides of the surfaces slid upon.
+    pub(super) fn take_corners(&mut self) {
+        let k = self.sliding.len();
+        let mut corners = Vec::new();
+        for vertex in 0..1_usize << k {
+            let mut config = self.config.clone();
+            for (i, guard) in self.sliding.iter().enumerate() {
+                config.sides[*guard] = if vertex >> i & 1 == 1 { self.high(*guard) } else { self.low(*guard) };
+            }
+            corners.push((self.equation.compiled(&config), self.load(&config)));
+        }
+        self.corners = corners;
+    }
+
+    /// The weights that the rule gives to the fields on all sides, not-a-number where there are none, and those fields.
+    pub(super) fn corner_weights(&mut self, t: f64, x: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let n = self.n;
+        let (mut fields, mut rates) = (Vec::new(), Vec::new());
+        for (compiled, variables) in &mut self.corners {
+            variables[..n].copy_from_slice(x);
+            variables[n] = t;
+            let mut field = vec![0.0; n];
+            compiled.field.evaluate(variables, &mut field);
+            let all = Self::along(compiled, variables, &field);
+            let of = |guard: &usize| compiled.active.iter().position(|g| g == guard).map_or(f64::NAN, |i| all[i]);
+            rates.push(self.sliding.iter().map(of).collect::<Vec<f64>>());
+            fields.push(field);
+        }
+        let weights = mixture(self.options.intersection, &fields, &rates);
+        (weights.unwrap_or_else(|| vec![f64::NAN; fields.len()]), fields)
     }
 
     /// The field on the positive side of a surface slid upon.

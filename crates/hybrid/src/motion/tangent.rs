@@ -322,6 +322,10 @@ fn solve_duals(mut a: Vec<D>, mut b: Vec<D>) -> Vec<D> {
 
 /// Tangent vectors are carried by the stages of explicit steps.
 fn explicit(options: &Options) -> Result<(), HybridError> {
+    if options.intersection != crate::selection::Intersection::Undecided {
+        let why = "tangent vectors are not carried through mixtures that a rule chooses; leave --intersection out";
+        return Err(HybridError::Bad(why.into()));
+    }
     match options.method {
         super::Method::Dopri5 => Ok(()),
         other => {
