@@ -2,6 +2,7 @@
 
     python compare.py               TWOFOLD names the program [target/release/twofold]
     python compare.py --no-times    values and lines only; seconds are marked as not measured
+    python compare.py --page        README.md anew from results.json
     python compare.py NAME METHOD   one cell, as JSON
 
 Every cell of SciPy and CVODE is a process of its own, ended after LIMIT seconds.
@@ -269,9 +270,11 @@ def page(record):
         "",
         "Error of each program; what is not right is bold.",
         "",
-        *table(results, METHODS, lambda cells, m: answer_of(cells[m]), lambda n: f"`{n}`: {asked[n]}"),
+        *table(results, METHODS, lambda cells, m: answer_of(cells[m]), lambda n: f"`{n}`: {asked[n]}".replace("|", "\\|")),
         *counts,
         "",
+        f"`twofold run` is not right in {len(results) - sum(r['twofold']['verdict'] == 'right' for r in results.values())}:",
+        f"{names([n for n, r in results.items() if r['twofold']['verdict'] != 'right'])}.",
         f"SciPy by hand is as right as `twofold` in {len(equal)} systems:",
         f"{names(equal)}.",
         f"Of these it has the smaller error in {len(closer)}: {names(closer)}.",
@@ -310,6 +313,11 @@ def main(times):
     }
     record = {"made": made, "times": times, "rtol": RTOL, "atol": ATOL, "right": RIGHT, "systems": results}
     (HERE / "results.json").write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n")
+    write(record)
+
+
+def write(record):
+    """The made part of README.md."""
     readme = HERE / "README.md"
     text = readme.read_text()
     begin, rest = text.split("do not edit -->\n", 1)
@@ -320,5 +328,7 @@ def main(times):
 if __name__ == "__main__":
     if sys.argv[1:] in ([], ["--no-times"]):
         main(times=not sys.argv[1:])
+    elif sys.argv[1:] == ["--page"]:
+        write(json.loads((HERE / "results.json").read_text()))
     else:
         print(json.dumps(one(*sys.argv[1:3])))
