@@ -50,7 +50,7 @@ pub const MAX_FILE: usize = 200_000;
 
 /// A constant: a number or an expression of numbers and parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "a number is wanted here, or an expression as a string")]
 pub enum Constant {
     /// A number.
     Number(f64),
@@ -69,7 +69,7 @@ impl Constant {
 
 /// A constant, or several.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "a number is wanted here, or an expression as a string, or a list of them")]
 pub enum Constants {
     /// One.
     One(Constant),
@@ -79,7 +79,11 @@ pub enum Constants {
 
 /// A parameter: a constant, or a table with more.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    deny_unknown_fields,
+    expecting = "a parameter is a number, an expression as a string, or a table of value, above, below, meaning and unit"
+)]
 pub enum ParameterEntry {
     /// Its value.
     Plain(Constant),
@@ -192,7 +196,7 @@ pub struct TableEntry {
     pub time: String,
     /// The name of its column of values.
     pub column: String,
-    /// How it is read between its rows.
+    /// How it is read between its rows: `previous` value, `linear` (the default), `cubic` spline, or `pchip`, which overshoots nowhere.
     #[serde(default)]
     pub interpolation: Interpolation,
 }
@@ -221,7 +225,7 @@ pub struct Document {
     /// The two or three states that pictures show.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub axes: Vec<String>,
-    /// The derivative of each state.
+    /// The derivative of each state, an expression each.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub f: Option<Vec<Constant>>,
     /// A switching function, with `plus` and `minus`, instead of `f`.
@@ -233,19 +237,19 @@ pub struct Document {
     /// The derivatives where h < 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minus: Option<Vec<Constant>>,
-    /// Parameters by name.
+    /// Parameters by name: a constant, or a table with `value`, `above`, `below`, `meaning` and `unit`.
     #[serde(default)]
     pub parameters: Ordered<ParameterEntry>,
     /// Expressions by name, in any order.
     #[serde(default, rename = "let")]
     pub terms: Ordered<Constant>,
-    /// Modes by name, instead of `f`; motion begins in the first.
+    /// Modes by name, a table `[modes.NAME]` each, instead of `f`; motion begins in the first.
     #[serde(default)]
     pub modes: Ordered<ModeEntry>,
-    /// What happens at moments.
+    /// Events, a table `[[event]]` each: what happens at moments.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub event: Vec<EventEntry>,
-    /// Data by name.
+    /// Tables of data by name: each is a function of time.
     #[serde(default)]
     pub tables: Ordered<TableEntry>,
 }
@@ -588,7 +592,7 @@ impl Definition {
             }
             _ => {
                 return problem(
-                    key("states"),
+                    key(if d.h.is_some() { "h" } else { "modes" }),
                     "the equations are given twice",
                     Some("give one of f, h with plus and minus, or modes"),
                 );
@@ -676,16 +680,14 @@ impl Definition {
                     Some(help),
                 );
             }
-            if set.is_empty() && mode.is_none() && !entry.stop {
-                // It is recorded, and nothing else happens.
-            }
             let name = if entry.name.is_empty() { format!("event {}", i + 1) } else { entry.name.clone() };
             events.push(Event { name, when, set, mode, from, stop: entry.stop, sticks });
         }
         let start = match &d.start {
             None => None,
             Some(start) if start.len() != n => {
-                return problem(key("start"), format!("{} numbers for {n} states", start.len()), None);
+                let message = format!("{} numbers for {n} states", start.len());
+                return problem(key("start"), message, Some("give one for each state, in their order"));
             }
             Some(start) => {
                 let known: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
