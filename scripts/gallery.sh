@@ -29,4 +29,12 @@ filippov="--switch filippov --exit at-once:plus"
     plot fused-focus $filippov --set mu=-0.01 --t-end 120
     plot relay-square $filippov --t-end 6
     plot two-blocks $filippov --t-end 40
+    plot bouncing-ball --t-end 5 --kind series
+    plot impact-oscillator --t-end 60
+    plot relay-hysteresis --t-end 40
+    plot three-blocks --t-end 40 --kind series --axes x1,x2,v1
+    plot sliding-mode-control --t-end 6
+    plot buck-ramp --set input=33 --t-end 0.02
+    plot rimless-wheel --t-end 20
+    plot driven-by-data --t-end 160
 }

@@ -19,8 +19,7 @@ use crate::num::Decimal;
 use crate::num::decimal::DecimalError;
 use crate::paper;
 use crate::record::files::{read_text, read_text_from};
-use crate::system::diagnostic::nearest;
-use crate::system::{self, Definition, ParameterError, System, library};
+use crate::system::{self, Definition, ParameterError, System};
 
 /// The flags that describe a run. What is not given has the default that its help names.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -455,7 +454,7 @@ enum Misuse {
     )]
     Past,
     #[error(
-        "--system {system}: a general system (f, events, modes or tables) is followed by `twofold run` and drawn by `twofold plot`; this command needs one with h, plus and minus"
+        "--system {system}: a general system (f, events, modes or tables) is taken by `twofold run`, `plot`, `orbit`, `lyapunov` and `rests`; this command needs one with h, plus and minus"
     )]
     General { system: String },
     #[error("--exit all follows many futures and records their paths; a sweep needs crossings: give another rule")]
@@ -773,9 +772,8 @@ fn from_file(name: &str) -> Result<System, Misuse> {
     // A general system's file comes here if it cannot be read as one.
     let is_file = json || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) || path.is_file();
     if !is_file {
-        let known: Vec<&str> = library::names().collect();
-        let help = nearest(name, &known).map_or(String::new(), |near| format!(", did you mean {near}?"));
-        return Err(Misuse::NoSuchSystem { name: name.into(), help, known: known.join(", ") });
+        let (help, known) = super::general::known(name);
+        return Err(Misuse::NoSuchSystem { name: name.into(), help, known });
     }
     let problem = |problem: String| Misuse::SystemFile { file: name.into(), problem };
     let text = read_text(path).map_err(|e| problem(e.to_string()))?;

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::CliError;
 use super::flags::{Intersection, RunFlags};
 use crate::hybrid::definition::is_general;
+use crate::hybrid::model::ModelError;
 use crate::hybrid::motion::{Exit as Side, Method, Record};
 use crate::hybrid::selection::Intersection as Rule;
 use crate::hybrid::{Definition, HybridError, Model, Options};
@@ -49,10 +50,16 @@ pub fn model(flags: &RunFlags) -> Result<Option<Model>, CliError> {
 /// If there is none, or it cannot be understood.
 pub fn any_model(name: &str, set: &[String]) -> Result<Model, CliError> {
     named(name, set, true)?.ok_or_else(|| {
-        let known: Vec<&str> = library::names().chain(library::general_names()).collect();
-        let near = nearest(name, &known).map_or(String::new(), |near| format!(", did you mean {near}?"));
+        let (near, _) = known(name);
         usage(format!("--system {name}: there is no such built-in system{near}; give a file's name for your own"))
     })
+}
+
+/// The names of all built-in systems, after advice if one of them is like `name`.
+pub fn known(name: &str) -> (String, String) {
+    let known: Vec<&str> = library::names().chain(library::general_names()).collect();
+    let near = nearest(name, &known).map_or(String::new(), |near| format!(", did you mean {near}?"));
+    (near, known.join(", "))
 }
 
 fn named(name: &str, set: &[String], any: bool) -> Result<Option<Model>, CliError> {
@@ -92,7 +99,16 @@ fn named(name: &str, set: &[String], any: bool) -> Result<Option<Model>, CliErro
         })?;
         model = model.with(parameter.trim(), value).map_err(|e| refused(e.to_string()))?;
     }
-    model.values().map_err(|e| wrong(e.to_string()))?;
+    model.values().map_err(|error| {
+        let named = |text: &&String| match (&error, text.split_once('=')) {
+            (ModelError::Value(name, ..), Some((parameter, _))) => parameter.trim() == name,
+            _ => false,
+        };
+        match set.iter().rfind(named) {
+            Some(text) => usage(format!("--set \"{text}\": {error}")),
+            None => wrong(error.to_string()),
+        }
+    })?;
     Ok(Some(model))
 }
 

@@ -295,7 +295,7 @@ fn streamed_rows_are_those_of_the_whole_and_thin_out() {
 fn the_gallery_is_whole() {
     let script = include_str!("../../scripts/gallery.sh");
     let drawn: Vec<&str> = script.lines().filter_map(|l| l.trim().strip_prefix("plot ")?.split(' ').next()).collect();
-    for name in twofold::system::library::names() {
+    for name in twofold::system::library::names().chain(twofold::system::library::general_names()) {
         assert!(drawn.contains(&name), "{name}");
     }
 }

@@ -96,6 +96,7 @@ const TABLE: &[(&str, &str, &[&str])] = &[
             "--downward",
             "--returns 2",
             "--settle 0",
+            "--period 1",
             "--longest-return 0.1",
             "--along belt=0.3..0.32:2",
             "--format json",
@@ -104,6 +105,11 @@ const TABLE: &[(&str, &str, &[&str])] = &[
             "--quiet",
             "--spec nowhere.json",
         ],
+    ),
+    (
+        "",
+        "rests --system chua --within x=-3..3",
+        &["--system wheel", "--set alpha=9", "--within q=0..1", "--format json", "--out r.txt", "--quiet"],
     ),
     (
         "",
@@ -233,6 +239,7 @@ const TABLE: &[(&str, &str, &[&str])] = &[
 
 /// Flags that promise what is so anyway in a case where nothing else can be seen: given there, they are neither refused nor ignored.
 const KEPT_PROMISES: &[(&str, &str)] = &[
+    ("rests --system chua --within x=-3..3", "--quiet"), // done before progress would be shown
     ("plot --from run.csv --out p.svg", "--quiet"), // nothing is computed, so there is no progress to keep quiet about
 ];
 

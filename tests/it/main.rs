@@ -30,6 +30,7 @@ mod filippov_events;
 mod filippov_limit;
 mod flags;
 mod fuzz;
+mod general;
 mod golden;
 mod guard;
 mod inspect;

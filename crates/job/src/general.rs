@@ -110,9 +110,9 @@ impl GeneralRun {
         let mut table = empty.clone();
         let found = follow(&self.model, &self.options, &mut |point| {
             table.push(self.row(&columns, point));
-            let mut more = true;
+            let mut more = reached(point.t);
             if table.len() >= PART {
-                more = rows(&table) && reached(point.t);
+                more &= rows(&table);
                 table = empty.clone();
             }
             more

@@ -3,14 +3,15 @@
 use std::path::PathBuf;
 
 use crate::cli::speak::{deliver, is_standard_output};
-use crate::cli::{CliError, Exit, print};
-use crate::system::diagnostic::nearest;
+use crate::cli::{CliError, Exit, general, print};
+use crate::hybrid;
+use crate::system::definition::State;
 use crate::system::library;
 
 /// Write a commented system file that runs as it stands, to be changed: `twofold run --system FILE`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  twofold new my.toml\n  twofold new my-circuit.toml --from chua\n  twofold new --list"
+    after_help = "Examples:\n  twofold new my.toml\n  twofold new my-circuit.toml --from chua\n  twofold new my-ball.toml --from bouncing-ball\n  twofold new --list"
 )]
 pub struct Arguments {
     /// The file to write, .toml, or - for standard output.
@@ -32,38 +33,28 @@ const TEMPLATE: &str = include_str!("new.toml");
 
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let Some(file) = &arguments.file else {
-        let width = library::names().map(str::len).max().unwrap_or(0);
-        let lines: Vec<String> = library::definitions()
-            .iter()
-            .map(|d| {
-                format!(
-                    "{:width$}  {} ({})",
-                    d.name(),
-                    d.title(),
-                    d.states().iter().map(|s| s.name.as_str()).collect::<Vec<_>>().join(", ")
-                )
-            })
-            .collect();
-        print(&lines.join("\n"))?;
+        print(&list())?;
         return Ok(Exit::Fine);
     };
     let text = match &arguments.from {
         None => TEMPLATE,
-        Some(name) => library::text(name).ok_or_else(|| {
-            let known: Vec<&str> = library::names().collect();
-            let help = nearest(name, &known).map_or(String::new(), |near| format!(", did you mean {near}?"));
-            CliError::Usage(format!(
-                "--from {name}: there is no such built-in system{help}; built in are {}",
-                known.join(", ")
-            ))
+        Some(name) => library::text(name).or_else(|| library::general(name)).ok_or_else(|| {
+            let (near, known) = general::known(name);
+            CliError::Usage(format!("--from {name}: there is no such built-in system{near}; built in are {known}"))
         })?,
     };
+    let tables = tables(text);
     if is_standard_output(file) {
         if arguments.force {
             return Err(CliError::no_effect(
                 "--force",
                 "standard output is no file that could be replaced; leave it out",
             ));
+        }
+        if let (Some((table, _)), Some(name)) = (tables.first(), &arguments.from) {
+            return Err(CliError::Usage(format!(
+                "--from {name}: the system reads {table}, which is written beside its file; give a file's name instead of -"
+            )));
         }
         deliver(None, text.as_bytes())?;
         return Ok(Exit::Fine);
@@ -74,16 +65,44 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             file.display()
         )));
     }
-    if file.symlink_metadata().is_ok() && !arguments.force {
+    let mut files = vec![(file.clone(), text)];
+    files.extend(tables.into_iter().map(|(name, text)| (file.with_file_name(name), text)));
+    if let Some((there, _)) = files.iter().find(|(f, _)| f.symlink_metadata().is_ok() && !arguments.force) {
         return Err(CliError::Usage(format!(
-            "{} is there already; choose another name, or replace it with --force",
-            file.display()
+            "{} is there already; choose another name or folder, or replace it with --force",
+            there.display()
         )));
     }
-    deliver(Some(file), text.as_bytes())?;
+    // The system comes last: with it, everything is there.
+    for (file, text) in files.iter().rev() {
+        deliver(Some(file), text.as_bytes())?;
+    }
     let name = file.display();
+    let written: Vec<String> = files.iter().map(|(f, _)| f.display().to_string()).collect();
     print(&format!(
-        "wrote {name}; try\n  twofold plot --system {name} --out picture.png\n  twofold run --system {name} --t-end 20"
+        "wrote {}; try\n  twofold plot --system {name} --out picture.png\n  twofold run --system {name} --t-end 20",
+        written.join(" and ")
     ))?;
     Ok(Exit::Fine)
+}
+
+/// A line for each system: name, title and states.
+fn list() -> String {
+    let width = library::names().chain(library::general_names()).map(str::len).max().unwrap_or(0);
+    let line = |name: &str, title: &str, states: &[State]| {
+        let states: Vec<&str> = states.iter().map(|s| s.name.as_str()).collect();
+        format!("{name:width$}  {title} ({})", states.join(", "))
+    };
+    let switched = library::definitions().iter().map(|d| line(d.name(), d.title(), d.states()));
+    let general = library::general_names()
+        .filter_map(|name| hybrid::Definition::from_toml(library::general(name)?, name).ok())
+        .map(|d| line(d.name(), d.title(), d.states()));
+    switched.chain(general).collect::<Vec<_>>().join("\n")
+}
+
+/// The tables that a built-in system reads, with their texts.
+fn tables(text: &str) -> Vec<(String, &'static str)> {
+    let Ok(definition) = hybrid::Definition::from_toml(text, "system") else { return Vec::new() };
+    let tables = definition.tables().iter();
+    tables.filter_map(|(_, t)| Some((t.file.clone(), library::table(&t.file)?))).collect()
 }

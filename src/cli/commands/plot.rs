@@ -216,16 +216,13 @@ fn draw_general(arguments: &Arguments, mut run: GeneralRun, format: Format) -> R
         *chord = 1e-4;
     }
     let definition = run.model.definition().clone();
-    let surface = match &run.options.record {
-        Record::Section(e) => Some(e.to_string()),
-        _ => None,
-    };
+    let crossed = arguments.flags.section.as_deref().map(|text| crossed(text, &run.model.coordinates()));
     let frame = plot::Frame {
         title: definition.title(),
         states: definition.states(),
         axes: definition.axes(),
         system: None,
-        section: surface.as_deref().map(plot::Crossed::Surface),
+        section: crossed,
         times: (run.options.t_start, run.options.t_end),
     };
     let look = look(arguments, &frame)?;
@@ -236,7 +233,7 @@ fn draw_general(arguments: &Arguments, mut run: GeneralRun, format: Format) -> R
     let reached = |_: f64| progress.asked_to_stop().is_none();
     let answer = run.compute(&reached).map_err(general::failed)?;
     let mut small_print = vec![format!(
-        "*t* = {} … {}, followed exactly, {}, rtol {}",
+        "*t* = {} … {}, event-driven, {}, rtol {}",
         number(run.options.t_start),
         number(run.options.t_end),
         run.options.method.name(),
@@ -256,6 +253,15 @@ fn draw_general(arguments: &Arguments, mut run: GeneralRun, format: Format) -> R
     sheet.searchable_svg = arguments.searchable;
     write(&sheet, &arguments.out, format)?;
     Ok(Exit::Fine)
+}
+
+/// What a section's equation crosses: the plane of a state, if it says no more than that.
+fn crossed<'a>(equation: &'a str, states: &[&str]) -> plot::Crossed<'a> {
+    let plane = equation.split_once('=').and_then(|(state, value)| {
+        let coordinate = states.iter().position(|s| *s == state.trim())?;
+        Some(plot::Crossed::Plane(coordinate, value.trim().parse().ok()?))
+    });
+    plane.unwrap_or(plot::Crossed::Surface(equation))
 }
 
 /// The run in words. The system's title, which stands above the picture, is not said again.
@@ -320,6 +326,13 @@ fn recorded(file: &Path) -> Result<(RunSpec, Answer), CliError> {
         (heading.about, Answer { stop, ..Answer::of_tables(vec![table]) })
     };
     let question = about.get("question").cloned().ok_or_else(|| wrong("it does not say of which run it is".into()))?;
+    if about["kind"] == "general-run" {
+        let name = question["system"]["name"].as_str().unwrap_or("FILE");
+        return Err(CliError::Usage(format!(
+            "--from {}: the run of a general system is drawn from the system itself: twofold plot --system {name}",
+            file.display()
+        )));
+    }
     let spec: RunSpec =
         serde_json::from_value(question).map_err(|e| wrong(format!("its question is not a run ({e})")))?;
     spec.validate().map_err(|e| wrong(format!("its question is wrong ({e})")))?;

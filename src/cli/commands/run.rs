@@ -101,8 +101,9 @@ fn general_run(arguments: &Arguments, run: &GeneralRun) -> Result<Exit, CliError
     if let Format::Json = format {
         let answer = run.compute(&reached).map_err(general::failed)?;
         watch.done(&format!("{} rows", answer.rows()));
-        deliver(out, &encode::json(&answer, &run.about()))?;
-        return Ok(said_how_it_ended(&answer));
+        let bytes = encode::json(&answer, &run.about());
+        let stopped = if answer.stop == Stop::Interrupted { progress.asked_to_stop() } else { None };
+        return deliver_whole_or_part(&answer, &bytes, out, stopped).map(|()| said_how_it_ended(&answer));
     }
     let file = out.filter(|f| !is_standard_output(f));
     let mut rows = match file {
@@ -211,12 +212,19 @@ fn record(run: &Run, format: Format, out: Option<&Path>, progress: &Progress) ->
         Format::Json => encode::json(&answer, &about),
     };
     let stopped = if answer.stop == Stop::Interrupted { progress.asked_to_stop() } else { None };
-    let Some(exit) = stopped else {
-        deliver(out, &bytes)?;
-        return Ok(Exit::Fine);
-    };
+    deliver_whole_or_part(&answer, &bytes, out, stopped).map(|()| Exit::Fine)
+}
+
+/// Delivers an answer; one whose run was stopped under another name, and as an error.
+fn deliver_whole_or_part(
+    answer: &Answer,
+    bytes: &[u8],
+    out: Option<&Path>,
+    stopped: Option<Exit>,
+) -> Result<(), CliError> {
+    let Some(exit) = stopped else { return deliver(out, bytes) };
     let part = out.filter(|f| !is_standard_output(f)).map(part_of);
-    deliver(part.as_deref(), &bytes)?;
+    deliver(part.as_deref(), bytes)?;
     let t: f64 = answer.fact("t").map_err(JobError::from)?;
     Err(stopped_at(t, answer.rows() as u64, part.as_deref(), exit))
 }

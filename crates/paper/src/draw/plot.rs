@@ -40,7 +40,7 @@ pub struct Frame<'a> {
 pub enum Crossed<'a> {
     /// The plane where a coordinate has a value.
     Plane(usize, f64),
-    /// The surface where an expression, as text, is zero.
+    /// The surface on which an equation, as text, holds.
     Surface(&'a str),
 }
 
@@ -176,7 +176,8 @@ pub fn axes(run: &Frame, kind: Kind, given: &[usize]) -> Result<Vec<usize>, Plot
                 Crossed::Plane(coordinate, _) => Some(coordinate),
                 Crossed::Surface(_) => None,
             };
-            Ok(others.into_iter().filter(|i| Some(*i) != flat).take(2).collect())
+            // The only state of a system, against time.
+            Ok(others.into_iter().filter(|i| n == 1 || Some(*i) != flat).take(2).collect())
         }
         (Kind::Plane | Kind::Section, 2) | (Kind::Space, 3) | (Kind::Series, _) => Ok(given.to_vec()),
         (Kind::Plane, _) => wrong("two axes"),
@@ -541,7 +542,7 @@ fn section(sheet: Sheet, run: &Frame, answer: &Answer, shown: &[usize]) -> Resul
     panel = panel.dots(points(false), DotStyle::early()).dots(points(true), DotStyle::late());
     let plane = match crossed {
         Crossed::Plane(coordinate, value) => format!("{} = {}", markup::name(names[coordinate]), number(value)),
-        Crossed::Surface(text) => format!("{} = 0", markup::literal(text)),
+        Crossed::Surface(equation) => markup::literal(equation),
     };
     let sheet = sheet.subtitle(format!("crossings of {plane}")).panel_aspect(0.9).panel("", "", panel);
     let half = number(half);

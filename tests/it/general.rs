@@ -1,0 +1,365 @@
+//! General systems (f, events, modes, tables) as a user follows and draws them.
+#![cfg(feature = "cli")]
+#![allow(clippy::disallowed_methods)] // compared with tolerances, not with hashes
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use serde_json::Value;
+use twofold::job::Table;
+use twofold::job::encode::from_csv;
+use twofold::render::{decode_png, read_provenance};
+use twofold::system::library;
+
+fn twofold_in(folder: &Path, arguments: &[&str]) -> (i32, Vec<u8>, String) {
+    let out = Command::cargo_bin("twofold").unwrap().current_dir(folder).args(arguments).output().unwrap();
+    (out.status.code().unwrap(), out.stdout, String::from_utf8(out.stderr).unwrap())
+}
+
+/// Runs a command that must succeed without a word on standard error.
+fn good(folder: &Path, arguments: &[&str]) -> Vec<u8> {
+    let (code, out, err) = twofold_in(folder, arguments);
+    assert_eq!((code, err.as_str()), (0, ""), "{arguments:?}");
+    out
+}
+
+fn refused(folder: &Path, arguments: &[&str], code: i32, expected: &[&str]) {
+    let (found, out, err) = twofold_in(folder, arguments);
+    assert_eq!(found, code, "{arguments:?}: {err}");
+    assert!(out.is_empty(), "{arguments:?}");
+    for words in expected {
+        assert!(err.contains(words), "{arguments:?}: no {words:?} in {err}");
+    }
+}
+
+/// The table of `twofold run` with these arguments.
+fn run(folder: &Path, arguments: &[&str]) -> Table {
+    let bytes = good(folder, &[&["run", "--quiet"], arguments].concat());
+    from_csv(&bytes).unwrap().1
+}
+
+fn names(table: &Table) -> Vec<&str> {
+    table.columns.iter().map(|c| c.name.as_str()).collect()
+}
+
+fn json(folder: &Path, arguments: &[&str]) -> (Value, String) {
+    let (code, out, err) = twofold_in(folder, &[&["run", "--quiet", "--format", "json"], arguments].concat());
+    assert_eq!(code, 0, "{arguments:?}: {err}");
+    (serde_json::from_slice(&out).unwrap(), err)
+}
+
+fn near(found: f64, want: f64, within: f64) {
+    assert!((found - want).abs() <= within, "{found} is not {want} to {within:e}");
+}
+
+/// (system, end time, columns)
+const SHIPPED: [(&str, &str, &[&str]); 8] = [
+    ("bouncing-ball", "2", &["t", "x", "v", "event"]),
+    ("impact-oscillator", "2", &["t", "x", "v", "event"]),
+    ("relay-hysteresis", "20", &["t", "T", "mode", "event"]),
+    ("three-blocks", "2", &["t", "x1", "x2", "x3", "v1", "v2", "v3", "signs"]),
+    ("sliding-mode-control", "2", &["t", "x", "v", "signs"]),
+    ("buck-ramp", "0.002", &["t", "v", "i", "signs"]),
+    ("rimless-wheel", "2", &["t", "a", "w", "event"]),
+    ("driven-by-data", "50", &["t", "height", "signs"]),
+];
+
+#[test]
+fn every_general_system_that_ships_is_run_and_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    assert!(library::general_names().eq(SHIPPED.map(|(name, ..)| name)));
+    for (name, t_end, columns) in SHIPPED {
+        let common = ["--system", name, "--t-end", t_end];
+        let table = run(at, &common);
+        assert_eq!(names(&table), columns, "{name}");
+        let t = table.numbers("t");
+        assert!(t[0] == 0.0 && t[t.len() - 1] == t_end.parse::<f64>().unwrap(), "{name}");
+        assert!(t.windows(2).all(|w| w[0] <= w[1]), "{name}");
+        // Twice the same bytes, streamed or as a whole.
+        let again = good(at, &[&["run", "--quiet"], &common[..]].concat());
+        assert_eq!(good(at, &[&["run", "--quiet"], &common[..]].concat()), again, "{name}");
+        good(at, &[&["run", "--quiet", "--out", "a.json"], &common[..]].concat());
+        let (_, whole) = twofold::job::encode::from_json(&fs::read(at.join("a.json")).unwrap()).unwrap();
+        let bits = |t: &Table| twofold::job::encode::bits(std::slice::from_ref(t));
+        assert!(bits(&whole.tables[0]) == bits(&table), "{name}");
+        good(at, &[&["plot", "--quiet", "--out", "a.png"], &common[..]].concat());
+        let bytes = fs::read(at.join("a.png")).unwrap();
+        let mut colours: Vec<[u8; 4]> =
+            decode_png(&bytes).unwrap().rgba.chunks(4).map(|c| c.try_into().unwrap()).collect();
+        colours.sort_unstable();
+        colours.dedup();
+        assert!(colours.len() > 20 && read_provenance(&bytes).unwrap().intact, "{name}");
+    }
+}
+
+#[test]
+fn switches_and_events_are_where_formulas_have_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    // A fall from 1: the first impact at sqrt(2/g), where v = -r v.
+    let ball = run(at, &["--system", "bouncing-ball", "--set", "r=0.5", "--t-end", "1", "--every", "0.25"]);
+    let (t, v) = (ball.numbers("t"), ball.numbers("v"));
+    assert_eq!(ball.words("event").collect::<Vec<_>>(), ["", "", "impact", "impact", "", "", "impact", "impact", ""]);
+    near(t[2], (2.0_f64 / 9.81).sqrt(), 1e-12);
+    near(v[3], -0.5 * v[2], 1e-15);
+    // Started elsewhere, the time begins elsewhere, too.
+    let ball =
+        run(at, &["--system", "bouncing-ball", "--start", "2,0", "--t-start", "10", "--t-end", "11", "--every", "0.5"]);
+    let t = ball.numbers("t");
+    assert_eq!(t[0], 10.0);
+    near(t[2], 10.0 + (4.0_f64 / 9.81).sqrt(), 1e-12);
+    // A section by any expression: x - v = 0.1.
+    let ball = run(at, &["--system", "bouncing-ball", "--t-end", "3", "--section", "x - v = 0.1"]);
+    assert_eq!(names(&ball), ["t", "x", "v"]);
+    assert!(ball.len() >= 5);
+    for (x, v) in ball.numbers("x").iter().zip(ball.numbers("v")) {
+        near(x - v, 0.1, 1e-12);
+    }
+    // On its line the controlled state decays by e each unit of time.
+    let control = run(at, &["--system", "sliding-mode-control", "--t-end", "4", "--every", "1"]);
+    let x = control.numbers("x");
+    near(x[4] / x[3], (-1.0_f64).exp(), 1e-9);
+    assert_eq!(control.words("signs").last(), Some("0"));
+    // Modes: the heater is off from 22 degrees on.
+    let room = run(at, &["--system", "relay-hysteresis", "--t-end", "20"]);
+    let rows = room.words("mode").zip(room.words("event")).collect::<Vec<_>>();
+    assert!(rows.windows(2).any(|w| w[0] == ("on", "warm enough") && w[1] == ("off", "warm enough")), "{rows:?}");
+}
+
+/// A tank's steady heights: inflow = outlet h^(1/2), and above the rim also spill (h - rim).
+#[test]
+fn a_tank_follows_its_table_to_the_steady_heights() {
+    let folder = tempfile::tempdir().unwrap();
+    let tank = run(folder.path(), &["--system", "driven-by-data", "--t-end", "160", "--every", "10"]);
+    let (t, h) = (tank.numbers("t"), tank.numbers("height"));
+    let at = |time: f64| h[t.iter().position(|t| *t == time).unwrap()];
+    near(at(40.0), 0.16, 1e-6);
+    near(0.5 * at(60.0).sqrt() + 5.0 * (at(60.0) - 1.5), 0.9, 1e-9);
+    near(at(160.0), 0.64, 1e-9);
+}
+
+/// Blocks stick as long as no spring's pull is larger than friction, 1; the first to slip does so where its pull is 1.
+#[test]
+fn three_blocks_stick_until_one_is_pulled_off() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = run(folder.path(), &["--system", "three-blocks", "--t-end", "12", "--every", "0.01"]);
+    let column = |name: &str| table.numbers(name);
+    let (x, v) = (["x1", "x2", "x3"].map(column), ["v1", "v2", "v3"].map(column));
+    let signs: Vec<&str> = table.words("signs").collect();
+    let pull = |k: usize| {
+        let [a, b, c] = [x[0][k], x[1][k], x[2][k]];
+        [-a + 1.2 * (b - a), -b + 1.2 * (a - b) + 1.2 * (c - b), -c + 1.2 * (b - c)].map(f64::abs)
+    };
+    let stuck: Vec<usize> = (0..signs.len()).filter(|k| signs[*k] == "000").collect();
+    assert!(stuck.len() > 100, "{}", stuck.len());
+    for k in &stuck {
+        assert!((0..3).all(|i| (v[i][*k] - 0.2).abs() < 1e-12), "{k}");
+        assert!(pull(*k).iter().all(|p| *p <= 1.0 + 1e-9), "{k}: {:?}", pull(*k));
+    }
+    // Rows are 0.01 apart, in which a pull changes by at most 0.002.
+    let last = *stuck.iter().find(|k| signs.get(*k + 1).is_some_and(|s| *s != "000")).unwrap();
+    let most = pull(last).into_iter().fold(0.0, f64::max);
+    assert!(most > 1.0 - 0.0021, "{most}");
+}
+
+/// Fossas & Olivar (1996): at 24 V, below the doubling at 24.516 V, the orbit has the ramp's period.
+#[test]
+fn a_buck_converter_takes_its_ramps_period() {
+    let folder = tempfile::tempdir().unwrap();
+    let buck = run(folder.path(), &["--system", "buck-ramp", "--t-end", "0.2", "--every", "0.0004"]);
+    let v = buck.numbers("v");
+    near(v[v.len() - 1], v[v.len() - 2], 1e-9);
+}
+
+#[test]
+fn facts_say_how_a_run_ends() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let ball = library::general("bouncing-ball").unwrap();
+    fs::write(at.join("ball.toml"), ball.replace("after_zeno = \"stick\"", "")).unwrap();
+    let (answer, said) = json(at, &["--system", "ball.toml", "--t-end", "6"]);
+    let zeno = &answer["facts"]["zeno"];
+    let want = (2.0_f64 / 9.81).sqrt() * 1.8 / 0.2;
+    near(zeno["t"].as_f64().unwrap(), want, zeno["error"].as_f64().unwrap() + 1e-11);
+    assert_eq!((zeno["event"].as_str(), answer["stop"].as_str()), (Some("impact"), Some("found")));
+    assert!(said.contains("infinitely often") && said.contains("after_zeno"), "{said}");
+    // With after_zeno = "stick" it rests, and the run comes to its end.
+    let (answer, said) = json(at, &["--system", "bouncing-ball", "--t-end", "6"]);
+    assert_eq!((&answer["facts"]["t"], said.as_str()), (&6.0.into(), ""));
+    assert!(answer["facts"]["zeno"].is_null());
+    fs::write(at.join("stop.toml"), ball.replace("set = {", "stop = true\nset = {")).unwrap();
+    let (answer, said) = json(at, &["--system", "stop.toml", "--t-end", "6"]);
+    assert_eq!(answer["facts"]["stopped_by"], "impact");
+    assert!(said.contains("impact ends the run at t = 0.45152364098"), "{said}");
+}
+
+const GUST: &str = "name = 'gust'\nstates = ['x']\nstart = [0]\nf = ['wind - x']\n[tables.wind]\nfile = 'wind.csv'\ntime = 't'\ncolumn = 'speed'\n";
+
+#[test]
+fn a_table_stands_beside_its_system() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::create_dir(at.join("sub")).unwrap();
+    fs::write(at.join("sub/gust.toml"), GUST).unwrap();
+    refused(at, &["run", "--system", "sub/gust.toml"], 2, &["wind.csv"]);
+    fs::write(at.join("sub/wind.csv"), "# measured\nt,speed\n0,0\n1,1\n5,1\n").unwrap();
+    // x' = t - x until 1, then 1 - x.
+    let table = run(at, &["--system", "sub/gust.toml", "--t-end", "4", "--every", "1"]);
+    let x = table.numbers("x");
+    near(x[1], (-1.0_f64).exp(), 1e-10);
+    near(x[4], 1.0 - (1.0 - (-1.0_f64).exp()) * (-3.0_f64).exp(), 1e-10);
+    let beyond = ["run", "--system", "sub/gust.toml", "--t-end", "9"];
+    refused(at, &beyond, 2, &["table `wind` (wind.csv)", "from t = 0 to 5", "--t-end"]);
+    for (text, expected) in [
+        ("t,sped\n0,0\n1,1\n", "no column `speed`"),
+        ("t,speed\n0,0\n0,1\n", "row 2: the time 0 does not come after"),
+        ("t,speed\n0,0\n1,fast\n", "row 2: `fast` is not a finite number"),
+        ("t,speed\n0,0\n", "at least two rows"),
+    ] {
+        fs::write(at.join("sub/wind.csv"), text).unwrap();
+        refused(at, &["run", "--system", "sub/gust.toml", "--t-end", "1"], 2, &["sub/gust.toml", "wind.csv", expected]);
+    }
+}
+
+#[test]
+fn wrong_files_and_flags_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (file, text, expected) in [
+        (
+            "a.toml",
+            "states = ['x', 'v']\nf = ['v', 'if(x, 1, 2)']",
+            &["--> a.toml:2:15", "^", "a condition is wanted here", "x > 0"][..],
+        ),
+        ("b.toml", "states = ['x']\nf = ['maxx(x, 0)']", &["--> b.toml:2:7", "did you mean `max`?"]),
+        ("c.toml", "states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x'\nmode = 'on'", &["c.toml:5:8", "no mode `on`"]),
+        ("d.json", r#"{"states": ["x"], "f": ["y"]}"#, &["d.json, f.1", "unknown name `y`"]),
+        ("e.toml", "states = ['x']\nf = ['1']", &["--start, 1 numbers"]),
+    ] {
+        fs::write(at.join(file), text).unwrap();
+        refused(at, &["run", "--quiet", "--system", file], 2, expected);
+    }
+    let ball = |more: &[&str], code: i32, expected: &[&str]| {
+        refused(at, &[&["run", "--quiet", "--system", "bouncing-ball"], more].concat(), code, expected);
+    };
+    for (flag, value) in [("--switch", "filippov"), ("--eps", "0.1"), ("--delay", "1"), ("--seed", "3")] {
+        ball(&[flag, value], 2, &[&format!("{flag} has no effect here")]);
+    }
+    ball(&["--print-spec"], 2, &["--print-spec has no effect"]);
+    ball(&["--method", "lsoda"], 2, &["dopri5"]);
+    ball(&["--exit", "all"], 2, &["at-once:plus or at-once:minus"]);
+    ball(&["--set", "q=1"], 2, &["no parameter `q`", "g, r"]);
+    ball(&["--set", "r=1"], 2, &["--set \"r=1\": `r` is 1", "below 1"]);
+    ball(&["--start", "1"], 2, &["--start has 1 numbers; give 2"]);
+    ball(&["--section", "x - w = 0"], 2, &["unknown name `w`"]);
+    ball(&["--section", "x > v = 0"], 2, &["a condition is no number"]);
+    ball(&["--section", "x = 0", "--every", "1"], 2, &["--every has no effect"]);
+    ball(&["--t-start", "5", "--t-end", "1"], 2, &["--t-end, --t-start"]);
+    for command in
+        [&["sweep", "--over", "params.r=0.5,0.6"][..], &["scan", "--section", "x=0.1", "--over", "params.r=0.5,0.6"]]
+    {
+        let expected = ["--system bouncing-ball: a general system", "`twofold run`"];
+        refused(at, &[command, &["--quiet", "--system", "bouncing-ball"]].concat(), 2, &expected);
+    }
+    refused(at, &["run", "--system", "bouncing-bal"], 2, &["did you mean bouncing-ball?", "driven-by-data"]);
+    // A system with one switch still says what it lacks, and who has it.
+    fs::write(at.join("f.toml"), "states = ['x']\nh = 'x'\nplus = ['max(x, 1)']\nminus = ['1']").unwrap();
+    refused(at, &["run", "--system", "f.toml"], 2, &["f.toml:3:10", "(a + b + abs(a - b))/2", "f = [...] has max"]);
+}
+
+/// What is not decided, and the end of a domain: exit code 3, and the rows so far.
+#[test]
+fn runs_that_fail_keep_their_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("later.toml"), "states = ['x', 'y']\nstart = [0, -1]\nf = ['y*sign(x)', '1']").unwrap();
+    fs::write(at.join("root.toml"), "states = ['x']\nstart = [4]\nf = ['-sqrt(x) - 1']").unwrap();
+    fs::write(at.join("circle.toml"), "states = ['x', 'y']\nstart = [1, 0]\nf = ['y', '-x']").unwrap();
+    let leaves = 2.0 * (2.0 - 3.0_f64.ln());
+    for (file, words, until) in [
+        ("later.toml", &["not decided at t = 1", "x = 0", "--exit at-once:plus"][..], 1.0),
+        ("root.toml", &["square root of a negative number", "`-sqrt(x) - 1`", "t = 1.8027"], leaves),
+        ("circle.toml", &["1000 steps were made", "--max-steps"], 1e6),
+    ] {
+        let run = [
+            "run",
+            "--quiet",
+            "--system",
+            file,
+            "--t-end",
+            "1e6",
+            "--every",
+            "0.25",
+            "--max-steps",
+            "1000",
+            "--out",
+            "a.csv",
+        ];
+        refused(at, &run, 3, &[words, &["a.csv.part"]].concat());
+        assert!(!at.join("a.csv").exists());
+        let bytes = fs::read(at.join("a.csv.part")).unwrap();
+        let table = from_csv(&bytes).unwrap().1;
+        let t = table.numbers("t");
+        assert!(t[0] == 0.0 && t[t.len() - 1] <= until + 1e-9 && t.len() >= 4, "{file}: {t:?}");
+        assert!(String::from_utf8(bytes).unwrap().ends_with("# stop: failed\n"), "{file}");
+    }
+    // A side by name: x' = y from t = 1 on.
+    let table = run(at, &["--system", "later.toml", "--t-end", "3", "--every", "1", "--exit", "at-once:plus"]);
+    near(table.numbers("x")[3], 2.0, 1e-9);
+}
+
+#[test]
+fn pictures_in_every_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let ball = ["--system", "bouncing-ball", "--t-end", "5"];
+    for (file, magic, more) in [
+        ("a.svg", "<svg", &["--kind", "series", "--searchable"][..]),
+        ("a.pdf", "%PDF", &[]),
+        ("b.svg", "<svg", &["--section", "v = 0", "--searchable"]),
+    ] {
+        let all = [&["plot", "--quiet", "--out", file][..], &ball, more].concat();
+        good(at, &all);
+        let bytes = fs::read(at.join(file)).unwrap();
+        assert!(bytes.starts_with(magic.as_bytes()), "{file}");
+        good(at, &all);
+        assert_eq!(fs::read(at.join(file)).unwrap(), bytes, "{file}");
+    }
+    let text = fs::read_to_string(at.join("a.svg")).unwrap();
+    assert!(text.contains("A ball that bounces until it rests") && text.contains("event-driven"));
+    good(at, &[&["run", "--quiet", "--out", "run.csv"][..], &ball].concat());
+    let from = ["plot", "--from", "run.csv", "--out", "c.png"];
+    refused(at, &from, 2, &["run.csv", "twofold plot --system bouncing-ball"]);
+    refused(at, &["plot", "--system", "bouncing-ball", "--kind", "space", "--out", "c.png"], 2, &["2"]);
+}
+
+#[test]
+fn new_begins_with_a_general_system() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let list = String::from_utf8(good(at, &["new", "--list"])).unwrap();
+    for name in library::general_names() {
+        assert!(list.lines().any(|l| l.starts_with(&format!("{name} "))), "{name}: {list}");
+    }
+    assert!(list.contains("A ball that bounces until it rests (x, v)"));
+    good(at, &["new", "my.toml", "--from", "bouncing-ball"]);
+    assert_eq!(fs::read_to_string(at.join("my.toml")).unwrap(), library::general("bouncing-ball").unwrap());
+    good(at, &["run", "--quiet", "--system", "my.toml", "--t-end", "1"]);
+    // A table comes with its system, and replaces nothing unasked.
+    fs::create_dir(at.join("sub")).unwrap();
+    let said = String::from_utf8(good(at, &["new", "sub/tank.toml", "--from", "driven-by-data"])).unwrap();
+    assert!(said.contains("tank.toml and sub"), "{said}");
+    let table = || fs::read_to_string(at.join("sub/inflow.csv")).unwrap();
+    assert_eq!(table(), library::table("inflow.csv").unwrap());
+    good(at, &["run", "--quiet", "--system", "sub/tank.toml", "--t-end", "1"]);
+    fs::write(at.join("sub/inflow.csv"), "mine").unwrap();
+    let again = ["new", "sub/other.toml", "--from", "driven-by-data"];
+    refused(at, &again, 2, &["inflow.csv is there already", "--force"]);
+    assert!(table() == "mine" && !at.join("sub/other.toml").exists());
+    good(at, &[&again[..], &["--force"]].concat());
+    assert!(table() != "mine");
+    refused(at, &["new", "-", "--from", "driven-by-data"], 2, &["inflow.csv", "give a file's name"]);
+    refused(at, &["new", "a.toml", "--from", "bouncing-bal"], 2, &["did you mean bouncing-ball?"]);
+}
