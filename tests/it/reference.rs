@@ -111,7 +111,7 @@ fn flags_of_a_run_are_as_the_page_says() {
 
 /// Commands that know figures and files, not runs of a system.
 fn of_figures(name: &str) -> bool {
-    !["run", "plot", "orbit", "lyapunov", "scan", "sweep", "sweep merge", "new"].contains(&name)
+    !["run", "plot", "orbit", "lyapunov", "rests", "scan", "sweep", "sweep merge", "new"].contains(&name)
 }
 
 /// A section for each of these commands.
@@ -188,15 +188,16 @@ fn keys_of_the_system_file_are_as_the_page_says() {
         ("A parameter as a table", "ParameterTable"),
         ("The table `second`", "SecondEntry"),
     ];
-    let mut block = String::new();
-    for (title, of) in tables {
-        let _ = write!(block, "### {title}\n\n| key | needed | meaning |\n|---|---|---|\n");
-        for Key { name, needed, about } in keys(&text, of) {
-            let _ = writeln!(block, "| `{name}` | {} | {about} |", if needed { "yes" } else { "" });
-        }
-        block.push('\n');
-    }
-    hold("docs/system-file.md", &[block]);
+    let block = keys_tables(&text, &tables);
+    let general = source("crates/hybrid/src/definition.rs");
+    let of_general = [
+        ("The file of a general system", "Document"),
+        ("A mode, `[modes.NAME]`", "ModeEntry"),
+        ("An event, `[[event]]`", "EventEntry"),
+        ("A table of data, `[tables.NAME]`", "TableEntry"),
+    ];
+    let general_block = keys_tables(&general, &of_general);
+    hold("docs/system-file.md", &[block, general_block, functions()]);
     // The reader knows these keys and no others.
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("a.toml");
@@ -206,6 +207,53 @@ fn keys_of_the_system_file_are_as_the_page_says() {
     for key in keys(&text, "Document") {
         assert!(said.contains(&format!("`{}`", key.name)), "{}: {said}", key.name);
     }
+    for (_, of) in of_general {
+        let text = match of {
+            "Document" => "f = ['1']\nnonsense = 1\n",
+            "ModeEntry" => "[modes.a]\nnonsense = 1\n",
+            "EventEntry" => "[[event]]\nnonsense = 1\n",
+            _ => "[tables.a]\nnonsense = 1\n",
+        };
+        fs::write(&file, format!("states = ['x']\n{text}")).unwrap();
+        let run = twofold(folder.path(), &["run", "--system", "a.toml"]);
+        let said = String::from_utf8(run.stderr).unwrap();
+        for key in keys(&general, of) {
+            assert!(said.contains(&format!("`{}`", key.name)), "{}: {said}", key.name);
+        }
+    }
+}
+
+/// A table of keys for each of these structs.
+fn keys_tables(text: &str, structs: &[(&str, &str)]) -> String {
+    let mut block = String::new();
+    for (title, of) in structs {
+        let _ = write!(block, "### {title}\n\n| key | needed | meaning |\n|---|---|---|\n");
+        for Key { name, needed, about } in keys(text, of) {
+            let _ = writeln!(block, "| `{name}` | {} | {about} |", if needed { "yes" } else { "" });
+        }
+        block.push('\n');
+    }
+    block
+}
+
+/// A table of the functions that expressions know.
+fn functions() -> String {
+    use twofold::system::expression::{Function, General};
+    let text = source("crates/system/src/expression.rs");
+    let about = |of: &str, variant: String| {
+        let (_, body) = text.split_once(&format!("pub enum {of} {{")).unwrap();
+        let at = body.find(&format!("    {variant},\n")).unwrap_or_else(|| panic!("no {of}::{variant}"));
+        let doc: Vec<&str> = body[..at].lines().rev().map_while(|l| l.trim().strip_prefix("/// ")).collect::<Vec<_>>();
+        cell(&doc.into_iter().rev().collect::<Vec<_>>().join(" ").replace("[`Function::Ln`]", "`ln`"))
+    };
+    let mut block = String::from("| function | of | meaning |\n|---|---|---|\n");
+    for (name, function) in Function::ALL {
+        let _ = writeln!(block, "| `{name}` | any system | {} |", about("Function", format!("{function:?}")));
+    }
+    for (name, function, _) in General::ALL {
+        let _ = writeln!(block, "| `{name}` | general systems | {} |", about("General", format!("{function:?}")));
+    }
+    block
 }
 
 #[test]
@@ -233,16 +281,26 @@ fn twofold(folder: &Path, arguments: &[&str]) -> std::process::Output {
 }
 
 /// What each column holds. A column without a line here fails the test.
-const COLUMNS: [(&str, &str); 45] = [
+const COLUMNS: [(&str, &str); 46] = [
     ("t", "time"),
     ("x", "the first state; likewise each other state under its name"),
     ("y", ""),
     ("v", ""),
     ("z", ""),
     ("direction", "+1 if the plane is crossed upwards, -1 downwards; in a closed orbit `up` or `down`"),
-    ("mode", "`plus` or `minus` in that field, `sliding-attracting` or `sliding-repelling` on the surface"),
+    (
+        "mode",
+        "`plus` or `minus` in that field, `sliding-attracting` or `sliding-repelling` on the surface; of a general system the mode's name",
+    ),
+    (
+        "signs",
+        "a character for each switching function: `+`, `-`, `0` where motion slides on its zero, `#` for `floor` and `mod`, `.` where it decides nothing",
+    ),
     ("piece", "number of the piece of the motion between two events"),
-    ("event", "what happens, such as `crossing`, `landing`, `two-fold-reached`, `exit`"),
+    (
+        "event",
+        "what happens, such as `crossing`, `landing`, `two-fold-reached`, `exit`; of a general system the event's name, before and after its reset",
+    ),
     ("from", "the mode before the event"),
     ("to", "the mode behind it"),
     ("side", "the side from which the motion comes (landing, grazing) or to which it goes"),
@@ -284,12 +342,15 @@ const COLUMNS: [(&str, &str); 45] = [
 #[test]
 fn columns_are_as_the_page_says() {
     let folder = tempfile::tempdir().unwrap();
+    let general = "states = ['x']\nstart = [0]\n[modes.a]\nf = ['1 + sign(x - 2)']\n[modes.b]\nf = ['1']\n[[event]]\nwhen = 'x'\n";
+    fs::write(folder.path().join("general.toml"), general).unwrap();
     let filippov = ["--switch", "filippov", "--exit", "after-time:0.3:plus"];
     let cases: Vec<(&str, Vec<&str>)> = vec![
         ("`twofold run`", vec!["run", "--t-end", "1"]),
         ("`twofold run --section`", vec!["run", "--t-end", "3", "--section", "y=0"]),
         ("`twofold run --switch hysteretic`", vec!["run", "--t-end", "0.1", "--switch", "hysteretic"]),
         ("`twofold run --switch filippov`", [&["run", "--t-end", "3"][..], &filippov].concat()),
+        ("`twofold run`, a general system", vec!["run", "--t-end", "1", "--system", "general.toml"]),
         (
             "`twofold orbit`",
             vec!["orbit", "--system", "stick-slip", "--switch", "filippov", "--section", "v=0", "--format", "csv"],
@@ -492,6 +553,7 @@ fn errors_are_as_the_page_says() {
     let places = [
         ("The command line", "src/cli"),
         ("Systems and their files", "crates/system/src"),
+        ("General systems", "crates/hybrid/src"),
         ("Integration", "crates/integrate/src"),
         ("Orbits, sections and exponents", "crates/analyse/src"),
         ("Questions, sweeps and files", "crates/job/src"),
