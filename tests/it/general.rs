@@ -310,6 +310,22 @@ fn runs_that_fail_keep_their_rows() {
     near(table.numbers("x")[3], 2.0, 1e-9);
 }
 
+/// Who reads no more wants no error.
+#[test]
+fn a_reader_may_go_away() {
+    for system in ["bouncing-ball", "stick-slip"] {
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_twofold"))
+            .args(["run", "--quiet", "--t-end", "3", "--system", system])
+            .stdout(std::process::Stdio::piped())
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        assert!(output.status.success() && output.stderr.is_empty(), "{system}: {output:?}");
+    }
+}
+
 #[test]
 fn pictures_in_every_format() {
     let folder = tempfile::tempdir().unwrap();

@@ -140,10 +140,10 @@ fn general_run(arguments: &Arguments, run: &GeneralRun) -> Result<Exit, CliError
         }
         rows.append(&encode::csv_head(&table))?;
     }
-    rows.append(&encode::csv_tail(&table, &run.about()))?;
+    rows.append_last(&encode::csv_tail(&table, &run.about()))?;
     let whole = matches!(stop, Stop::Finished | Stop::Found);
     if !whole {
-        rows.append(&encode::cut_short(stop))?;
+        rows.append_last(&encode::cut_short(stop))?;
     }
     let part = file.filter(|_| !whole).map(part_of);
     if let Rows::File(file) = rows {
@@ -248,6 +248,14 @@ impl Rows {
             Rows::Output => Ok(io::stdout().lock().write_all(bytes)?),
         }
     }
+
+    /// Appends what no reader waits for.
+    fn append_last(&mut self, bytes: &[u8]) -> Result<(), CliError> {
+        match self.append(bytes) {
+            Err(CliError::Output(e)) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+            other => other,
+        }
+    }
 }
 
 /// CSV as it is computed: memory stays flat, and who reads standard output sees rows as they come. Whether the run came to its end is known
@@ -288,8 +296,8 @@ fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, Cl
         Ok(found) => found,
         Err(error) if count == 0 => return Err(error.into()),
         Err(error) => {
-            rows.append(&tail)?;
-            rows.append(&encode::cut_short(Stop::Failed))?;
+            rows.append_last(&tail)?;
+            rows.append_last(&encode::cut_short(Stop::Failed))?;
             let part = file.map(part_of);
             if let Rows::File(file) = rows {
                 file.finish(part.as_deref())?;
@@ -302,7 +310,7 @@ fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, Cl
             });
         }
     };
-    rows.append(&tail)?;
+    rows.append_last(&tail)?;
     let stopped = if found.stop == Stop::Interrupted { progress.asked_to_stop() } else { None };
     let Some(exit) = stopped else {
         if let Rows::File(file) = rows {
@@ -310,7 +318,7 @@ fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, Cl
         }
         return Ok(Exit::Fine);
     };
-    rows.append(&encode::cut_short(found.stop))?;
+    rows.append_last(&encode::cut_short(found.stop))?;
     let part = file.map(part_of);
     if let Rows::File(file) = rows {
         file.finish(part.as_deref())?;
