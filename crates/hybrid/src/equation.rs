@@ -55,6 +55,9 @@ pub struct Compiled {
     /// What can be flat where a step looks and steep elsewhere, and the program of its arguments.
     pub(crate) gates: Vec<Gate>,
     pub(crate) gate_arguments: Program,
+    /// The same of the watched values.
+    pub(crate) watched_gates: Vec<Gate>,
+    pub(crate) watched_gate_arguments: Program,
     tape: Tape,
 }
 
@@ -353,13 +356,15 @@ impl Equation {
             outputs
         });
         let outputs = n + active.len() + self.watched.len();
-        let gates = gates(&tape.select(0..n));
+        let (gates, watched_gates) = (gates(&tape.select(0..n)), gates(&tape.select(n..outputs)));
         Compiled {
             field: Program::new(&tape.select(0..n)),
             watched: Program::new(&tape.select(n..outputs)),
             outputs: outputs - n,
             depends: dependencies(&tape),
             gate_arguments: Program::new(&with_outputs(&tape, gates.iter().map(|(_, a)| *a).collect())),
+            watched_gate_arguments: Program::new(&with_outputs(&tape, watched_gates.iter().map(|(_, a)| *a).collect())),
+            watched_gates: watched_gates.into_iter().map(|(gate, _)| gate).collect(),
             gates: gates.into_iter().map(|(gate, _)| gate).collect(),
             active,
             tape,

@@ -264,8 +264,8 @@ enum Sought {
     Leave { place: usize, plus: bool },
     /// Sliding stops being attracting.
     Repelling,
-    /// A contact opens.
-    Release,
+    /// A contact opens, by its place.
+    Release(usize),
 }
 
 /// Times at which something happened again and again.
@@ -338,7 +338,7 @@ struct Follower<'a> {
     corners: Vec<(Rc<Compiled>, Vec<f64>)>,
     /// Surfaces slid upon that know nothing of each other: the one that each state's derivative depends on.
     separate: Option<Vec<Option<usize>>>,
-    contact: Option<Contact>,
+    contacts: Vec<Contact>,
     /// Which side of zero each watched expression is on; 0 if it stays there.
     watch_side: Vec<f64>,
     /// Guards and watched expressions that left zero at the step's beginning.
@@ -480,7 +480,7 @@ impl<'a> Follower<'a> {
             base: Vec::new(),
             corners: Vec::new(),
             separate: None,
-            contact: None,
+            contacts: Vec::new(),
             watch_side: vec![0.0; watched],
             fresh_guard: vec![false; guards],
             fresh_watch: vec![false; watched],
@@ -536,7 +536,7 @@ impl<'a> Follower<'a> {
                 self.next_record = ((self.t / every).floor() + 1.0) * every;
             }
         }
-        let (mut before, mut list_values) = (Vec::new(), [const { Vec::new() }; 5]);
+        let mut list_values = [const { Vec::new() }; 5];
         let mut room = vec![0.0; self.n];
         loop {
             // Times at which something is known to happen.
@@ -612,28 +612,28 @@ impl<'a> Follower<'a> {
             // The first thing that is met.
             let list = self.sought();
             let mut found: Vec<(f64, Sought)> = Vec::new();
-            if !list.is_empty() {
+            let parts = if list.is_empty() { Vec::new() } else { self.parts(&step) };
+            for (from, to) in parts {
                 for (i, place) in PLACES.iter().enumerate() {
-                    let at = self.t + place * wanted;
-                    if i == 4 {
+                    let theta = from + place * (to - from);
+                    if theta == 1.0 {
                         room.copy_from_slice(&step.y);
                     } else {
-                        step.at(*place, &mut room);
+                        step.at(theta, &mut room);
                     }
                     let mut values = std::mem::take(&mut list_values[i]);
-                    self.measure(&list, at, &room, &mut values);
+                    self.measure(&list, self.t + theta * wanted, &room, &mut values);
                     list_values[i] = values;
                 }
-                before.clone_from(&list_values[0]);
                 for (j, (sought, side)) in list.iter().enumerate() {
                     let mut v: [f64; 5] = std::array::from_fn(|i| list_values[i][j]);
-                    if self.is_fresh(*sought) || v[0] * side < 0.0 {
+                    if from == 0.0 && (self.is_fresh(*sought) || v[0] * side < 0.0) {
                         v[0] = 0.0;
                     }
                     if v.iter().any(|v| v.is_nan()) {
                         // Weights of sliding where there are none, or an expression out of its domain: shorter steps find the place.
                         if matches!(sought, Sought::Leave { .. } | Sought::Repelling) {
-                            found.push((0.5, *sought));
+                            found.push((from + 0.5 * (to - from), *sought));
                         }
                         continue;
                     }
@@ -648,7 +648,10 @@ impl<'a> Follower<'a> {
                         follower.measure(&one, begin + theta * length, &at, &mut value);
                         value[0]
                     };
-                    found.extend(first(v, *side, 0.0, 1.0, &mut f, 0).map(|theta| (theta, *sought)));
+                    found.extend(first(v, *side, from, to, &mut f, 0).map(|theta| (theta, *sought)));
+                }
+                if !found.is_empty() {
+                    break;
                 }
             }
             let earliest = found.iter().map(|(theta, _)| *theta).fold(f64::INFINITY, f64::min);
@@ -683,7 +686,7 @@ impl<'a> Follower<'a> {
                 h_next
             };
             if !earliest.is_finite() {
-                if !self.sliding.is_empty() || self.contact.is_some() {
+                if !self.sliding.is_empty() || !self.contacts.is_empty() {
                     self.project();
                 }
                 continue;

@@ -29,8 +29,17 @@ pub(crate) fn stays(v: &[f64; 5], side: f64) -> bool {
         return true;
     }
     let b = bernstein(v);
-    b[1..].iter().all(|c| c * side > 0.0) && b[0] * side >= 0.0
+    if !(b[1..].iter().all(|c| c * side > 0.0) && b[0] * side >= 0.0) {
+        return false;
+    }
+    // A polynomial that only comes near to zero between its ends is not what the function is: it is looked at closer.
+    let (low, high) = b.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), c| (l.min(c * side), h.max(c * side)));
+    let goes_one_way = b.windows(2).all(|w| w[0] <= w[1]) || b.windows(2).all(|w| w[0] >= w[1]);
+    goes_one_way || low > NEAR * (high - low)
 }
+
+/// A function whose least value in an interval is less than this part of its range there is looked at closer.
+const NEAR: f64 = 0.05;
 
 /// The first place in (from, to] where the function, which begins on `side` of zero (or at zero, leaving to that side), meets zero or is beyond it.
 pub(crate) fn first(

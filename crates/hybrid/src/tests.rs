@@ -589,3 +589,44 @@ fn a_rule_chooses_among_mixtures() {
     let x = follow(&model(text), &options, &mut |_| true).unwrap().x;
     assert!(x[0].abs() < 1e-12 && x[1].abs() < 1e-12, "{x:?}");
 }
+
+/// Conditions that hold for a short while between two places where nothing shows it.
+#[test]
+fn conditions_that_hold_briefly_are_met() {
+    for (condition, t_end, want) in [
+        // |sin(pi t)| < 1e-3: twice asin(1e-3)/pi around each whole number.
+        ("sin(pi*t)^2 < 1e-6", 10.5, 21.0 * 1e-3_f64.asin() / std::f64::consts::PI),
+        ("cos(40*t) > 0.999999", 3.0, {
+            let half = 0.999999_f64.acos() / 40.0;
+            half * (1.0 + 2.0 * (3.0 * 40.0 / (2.0 * std::f64::consts::PI)).floor())
+        }),
+        ("exp(-((t - 7)/1e-3)^2) > 0.5", 10.0, 2e-3 * 2.0_f64.ln().sqrt()),
+        ("1/(1 + (1e4*(t - 3.3))^2) > 0.5", 10.0, 2e-4),
+    ] {
+        let x = end(&format!("states = ['x']\nstart = [0]\nf = ['if({condition}, 1, 0)']"), t_end);
+        near(x[0], want, 1e-9);
+    }
+}
+
+/// A ball at rest stays so whatever else happens; two balls may rest at once.
+#[test]
+fn contacts_outlast_other_events() {
+    let text = "states = ['x', 'v', 'y', 'w', 'n']\nstart = [1, 0, 2, 0, 0]\nf = ['v', '-1', 'w', '-1', '0']\n\
+        [[event]]\nwhen = 'x'\ndirection = 'down'\nset = { v = '-0.5*v' }\nafter_zeno = 'stick'\n\
+        [[event]]\nwhen = 'y'\ndirection = 'down'\nset = { w = '-0.5*w' }\nafter_zeno = 'stick'\n\
+        [[event]]\nat = [8, 12]\nset = { n = 'n + 1' }\n[[event]]\nat = 14\nset = { v = 1 }";
+    let x = end(text, 15.0);
+    near(x[0], 0.5, 1e-9);
+    assert!(x[2].abs() < 1e-9 && x[3] == 0.0 && x[4] == 2.0, "{x:?}");
+}
+
+/// Alur & Henzinger's tanks: the inflow goes to the one that is empty, by turns that shorten without end.
+#[test]
+fn turns_that_shorten_without_end_are_named() {
+    let text = "states = ['a', 'b']\nstart = [1, 1]\n[modes.left]\nf = ['0.75 - 0.5', '-0.5']\n[modes.right]\nf = ['-0.5', '0.75 - 0.5']\n\
+        [[event]]\nwhen = 'b'\ndirection = 'down'\nmode = 'right'\n[[event]]\nwhen = 'a'\ndirection = 'down'\nmode = 'left'";
+    let outcome = run(&model(text), 20.0).1.unwrap();
+    // The sum falls by 1/4 a unit of time.
+    let Ending::Zeno { t, error, .. } = outcome.ending else { panic!("{outcome:?}") };
+    assert!((t - 8.0).abs() <= error + 1e-9, "{t} {error}");
+}

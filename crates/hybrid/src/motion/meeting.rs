@@ -16,7 +16,7 @@ impl Follower<'_> {
         let mut fired = due.to_vec();
         let mut passed = Vec::new();
         let mut crossed = Vec::new();
-        let mut leave = Vec::new();
+        let (mut leave, mut opened) = (Vec::new(), Vec::new());
         for sought in met {
             match *sought {
                 Sought::Guard { guard, .. } => {
@@ -62,14 +62,14 @@ impl Follower<'_> {
                         rule => zero.iter().for_each(|g| leave.push((*g, rule == Exit::Plus))),
                     }
                 }
-                Sought::Release => {
-                    if let Some(contact) = self.contact.take() {
-                        self.watch_side[contact.watched] = contact.above;
-                        self.fresh_watch[contact.watched] = true;
-                        self.trains[contact.event] = Train::default();
-                    }
-                }
+                Sought::Release(place) => opened.push(self.contacts[place]),
             }
+        }
+        for contact in opened {
+            self.contacts.retain(|c| c.watched != contact.watched);
+            self.watch_side[contact.watched] = contact.above;
+            self.fresh_watch[contact.watched] = true;
+            self.trains[contact.event] = Train::default();
         }
         if !leave.is_empty() {
             self.outcome.switches += 1;
@@ -165,7 +165,8 @@ impl Follower<'_> {
             if event.stop {
                 stop = Some(Ending::Stopped(event.name.clone()));
             }
-            let resets = matches!(event.when, When::Zero(..) | When::Becomes(_)) && !event.set.is_empty();
+            let resets = matches!(event.when, When::Zero(..) | When::Becomes(_))
+                && (!event.set.is_empty() || event.mode.is_some());
             if resets && let Some((t, error)) = self.trains[*i].note(self.t) {
                 zeno = Some((*i, t, error));
             }
@@ -197,12 +198,14 @@ impl Follower<'_> {
             let watched: Vec<usize> = (0..self.watch_side.len())
                 .filter(|i| self.fresh_watch[*i] && stays_zero(&self.equation.watched[*i]))
                 .collect();
-            self.contact = None;
             if mode.is_some() || !self.equation.guards.is_empty() {
                 self.settle_afresh(&zero)?;
             }
+            self.keep_contacts(&old);
             for i in 0..self.watch_side.len() {
-                self.begin_watching(i, watched.contains(&i));
+                if !self.contacts.iter().any(|c| c.watched == i) {
+                    self.begin_watching(i, watched.contains(&i));
+                }
             }
             for i in &watched {
                 let Some(event) = self.event_of[*i] else { continue };
@@ -276,6 +279,24 @@ impl Follower<'_> {
         }
     }
 
+    /// After a reset of the state `old`: contacts whose expressions it leaves alone rest on.
+    fn keep_contacts(&mut self, old: &[f64]) {
+        if self.contacts.is_empty() {
+            return;
+        }
+        let config = self.config.clone();
+        let (compiled, rates) = self.rates(&config);
+        let contacts = std::mem::take(&mut self.contacts);
+        let rests = |c: &Contact| {
+            let e = &self.equation.watched[c.watched];
+            let change = self.equation.value(e, self.t, old) - self.equation.value(e, self.t, &self.x);
+            let place = compiled.active.len() + c.watched;
+            change.abs() <= 1e-12 * self.magnitude(e) && rates.first[place].abs() <= 1e-9 * rates.terms[place]
+        };
+        let (kept, _): (Vec<Contact>, Vec<Contact>) = contacts.into_iter().partition(|c| rests(c));
+        self.contacts = kept;
+    }
+
     /// Puts motion at rest on an event's surface from `t` on; false if the set state does not move the expression's derivative.
     pub(super) fn stick(&mut self, definition: &crate::Definition, event: usize, t: f64) -> bool {
         let Some(watched) = self.event_of.iter().position(|e| *e == Some(event)) else { return false };
@@ -297,11 +318,12 @@ impl Follower<'_> {
         self.adopt(config, sliding);
         let mut field = vec![0.0; self.n];
         self.compiled.field.evaluate(&self.variables, &mut field);
-        let (_, grip) = self.contact_forces(contact, &field);
-        if !grip.is_finite() || grip == 0.0 {
+        self.contacts.retain(|c| c.watched != watched);
+        self.contacts.push(contact);
+        if !self.contact_forces(&field).iter().all(|f| f.is_finite()) {
+            self.contacts.pop();
             return false;
         }
-        self.contact = Some(contact);
         self.project();
         // What is left of the time that infinitely many take.
         let (now, x, mut rate) = (self.t, self.x.clone(), vec![0.0; self.n]);
@@ -316,18 +338,20 @@ impl Follower<'_> {
 
     /// Puts the state back onto the surfaces that are slid upon, and a contact's derivative to zero.
     pub(super) fn project(&mut self) {
-        if let Some(contact) = self.contact {
+        if !self.contacts.is_empty() {
             self.variables[..self.n].copy_from_slice(&self.x);
             self.variables[self.n] = self.t;
             let mut field = vec![0.0; self.n];
             self.compiled.field.evaluate(&self.variables, &mut field);
-            let slope =
-                Self::along(&self.compiled, &self.variables, &field)[self.compiled.active.len() + contact.watched];
-            let (_, grip) = self.contact_forces(contact, &field);
-            let correction = slope / grip;
-            if correction.is_finite() {
-                self.x[contact.state] -= correction;
+            let all = Self::along(&self.compiled, &self.variables, &field);
+            let slopes: Vec<f64> = self.contacts.iter().map(|c| -all[self.compiled.active.len() + c.watched]).collect();
+            for (contact, change) in
+                self.contacts.iter().zip(solve_any(&self.grips(&field), &slopes, 0.0).unwrap_or_default())
+            {
+                self.x[contact.state] += change;
             }
+        }
+        if self.sliding.is_empty() {
             return;
         }
         let k = self.sliding.len();

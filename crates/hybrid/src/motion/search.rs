@@ -19,7 +19,7 @@ impl Follower<'_> {
             }
         }
         for (i, side) in self.watch_side.iter().enumerate() {
-            if *side != 0.0 && !self.contact.is_some_and(|c| c.watched == i) {
+            if *side != 0.0 && !self.contacts.iter().any(|c| c.watched == i) {
                 list.push((Sought::Watched(i), *side));
             }
         }
@@ -30,9 +30,7 @@ impl Follower<'_> {
         if !self.sliding.is_empty() {
             list.push((Sought::Repelling, 1.0));
         }
-        if self.contact.is_some() {
-            list.push((Sought::Release, 1.0));
-        }
+        list.extend((0..self.contacts.len()).map(|place| (Sought::Release(place), 1.0)));
         list
     }
 
@@ -85,17 +83,53 @@ impl Follower<'_> {
                 Sought::Leave { place, plus: false } => weights[place],
                 Sought::Leave { place, plus: true } => 1.0 - weights[place],
                 Sought::Repelling => determinant,
-                Sought::Release => {
-                    let contact = self.contact.expect("sought with a contact only");
+                // A surface pushes and does not pull.
+                Sought::Release(place) => {
                     let mut field = vec![0.0; n];
                     compiled.field.evaluate(&self.variables, &mut field);
-                    let (pull, _) = self.contact_forces(contact, &field);
-                    -contact.above * pull
+                    let k = self.contacts.len();
+                    let own = self.grips(&field)[place * k + place];
+                    self.contacts[place].above * own.signum() * self.contact_forces(&field)[place]
                 }
             });
         }
         self.scratch = values;
     }
+    /// Parts of a step in each of which what is sought is smooth: no operation in it is flat at five places and steep between them.
+    pub(super) fn parts(&mut self, step: &Step) -> Vec<(f64, f64)> {
+        let compiled = self.compiled.clone();
+        if compiled.watched_gates.is_empty() {
+            return vec![(0.0, 1.0)];
+        }
+        let n = self.n;
+        let (mut x, mut out) = (vec![0.0; n], vec![0.0; compiled.watched_gates.len()]);
+        let mut arguments = |follower: &mut Self, theta: f64| {
+            step.at(theta, &mut x);
+            follower.variables[..n].copy_from_slice(&x);
+            follower.variables[n] = step.t + theta * step.h;
+            compiled.watched_gate_arguments.evaluate(&follower.variables, &mut out);
+            out.clone()
+        };
+        let mut open = vec![(0.0, 1.0, 0, arguments(self, 0.0), arguments(self, 1.0))];
+        let mut parts = Vec::new();
+        while let Some((a, b, depth, first, last)) = open.pop() {
+            let middle = 0.5 * (a + b);
+            let between = arguments(self, middle);
+            let quiet = compiled.watched_gates.iter().enumerate().all(|(i, gate)| {
+                let (p, q, r) = (first[i], between[i], last[i]);
+                let bend = (0.5 * (p + r) - q).abs() * 0.5;
+                gate.is_quiet(p.min(q).min(r) - bend, p.max(q).max(r) + bend)
+            });
+            if quiet || depth >= 16 || parts.len() + open.len() >= 1 << 16 {
+                parts.push((a, b));
+            } else {
+                open.push((middle, b, depth + 1, between.clone(), last));
+                open.push((a, middle, depth + 1, first, between));
+            }
+        }
+        parts
+    }
+
     /// The place in a step before which all is as the step saw it, if there is something that it did not see: an operation that is flat at the step's stages
     /// and steep between them. Where arguments move far, the field along the continuous extension is compared with the extension's own derivative (the
     /// defect: Enright 1989).

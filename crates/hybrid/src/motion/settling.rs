@@ -355,7 +355,7 @@ impl Follower<'_> {
         let active = self.compiled.active.len();
         for i in 0..self.watch_side.len() {
             let (value, side) = (values[active + i], self.watch_side[i]);
-            let rests = self.contact.is_some_and(|c| c.watched == i) || passed.contains(&i) || side == 0.0;
+            let rests = self.contacts.iter().any(|c| c.watched == i) || passed.contains(&i) || side == 0.0;
             if rests || value * side >= 0.0 || value.abs() <= 1e-12 * self.magnitude(&self.equation.watched[i]) {
                 continue;
             }

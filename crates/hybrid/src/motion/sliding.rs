@@ -157,9 +157,9 @@ impl Follower<'_> {
                 }
             }
         }
-        if let Some(contact) = self.contact {
-            let (pull, grip) = self.contact_forces(contact, out);
-            out[contact.state] -= pull / grip;
+        if !self.contacts.is_empty() {
+            let forces = self.contact_forces(out);
+            self.contacts.iter().zip(forces).for_each(|(contact, force)| out[contact.state] += force);
         }
     }
 
@@ -249,12 +249,18 @@ impl Follower<'_> {
         (a, matrix)
     }
 
-    /// The second derivative of a contact's expression under `field`, and how much the contact's state moves it.
-    pub(super) fn contact_forces(&mut self, contact: Contact, field: &[f64]) -> (f64, f64) {
+    /// How the contacts' states move the derivatives of their expressions, row by row.
+    pub(super) fn grips(&self, field: &[f64]) -> Vec<f64> {
+        let columns: Vec<Vec<f64>> = self.contacts.iter().map(|c| self.second_along(field, Some(c.state))).collect();
+        let place = |c: &Contact| self.compiled.active.len() + c.watched;
+        self.contacts.iter().flat_map(|c| columns.iter().map(|column| column[place(c)]).collect::<Vec<_>>()).collect()
+    }
+
+    /// What is added to the speed of each contact's state under `field`, so that its expression stays at zero; not-a-number where nothing does.
+    pub(super) fn contact_forces(&self, field: &[f64]) -> Vec<f64> {
         let rates = self.second_along(field, None);
-        let grip = self.second_along(field, Some(contact.state));
-        let place = self.compiled.active.len() + contact.watched;
-        (rates[place], grip[place])
+        let pulls: Vec<f64> = self.contacts.iter().map(|c| -rates[self.compiled.active.len() + c.watched]).collect();
+        solve_any(&self.grips(field), &pulls, 0.0).unwrap_or_else(|| vec![f64::NAN; pulls.len()])
     }
 
     /// Second derivatives of the watched values along the field; or the derivatives of their first ones by a state.

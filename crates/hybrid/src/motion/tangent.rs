@@ -264,7 +264,7 @@ impl Follower<'_> {
     /// Multiplies the tangent vectors by the saltation matrix of what has been met.
     pub(super) fn after(&mut self, before: Option<Before>) -> Result<(), HybridError> {
         let Some(before) = before else { return Ok(()) };
-        if self.contact.is_some() {
+        if !self.contacts.is_empty() {
             return Err(self.no_tangents("impacts accumulate and the motion rests on a surface"));
         }
         let n = self.n;
