@@ -109,7 +109,7 @@ const TABLE: &[(&str, &str, &[&str])] = &[
     (
         "",
         "rests --system chua --within x=-3..3",
-        &["--system wheel", "--set alpha=9", "--within q=0..1", "--format json", "--out r.txt", "--quiet"],
+        &["--system wheel", "--set alpha=8", "--within q=0..1", "--format json", "--out r.txt", "--quiet"],
     ),
     (
         "",
