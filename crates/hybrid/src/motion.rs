@@ -190,7 +190,7 @@ pub enum HybridError {
     Bad(String),
     /// Several continuations.
     #[error(
-        "the motion is not decided at t = {t}, state {x:?}: on {surfaces} it can go on in more than one way ({ways}). Nothing is chosen here: end the run before that time (--t-end), start elsewhere (--start), change a parameter (--set), or choose a side (--exit at-once:plus or at-once:minus)"
+        "the motion is not decided at t = {t}, state {x:?}: on {surfaces} it can go on in more than one way ({ways}). Nothing is chosen here: end the run before that time (--t-end), start elsewhere (--start), change a parameter (--set), choose a side (--exit at-once:plus or at-once:minus), or of mixtures one (--intersection)"
     )]
     Undecided {
         /// When.
@@ -505,7 +505,7 @@ impl<'a> Follower<'a> {
         for watched in 0..follower.watch_side.len() {
             follower.begin_watching(watched, false);
         }
-        follower.note_conditions();
+        follower.new_conditions(model.definition());
         follower.rest_at_start();
         Ok(follower)
     }
@@ -778,9 +778,11 @@ impl<'a> Follower<'a> {
             Record::Times { every } => {
                 let mut next = self.next_record;
                 let mut count = (next / every).round();
-                while next <= end {
+                // The end of the run is a multiple of the time if it is one to rounding.
+                let slack = if end == self.options.t_end { 1e-12 * every } else { 0.0 };
+                while next <= end + slack {
                     step.at(((next - step.t) / step.h).min(1.0), &mut at);
-                    if !give(next, &at) {
+                    if !give(next.min(end), &at) {
                         return false;
                     }
                     count += 1.0;

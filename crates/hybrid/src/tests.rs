@@ -630,3 +630,29 @@ fn turns_that_shorten_without_end_are_named() {
     let Ending::Zeno { t, error, .. } = outcome.ending else { panic!("{outcome:?}") };
     assert!((t - 8.0).abs() <= error + 1e-9, "{t} {error}");
 }
+
+#[test]
+fn what_an_event_makes_true_happens_at_once() {
+    // A counter ends the run; two modes that send motion back to where it came from happen without end.
+    let text = "states = ['x', 'n']\nstart = [0, 0]\nf = ['1', '0']\n[[event]]\nevery = 1\nset = { n = 'n + 1' }\n[[event]]\nname = 'three'\nwhen = 'n > 2.5'\nstop = true";
+    let outcome = run(&model(text), 9.0).1.unwrap();
+    assert_eq!((outcome.ending, outcome.t), (Ending::Stopped("three".into()), 3.0));
+    let text = "states = ['x']\nstart = [0]\n[modes.a]\nf = ['1']\n[modes.b]\nf = ['-1']\n[[event]]\nwhen = 'x > 1'\nmode = 'b'\n[[event]]\nwhen = 'x < 1'\nmode = 'a'";
+    let Ending::Zeno { t, .. } = run(&model(text), 5.0).1.unwrap().ending else { panic!("it goes on") };
+    near(t, 1.0, 1e-12);
+    // A condition's impacts accumulate as an expression's do.
+    let text = "states = ['q', 'v']\nstart = [1, 0]\nf = ['v', '-2']\n[[event]]\nwhen = 'q < 0'\nset = { v = '-0.5*v', q = 0 }";
+    let Ending::Zeno { t, .. } = run(&model(text), 5.0).1.unwrap().ending else { panic!("it goes on") };
+    near(t, 3.0, 1e-9);
+    // A reset to zero within rounding is one to zero.
+    let text = "states = ['x']\nstart = [0.5]\nf = ['1']\n[[event]]\nwhen = 'x - 1'\nset = { x = 'x - 1' }\n[[event]]\nwhen = 'x'\nset = { x = 'x + 1' }";
+    near(end(text, 5.2)[0], 0.7, 1e-9);
+    let mut times = Vec::new();
+    let options = Options { t_end: 1.2, record: Record::Times { every: 0.4 }, ..Options::default() };
+    follow(&model("states = ['x']\nstart = [0]\nf = ['1']"), &options, &mut |p| {
+        times.push(p.t);
+        true
+    })
+    .unwrap();
+    assert_eq!(times, [0.0, 0.4, 0.8, 1.2]);
+}

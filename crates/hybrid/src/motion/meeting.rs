@@ -83,21 +83,13 @@ impl Follower<'_> {
             let rest: Vec<usize> = self.sliding.iter().copied().filter(|g| zero.contains(g)).collect();
             self.adopt(config, rest);
         }
+        let mut accumulates = None;
         if !crossed.is_empty() {
             self.outcome.switches += 1;
             self.settle(&zero)?;
             for guard in crossed {
-                if let Some((t, error)) = self.switch_trains[guard].note(self.t).filter(|_| fired.is_empty()) {
-                    if self.rests_where_switches_accumulate(t) {
-                        return Ok(if self.emit_rest(observe) {
-                            Some(Ending::Finished)
-                        } else {
-                            Some(Ending::Interrupted)
-                        });
-                    }
-                    let surfaces = self.names(&[guard]);
-                    return Err(HybridError::Accumulation { t, error, x: self.x.clone(), surfaces });
-                }
+                let found = self.switch_trains[guard].note(self.t);
+                accumulates = accumulates.or(found.map(|(t, error)| (guard, t, error)));
             }
             self.watch_jumps(definition, &mut passed, &mut fired);
         }
@@ -106,14 +98,14 @@ impl Follower<'_> {
             self.watch_side[i] = -old;
             self.fresh_watch[i] = true;
         }
-        for (i, event) in definition.events().iter().enumerate() {
-            if let When::Becomes(e) = &event.when {
-                let now = self.equation.holds(e, &self.config);
-                if now && !self.holds[i] {
-                    fired.push(i);
-                }
-                self.holds[i] = now;
+        fired.extend(self.new_conditions(definition));
+        if let Some((guard, t, error)) = accumulates.filter(|_| fired.is_empty()) {
+            if self.rests_where_switches_accumulate(t) {
+                let more = self.emit_rest(observe);
+                return Ok(Some(if more { Ending::Finished } else { Ending::Interrupted }));
             }
+            let surfaces = self.names(&[guard]);
+            return Err(HybridError::Accumulation { t, error, x: self.x.clone(), surfaces });
         }
         fired.sort_unstable();
         self.happen(definition, &fired, &zero, observe)
@@ -136,8 +128,7 @@ impl Follower<'_> {
             return Ok(None);
         }
         let quiet = matches!(self.options.record, Record::Section(_));
-        let mut stop = None;
-        let mut zeno = None;
+        let (mut stop, mut zeno, mut newly) = (None, None, Vec::new());
         let old = self.x.clone();
         let mut new = self.x.clone();
         let mut mode = None;
@@ -220,7 +211,7 @@ impl Follower<'_> {
                     zeno = Some((event, self.t, 4.0 * f64::EPSILON * self.t.abs()));
                 }
             }
-            self.note_conditions();
+            newly = self.new_conditions(definition);
             let setting = fired.iter().rev().find(|i| !definition.events()[**i].set.is_empty());
             let name = &definition.events()[*setting.unwrap_or(&fired[fired.len() - 1])].name;
             if !quiet && !self.emit(self.t, Some(name), observe) {
@@ -254,7 +245,8 @@ impl Follower<'_> {
                 return Ok(Some(Ending::Interrupted));
             }
         }
-        Ok(None)
+        // What a reset or a new mode makes true happens at once.
+        self.happen(definition, &newly, &[], observe)
     }
 
     /// A start at rest on a surface on which motion may stick, pressed against it, stays there.

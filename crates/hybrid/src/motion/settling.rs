@@ -13,11 +13,16 @@ type Vertex = (Configuration, Vec<Option<usize>>, Rates);
 impl Follower<'_> {
     // Sides.
 
-    /// The size of the terms that an expression is a sum of, at the present point.
+    /// The size of the terms that an expression is a sum of, with states as large as they have been in this run: what rounding is measured by.
     pub(super) fn magnitude(&self, e: &Expression) -> f64 {
         match e {
             Expression::Add(a, b) | Expression::Sub(a, b) => self.magnitude(a) + self.magnitude(b),
             Expression::Neg(a) => self.magnitude(a),
+            Expression::Mul(a, b) => self.magnitude(a) * self.magnitude(b),
+            Expression::Name(name) => match self.model.definition().states().iter().position(|s| s.name == *name) {
+                Some(i) => self.size[i].max(self.x[i].abs()),
+                None => self.equation.value(e, self.t, &self.x).abs(),
+            },
             other => self.equation.value(other, self.t, &self.x).abs(),
         }
     }
@@ -394,11 +399,18 @@ impl Follower<'_> {
         values
     }
 
-    pub(super) fn note_conditions(&mut self) {
-        for (i, event) in self.model.definition().events().iter().enumerate() {
+    /// The events whose conditions hold now and did not before.
+    pub(super) fn new_conditions(&mut self, definition: &crate::Definition) -> Vec<usize> {
+        let mut new = Vec::new();
+        for (i, event) in definition.events().iter().enumerate() {
             if let When::Becomes(e) = &event.when {
-                self.holds[i] = self.equation.holds(e, &self.config);
+                let now = self.equation.holds(e, &self.config);
+                if now && !self.holds[i] {
+                    new.push(i);
+                }
+                self.holds[i] = now;
             }
         }
+        new
     }
 }
