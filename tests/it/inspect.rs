@@ -213,7 +213,7 @@ fn published_pictures_are_checked_criterion_by_criterion() {
 
 /// A committed picture under another committed picture's name is not what its name says.
 #[test]
-fn a_picture_under_anothers_name_is_named() {
+fn a_picture_under_the_wrong_name_is_named() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("figures");
     let folder = tempfile::tempdir().unwrap();
     for (name, code, state) in [("fig3.png", 0, "same"), ("mine.png", 0, "same"), ("fig1.png", 1, "misnamed")] {

@@ -328,7 +328,7 @@ fn errors_point_into_the_file() {
         ("states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x'\nmode = 'on'", "5:8", "no mode `on`", ""),
         ("states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x'\nafter_zeno = 'stick'", "5:14", "sets one state", ""),
         ("states = ['x']\nf = [true]", "2:5", "a number is wanted", ""),
-        ("states = ['x']\nf = ['1']\n[parameters]\ng = { value = 1, abov = 0 }", "4:5", "value, above, below", ""),
+        ("states = ['x']\nf = ['1']\n[parameters]\ng = { value = 1, aboev = 0 }", "4:5", "value, above, below", ""),
         ("states = ['x']\nstart = [1, 2]\nf = ['1']", "2:9", "2 numbers for 1 states", "one for each"),
         ("states = ['x']\nf = ['1']\nh = 'x'\nplus = ['1']\nminus = ['1']", "3:5", "given twice", "one of f"),
         ("states = ['x']\nf = ['1']\nevnt = 3", "3:1", "unknown field `evnt`", "did you mean `event`?"),
