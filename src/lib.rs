@@ -55,8 +55,8 @@
 pub use nalgebra;
 
 pub use twofold_analyse as analyse;
-pub use twofold_integrate as integrate;
 pub use twofold_hybrid as hybrid;
+pub use twofold_integrate as integrate;
 pub use twofold_job as job;
 pub use twofold_job::record;
 pub use twofold_num as num;

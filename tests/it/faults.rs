@@ -659,8 +659,11 @@ fn help_that_cannot_be_written_is_an_error() {
     for argument in ["help", "--version"] {
         let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
         let program = env!("CARGO_BIN_EXE_twofold");
-        let output =
-            std::process::Command::new(program).arg(argument).stdout(full).stderr(std::process::Stdio::piped()).output();
+        let output = std::process::Command::new(program)
+            .arg(argument)
+            .stdout(full)
+            .stderr(std::process::Stdio::piped())
+            .output();
         let output = output.unwrap();
         let said = String::from_utf8(output.stderr).unwrap();
         assert!(output.status.code() == Some(2) && said.starts_with("error: "), "{argument}: {said}");

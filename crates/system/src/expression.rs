@@ -329,12 +329,7 @@ impl Expression {
         Self::parse_in(text, names, conditions, Dialect::General)
     }
 
-    fn parse_in(
-        text: &str,
-        names: &[&str],
-        conditions: &[&str],
-        dialect: Dialect,
-    ) -> Result<Self, ExpressionError> {
+    fn parse_in(text: &str, names: &[&str], conditions: &[&str], dialect: Dialect) -> Result<Self, ExpressionError> {
         if text.len() > MAX_LENGTH {
             return Err(ExpressionError {
                 message: format!("an expression of {} bytes; the limit is {MAX_LENGTH}", text.len()),
@@ -342,7 +337,8 @@ impl Expression {
                 help: Some("name parts of it in [let]".into()),
             });
         }
-        let mut parser = Parser { text, tokens: tokens(text, dialect)?, at: 0, depth: 0, terms: 0, names, conditions, dialect };
+        let mut parser =
+            Parser { text, tokens: tokens(text, dialect)?, at: 0, depth: 0, terms: 0, names, conditions, dialect };
         if parser.peek() == &Token::End {
             return Err(parser.error("an empty expression", Some("write 0 for a component that vanishes".into())));
         }
