@@ -1,6 +1,6 @@
 //! Following a general system exactly: from switch to switch, from event to event.
 //!
-//! Between switches the equations are smooth and a step of [Dormand & Prince's method](crate::step) is made. Every step is searched for the first
+//! Between switches the equations are smooth and a step of Dormand & Prince's method is made. Every step is searched for the first
 //! zero of all switching functions, events' expressions and limits of sliding; it is made again to end there, and
 //! [what happens there](crate::selection) is decided from the equations on both sides.
 
