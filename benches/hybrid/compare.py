@@ -147,7 +147,7 @@ def ours(name):
 
         cell = timed(run)
         if last[0].returncode == 3:
-            said = last[0].stderr.strip()
+            said = last[0].stderr.strip().replace(f"{folder}/", "")
             value = system.refused(said) if hasattr(system, "refused") else None
             return cell | ({"refused": said} if value is None else {"value": value})
         if last[0].returncode != 0:
