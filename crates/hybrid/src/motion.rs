@@ -586,16 +586,13 @@ impl<'a> Follower<'a> {
                     let shorter = follower.unseen(&step, &scale).map(|theta| theta.clamp(0.05, 0.9));
                     let shorter = shorter.or_else(|| follower.too_long_for_tangents(&step));
                     let Some(factor) = shorter else { break error };
-                    rejected += 1;
                     wanted *= factor;
-                    if follower.t + wanted == follower.t || rejected > 200 {
-                        break error;
-                    }
-                    continue;
+                } else if error.is_nan() {
+                    wanted *= 0.1;
+                } else {
+                    wanted *= (0.9 * rough_pow(error, -0.2)).clamp(0.1, 0.9);
                 }
                 rejected += 1;
-                let factor = if error.is_nan() { 0.1 } else { (0.9 * rough_pow(error, -0.2)).clamp(0.1, 0.9) };
-                wanted *= factor;
                 if self.t + wanted == self.t || rejected > 200 {
                     break f64::NAN;
                 }
