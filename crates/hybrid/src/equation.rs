@@ -423,7 +423,10 @@ impl Gate {
             Gate::Step(flat) => width <= 1.0 || low >= flat || high <= -flat,
             Gate::Exp => width <= 1.0 || high <= -40.0,
             Gate::Wave => width <= 3.0,
-            Gate::Scale => low.abs().max(high.abs()) <= 8.0 * low.abs().min(high.abs()) && low * high > 0.0,
+            Gate::Scale => {
+                let (most, least) = (low.abs().max(high.abs()), low.abs().min(high.abs()));
+                width <= 0.0 || (most <= 8.0 * least && low * high > 0.0)
+            }
         }
     }
 }

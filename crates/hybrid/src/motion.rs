@@ -576,6 +576,7 @@ impl<'a> Follower<'a> {
             }
             // A step that the tolerance allows.
             let mut rejected = 0;
+            let mut parts = Vec::new();
             let error = loop {
                 let follower = &mut *self;
                 step.take(wanted, &mut |t, x, out| follower.rhs(t, x, out));
@@ -585,6 +586,13 @@ impl<'a> Follower<'a> {
                     // What the step did not see begins there: it is made to end before.
                     let shorter = follower.unseen(&step, &scale).map(|theta| theta.clamp(0.05, 0.9));
                     let shorter = shorter.or_else(|| follower.too_long_for_tangents(&step));
+                    let shorter = shorter.or_else(|| match follower.parts(&step) {
+                        Some(found) => {
+                            parts = found;
+                            None
+                        }
+                        None => Some(search::SHORTER),
+                    });
                     let Some(factor) = shorter else { break error };
                     wanted *= factor;
                 } else if error.is_nan() {
@@ -609,8 +617,7 @@ impl<'a> Follower<'a> {
             // The first thing that is met.
             let list = self.sought();
             let mut found: Vec<(f64, Sought)> = Vec::new();
-            let parts = if list.is_empty() { Vec::new() } else { self.parts(&step) };
-            for (from, to) in parts {
+            for (from, to) in if list.is_empty() { Vec::new() } else { parts } {
                 for (i, place) in PLACES.iter().enumerate() {
                     let theta = from + place * (to - from);
                     if theta == 1.0 {

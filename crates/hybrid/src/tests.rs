@@ -600,6 +600,12 @@ fn conditions_that_hold_briefly_are_met() {
             let half = 0.999999_f64.acos() / 40.0;
             half * (1.0 + 2.0 * (3.0 * 40.0 / (2.0 * std::f64::consts::PI)).floor())
         }),
+        // Fifteen thousand turns in the run, more than are searched in one step.
+        ("cos(1e4*t) > 0.999", 9.5, {
+            let turn = 2.0 * std::f64::consts::PI / 1e4;
+            let half = 0.999_f64.acos() / 1e4;
+            half * (1.0 + 2.0 * (9.5 / turn).floor())
+        }),
         ("exp(-((t - 7)/1e-3)^2) > 0.5", 10.0, 2e-3 * 2.0_f64.ln().sqrt()),
         ("1/(1 + (1e4*(t - 3.3))^2) > 0.5", 10.0, 2e-4),
     ] {

@@ -1,6 +1,17 @@
 //! What a step is searched for, and what it may have jumped over.
 
+use twofold_num::tape::Program;
+
 use super::*;
+use crate::equation::Gate;
+
+/// Most parts of a step that are searched; one with more is made shorter, to this part.
+const MOST_PARTS: usize = 4096;
+pub(super) const SHORTER: f64 = 0.25;
+/// How often a step is halved in search of where it is smooth.
+const DEEPEST: usize = 16;
+/// By so much of what its error is measured by the derivative of the continuous extension, which is of lower order than the step, may miss the field.
+const LARGEST_DEFECT: f64 = 1e3;
 
 impl Follower<'_> {
     // What a step is searched for.
@@ -95,39 +106,44 @@ impl Follower<'_> {
         }
         self.scratch = values;
     }
-    /// Parts of a step in each of which what is sought is smooth: no operation in it is flat at five places and steep between them.
-    pub(super) fn parts(&mut self, step: &Step) -> Vec<(f64, f64)> {
+
+    /// The arguments of gates at the fraction `theta` of a step.
+    fn arguments(&mut self, program: &Program, gates: usize, step: &Step, theta: f64) -> Vec<f64> {
+        let mut out = vec![0.0; gates];
+        step.at(theta, &mut self.variables[..self.n]);
+        self.variables[self.n] = step.t + theta * step.h;
+        program.evaluate(&self.variables, &mut out);
+        out
+    }
+
+    /// Parts of a step in each of which what is sought is smooth: no operation in it is flat at five places and steep between them. None if they
+    /// are too many to be searched.
+    pub(super) fn parts(&mut self, step: &Step) -> Option<Vec<(f64, f64)>> {
         let compiled = self.compiled.clone();
         if compiled.watched_gates.is_empty() {
-            return vec![(0.0, 1.0)];
+            return Some(vec![(0.0, 1.0)]);
         }
-        let n = self.n;
-        let (mut x, mut out) = (vec![0.0; n], vec![0.0; compiled.watched_gates.len()]);
-        let mut arguments = |follower: &mut Self, theta: f64| {
-            step.at(theta, &mut x);
-            follower.variables[..n].copy_from_slice(&x);
-            follower.variables[n] = step.t + theta * step.h;
-            compiled.watched_gate_arguments.evaluate(&follower.variables, &mut out);
-            out.clone()
+        let arguments = |follower: &mut Self, theta: f64| {
+            follower.arguments(&compiled.watched_gate_arguments, compiled.watched_gates.len(), step, theta)
         };
         let mut open = vec![(0.0, 1.0, 0, arguments(self, 0.0), arguments(self, 1.0))];
         let mut parts = Vec::new();
         while let Some((a, b, depth, first, last)) = open.pop() {
             let middle = 0.5 * (a + b);
             let between = arguments(self, middle);
-            let quiet = compiled.watched_gates.iter().enumerate().all(|(i, gate)| {
-                let (p, q, r) = (first[i], between[i], last[i]);
-                let bend = (0.5 * (p + r) - q).abs() * 0.5;
-                gate.is_quiet(p.min(q).min(r) - bend, p.max(q).max(r) + bend)
-            });
-            if quiet || depth >= 16 || parts.len() + open.len() >= 1 << 16 {
+            let quiet = are_quiet(&compiled.watched_gates, &first, &between, &last);
+            if parts.len() + open.len() >= MOST_PARTS {
+                return None;
+            }
+            // A pole is quiet nowhere near it.
+            if quiet || depth >= DEEPEST {
                 parts.push((a, b));
             } else {
                 open.push((middle, b, depth + 1, between.clone(), last));
                 open.push((a, middle, depth + 1, first, between));
             }
         }
-        parts
+        Some(parts)
     }
 
     /// The place in a step before which all is as the step saw it, if there is something that it did not see: an operation that is flat at the step's stages
@@ -139,13 +155,8 @@ impl Follower<'_> {
             return None;
         }
         let n = self.n;
-        let (mut x, mut out) = (vec![0.0; n], vec![0.0; compiled.gates.len()]);
-        let mut arguments = |follower: &mut Self, theta: f64| {
-            step.at(theta, &mut x);
-            follower.variables[..n].copy_from_slice(&x);
-            follower.variables[n] = step.t + theta * step.h;
-            compiled.gate_arguments.evaluate(&follower.variables, &mut out);
-            out.clone()
+        let arguments = |follower: &mut Self, theta: f64| {
+            follower.arguments(&compiled.gate_arguments, compiled.gates.len(), step, theta)
         };
         let mut open = vec![(0.0, 1.0, 0, arguments(self, 0.0), arguments(self, 1.0))];
         let mut looked = 0;
@@ -153,12 +164,7 @@ impl Follower<'_> {
         while let Some((a, b, depth, first, last)) = open.pop() {
             let middle = 0.5 * (a + b);
             let between = arguments(self, middle);
-            let quiet = compiled.gates.iter().enumerate().all(|(i, gate)| {
-                let (p, q, r) = (first[i], between[i], last[i]);
-                // A parabola's reach beyond its three points.
-                let bend = (0.5 * (p + r) - q).abs() * 0.5;
-                gate.is_quiet(p.min(q).min(r) - bend, p.max(q).max(r) + bend)
-            });
+            let quiet = are_quiet(&compiled.gates, &first, &between, &last);
             if quiet && depth == 0 {
                 return None;
             }
@@ -168,10 +174,14 @@ impl Follower<'_> {
             looked += 1;
             let defect =
                 (0..n).map(|i| ((field[i] - slope[i]) * step.h * (b - a) / scale[i]).abs()).fold(0.0, f64::max);
-            if !(defect <= 1e3) {
-                return Some(a.max(0.05));
+            if !(defect <= LARGEST_DEFECT) {
+                return Some(a);
             }
-            if !quiet && depth < 14 && looked < 4096 {
+            if looked >= MOST_PARTS {
+                // Too much to be searched at once.
+                return Some(SHORTER);
+            }
+            if !quiet && depth < DEEPEST {
                 open.push((middle, b, depth + 1, between.clone(), last));
                 open.push((a, middle, depth + 1, first, between));
             }
@@ -350,6 +360,16 @@ impl Follower<'_> {
             }
         }
     }
+}
+
+/// Whether gates do nothing that could be missed between three equidistant places, by their arguments there.
+fn are_quiet(gates: &[Gate], first: &[f64], between: &[f64], last: &[f64]) -> bool {
+    gates.iter().enumerate().all(|(i, gate)| {
+        let (p, q, r) = (first[i], between[i], last[i]);
+        // A parabola's reach beyond its three points.
+        let bend = (0.5 * (p + r) - q).abs() * 0.5;
+        gate.is_quiet(p.min(q).min(r) - bend, p.max(q).max(r) + bend)
+    })
 }
 
 /// The value of a guard among those of a compiled structure.
