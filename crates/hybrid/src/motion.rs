@@ -248,6 +248,8 @@ pub enum HybridError {
     },
 }
 
+/// How often a step is made shorter before it is given up.
+const MOST_SHORTENINGS: usize = 200;
 /// How often switches may make each other jump at one moment.
 const MOST_JUMPS: usize = 32;
 
@@ -318,6 +320,16 @@ struct Contact {
     state: usize,
     /// +1 if the surface is met from above.
     above: f64,
+}
+
+/// A step that stands, but for what is met in it.
+struct Accepted {
+    length: f64,
+    error: f64,
+    /// Where it is searched.
+    parts: Vec<(f64, f64)>,
+    /// Whether longer ones were tried.
+    rejected: bool,
 }
 
 struct Follower<'a> {
@@ -510,8 +522,6 @@ impl<'a> Follower<'a> {
         Ok(follower)
     }
 
-    // The run.
-
     /// The run, and the follower as it is at its end.
     fn run_whole(mut self, observe: &mut dyn FnMut(&Point) -> bool) -> Result<(Outcome, Self), HybridError> {
         let ending = self.run(observe)?;
@@ -536,7 +546,7 @@ impl<'a> Follower<'a> {
                 self.next_record = ((self.t / every).floor() + 1.0) * every;
             }
         }
-        let mut list_values = [const { Vec::new() }; 5];
+        let mut last_values = Vec::new();
         let mut room = vec![0.0; self.n];
         loop {
             // Times at which something is known to happen.
@@ -574,90 +584,17 @@ impl<'a> Follower<'a> {
             if to_stop {
                 wanted = stop - self.t;
             }
-            // A step that the tolerance allows.
-            let mut rejected = 0;
-            let mut parts = Vec::new();
-            let error = loop {
-                let follower = &mut *self;
-                step.take(wanted, &mut |t, x, out| follower.rhs(t, x, out));
-                let scale = scale_now(follower, &step);
-                let error = step.error(&|i| scale[i]);
-                if error <= 1.0 {
-                    // What the step did not see begins there: it is made to end before.
-                    let shorter = follower.unseen(&step, &scale).map(|theta| theta.clamp(0.05, 0.9));
-                    let shorter = shorter.or_else(|| follower.too_long_for_tangents(&step));
-                    let shorter = shorter.or_else(|| match follower.parts(&step) {
-                        Some(found) => {
-                            parts = found;
-                            None
-                        }
-                        None => Some(search::SHORTER),
-                    });
-                    let Some(factor) = shorter else { break error };
-                    wanted *= factor;
-                } else if error.is_nan() {
-                    wanted *= 0.1;
-                } else {
-                    wanted *= (0.9 * rough_pow(error, -0.2)).clamp(0.1, 0.9);
-                }
-                rejected += 1;
-                if self.t + wanted == self.t || rejected > 200 {
-                    break f64::NAN;
-                }
-            };
-            if error.is_nan() {
+            let Some(Accepted { length: wanted, error, parts, rejected }) = self.step_within(&mut step, wanted) else {
                 if self.land_at_an_edge()? {
                     continue;
                 }
-                return Err(self.left_domain(self.t + wanted, &step.x.clone()));
-            }
-            let stopped = to_stop && rejected == 0;
-            let most = if rejected > 0 { 1.2 } else { 5.0 };
+                return Err(self.left_domain(self.t, &step.x.clone()));
+            };
+            let stopped = to_stop && !rejected;
+            let most = if rejected { 1.2 } else { 5.0 };
             let h_next = wanted * if error > 0.0 { (0.9 * rough_pow(error, -0.2)).clamp(0.2, most) } else { most };
-            // The first thing that is met.
             let list = self.sought();
-            let mut found: Vec<(f64, Sought)> = Vec::new();
-            for (from, to) in if list.is_empty() { Vec::new() } else { parts } {
-                for (i, place) in PLACES.iter().enumerate() {
-                    let theta = from + place * (to - from);
-                    if theta == 1.0 {
-                        room.copy_from_slice(&step.y);
-                    } else {
-                        step.at(theta, &mut room);
-                    }
-                    let mut values = std::mem::take(&mut list_values[i]);
-                    self.measure(&list, self.t + theta * wanted, &room, &mut values);
-                    list_values[i] = values;
-                }
-                for (j, (sought, side)) in list.iter().enumerate() {
-                    let mut v: [f64; 5] = std::array::from_fn(|i| list_values[i][j]);
-                    if from == 0.0 && (self.is_fresh(*sought) || v[0] * side < 0.0) {
-                        v[0] = 0.0;
-                    }
-                    if v.iter().any(|v| v.is_nan()) {
-                        // Weights of sliding where there are none, or an expression out of its domain: shorter steps find the place.
-                        if matches!(sought, Sought::Leave { .. } | Sought::Repelling) {
-                            found.push((from + 0.5 * (to - from), *sought));
-                        }
-                        continue;
-                    }
-                    if stays(&v, *side) {
-                        continue;
-                    }
-                    let (begin, length) = (self.t, wanted);
-                    let follower = &mut *self;
-                    let (one, mut value, mut at) = ([(*sought, *side)], Vec::new(), vec![0.0; room.len()]);
-                    let mut f = |theta: f64| {
-                        step.at(theta, &mut at);
-                        follower.measure(&one, begin + theta * length, &at, &mut value);
-                        value[0]
-                    };
-                    found.extend(first(v, *side, from, to, &mut f, 0).map(|theta| (theta, *sought)));
-                }
-                if !found.is_empty() {
-                    break;
-                }
-            }
+            let found = self.find(&step, &list, &parts, &mut last_values);
             let earliest = found.iter().map(|(theta, _)| *theta).fold(f64::INFINITY, f64::min);
             if earliest.is_finite() {
                 let met: Vec<Sought> =
@@ -680,7 +617,7 @@ impl<'a> Follower<'a> {
             self.x.copy_from_slice(&step.y);
             self.note_growth(end);
             if progress {
-                self.clear_fresh(&list, &list_values[4], earliest.is_finite());
+                self.clear_fresh(&list, &last_values, earliest.is_finite());
             }
             h = if earliest.is_finite() {
                 // Where things happen often, steps are about as long as what is between them.
@@ -721,6 +658,91 @@ impl<'a> Follower<'a> {
                 return Ok(ending);
             }
         }
+    }
+
+    /// Makes a step of at most this length that the tolerance allows and that has seen what there is; none if none is short enough.
+    fn step_within(&mut self, step: &mut Step, longest: f64) -> Option<Accepted> {
+        let mut length = longest;
+        for tried in 0..=MOST_SHORTENINGS {
+            step.take(length, &mut |t, x, out| self.rhs(t, x, out));
+            let scale = scale_now(self, step);
+            let error = step.error(&|i| scale[i]);
+            let factor = if error <= 1.0 {
+                // What the step did not see begins there: it is made to end before.
+                let unseen = self.unseen(step, &scale).map(|theta| theta.clamp(0.05, 0.9));
+                match unseen.or_else(|| self.too_long_for_tangents(step)) {
+                    Some(factor) => factor,
+                    None => match self.parts(step) {
+                        Some(parts) => return Some(Accepted { length, error, parts, rejected: tried > 0 }),
+                        None => search::SHORTER,
+                    },
+                }
+            } else if error.is_nan() {
+                0.1
+            } else {
+                (0.9 * rough_pow(error, -0.2)).clamp(0.1, 0.9)
+            };
+            length *= factor;
+            if self.t + length == self.t {
+                break;
+            }
+        }
+        None
+    }
+
+    /// What is met first in a step, with its place and all else in the same part of the step; `last` takes the values where the search ends.
+    fn find(
+        &mut self,
+        step: &Step,
+        list: &[(Sought, f64)],
+        parts: &[(f64, f64)],
+        last: &mut Vec<f64>,
+    ) -> Vec<(f64, Sought)> {
+        let mut found = Vec::new();
+        if list.is_empty() {
+            return found;
+        }
+        let mut at = vec![0.0; self.n];
+        let mut values = [const { Vec::new() }; 5];
+        for &(from, to) in parts {
+            for (place, values) in PLACES.iter().zip(&mut values) {
+                let theta = from + place * (to - from);
+                if theta == 1.0 {
+                    at.copy_from_slice(&step.y);
+                } else {
+                    step.at(theta, &mut at);
+                }
+                self.measure(list, step.t + theta * step.h, &at, values);
+            }
+            for (j, (sought, side)) in list.iter().enumerate() {
+                let mut v: [f64; 5] = std::array::from_fn(|i| values[i][j]);
+                if from == 0.0 && (self.is_fresh(*sought) || v[0] * side < 0.0) {
+                    v[0] = 0.0;
+                }
+                if v.iter().any(|v| v.is_nan()) {
+                    // Weights of sliding where there are none: shorter steps find the place.
+                    if matches!(sought, Sought::Leave { .. } | Sought::Repelling) {
+                        found.push((from + 0.5 * (to - from), *sought));
+                    }
+                    continue;
+                }
+                if stays(&v, *side) {
+                    continue;
+                }
+                let (one, mut value) = ([(*sought, *side)], Vec::new());
+                let mut f = |theta: f64| {
+                    step.at(theta, &mut at);
+                    self.measure(&one, step.t + theta * step.h, &at, &mut value);
+                    value[0]
+                };
+                found.extend(first(v, *side, from, to, &mut f, 0).map(|theta| (theta, *sought)));
+            }
+            if !found.is_empty() {
+                break;
+            }
+        }
+        std::mem::swap(last, &mut values[4]);
+        found
     }
 
     /// What is due at the present time, together with what is met here.
@@ -765,8 +787,6 @@ impl<'a> Follower<'a> {
         let passes = |i: &usize| rates.direction(compiled.active.len() + i) * self.watch_side[*i] < 0.0;
         near.into_iter().filter(passes).map(Sought::Watched).collect()
     }
-
-    // Recording.
 
     fn emit(&self, t: f64, event: Option<&str>, observe: &mut dyn FnMut(&Point) -> bool) -> bool {
         observe(&Point { t, x: &self.x, mode: self.config.mode, signs: &self.signs, event, direction: None })

@@ -3,8 +3,6 @@
 use super::*;
 
 impl Follower<'_> {
-    // What happens at a point that is met.
-
     pub(super) fn meet(
         &mut self,
         definition: &crate::Definition,

@@ -14,8 +14,6 @@ const DEEPEST: usize = 16;
 const LARGEST_DEFECT: f64 = 1e3;
 
 impl Follower<'_> {
-    // What a step is searched for.
-
     pub(super) fn sought(&self) -> Vec<(Sought, f64)> {
         let mut list = Vec::new();
         for guard in &self.compiled.active {

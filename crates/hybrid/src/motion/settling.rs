@@ -11,8 +11,6 @@ const MOST_CORNERS: usize = 3;
 type Vertex = (Configuration, Vec<Option<usize>>, Rates);
 
 impl Follower<'_> {
-    // Sides.
-
     /// The size of the terms that an expression is a sum of, with states as large as they have been in this run: what rounding is measured by.
     pub(super) fn magnitude(&self, e: &Expression) -> f64 {
         match e {

@@ -5,8 +5,6 @@ use std::rc::Rc;
 use super::*;
 
 impl Follower<'_> {
-    // What programs read.
-
     pub(super) fn load(&self, config: &Configuration) -> Vec<f64> {
         let n = self.n;
         let mut v = vec![0.0; self.equation.variables()];
@@ -127,8 +125,6 @@ impl Follower<'_> {
         let value = self.equation.value(&self.equation.guards[guard].expression, self.t, &self.x);
         value.round()
     }
-
-    // The field.
 
     pub(super) fn rhs(&mut self, t: f64, x: &[f64], out: &mut [f64]) {
         let n = self.n;
