@@ -1,11 +1,18 @@
-//! Runs of general systems, as tables.
+//! Questions about general systems: runs, closed orbits, exponents, rests.
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+use twofold_analyse::path::MOST_POINTS;
+use twofold_hybrid::motion::tangent::{Return, closed_orbit, exponents};
 use twofold_hybrid::motion::{Exit, Record};
+use twofold_hybrid::rests::{Place, rests};
 use twofold_hybrid::selection::Intersection;
 use twofold_hybrid::{Ending, HybridError, Model, Options, Point, follow};
+use twofold_integrate::Watch;
 
 use super::answer::{Answer, Stop};
+use super::executor::Executor;
+use super::question::{JobError, Question};
 use super::table::{Column, Entry, Table};
 
 /// A run of a general system.
@@ -140,21 +147,277 @@ impl GeneralRun {
         };
         Ok(answer)
     }
+}
 
-    /// The whole run in memory.
-    ///
-    /// # Errors
-    /// As [`follow`].
-    pub fn compute(&self, reached: &dyn Fn(f64) -> bool) -> Result<Answer, HybridError> {
+impl Question for GeneralRun {
+    fn kind(&self) -> &'static str {
+        "general-run"
+    }
+
+    fn json(&self) -> Value {
+        GeneralRun::json(self)
+    }
+
+    fn label(&self) -> String {
+        let title = self.model.definition().title();
+        if title.is_empty() { "run".to_owned() } else { title.to_owned() }
+    }
+
+    fn extent(&self) -> f64 {
+        self.options.t_end
+    }
+
+    fn cost(&self) -> f64 {
+        self.options.t_end - self.options.t_start
+    }
+
+    fn compute(&self, _: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
         let mut whole = self.table();
-        let mut answer = self.stream(
-            &mut |part| {
-                whole.extend(part.rows());
-                true
-            },
-            reached,
-        )?;
+        let mut full = None;
+        let mut keep = |part: &Table| {
+            whole.extend(part.rows());
+            if whole.len() > MOST_POINTS {
+                full = whole.numbers("t").last().copied();
+            }
+            full.is_none()
+        };
+        let mut answer = self.stream(&mut keep, &|t| watch.reached(t))?;
+        if let Some(t) = full {
+            return Err(JobError::TooManyPoints { t, limit: MOST_POINTS });
+        }
         answer.tables = vec![whole];
         Ok(answer)
+    }
+}
+
+/// A closed orbit of a general system, by Newton's method once the motion has settled.
+#[derive(Clone, Debug)]
+pub struct GeneralOrbit {
+    /// System, start and method; `options.t_end` is the longest time of a return.
+    pub run: GeneralRun,
+    /// Time in which the motion settles first; whole periods of a drive.
+    pub settle: f64,
+    /// Where or when an orbit closes.
+    pub after: Return,
+}
+
+impl Question for GeneralOrbit {
+    fn kind(&self) -> &'static str {
+        "general-orbit"
+    }
+
+    fn json(&self) -> Value {
+        let mut json = self.run.json();
+        json["settle"] = self.settle.into();
+        json["closes"] = match self.after {
+            Return::Period(period) => json!({ "period": period }),
+            Return::Crossings(count) => json!({ "crossings": count }),
+        };
+        json
+    }
+
+    fn extent(&self) -> f64 {
+        self.run.options.t_start + self.settle
+    }
+
+    fn cost(&self) -> f64 {
+        self.settle
+    }
+
+    /// Facts: `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts, the largest first) and `gap` (how far the orbit is from closed,
+    /// relative to its largest state).
+    fn compute(&self, _: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+        let GeneralRun { model, options } = &self.run;
+        let mut options = options.clone();
+        // The phase of a drive is kept: whole periods.
+        let settle = match self.after {
+            Return::Period(period) => (self.settle / period).ceil() * period,
+            Return::Crossings(_) => self.settle,
+        };
+        if settle > 0.0 {
+            let t_end = options.t_start + settle;
+            let settling = Options { t_end, record: Record::Times { every: f64::INFINITY }, ..options.clone() };
+            let end = follow(model, &settling, &mut |point| watch.reached(point.t))?;
+            if end.ending == Ending::Interrupted {
+                return Err(JobError::Interrupted);
+            }
+            options.start = Some(end.x);
+        }
+        let found = closed_orbit(model, &options, &self.after)?;
+        Ok(Answer::of_tables(Vec::new())
+            .with_fact("states", &model.coordinates())
+            .with_fact("point", &found.x)
+            .with_fact("period", &found.period)
+            .with_fact("multipliers", &found.multipliers)
+            .with_fact("gap", &found.gap))
+    }
+}
+
+/// Lyapunov exponents of a general system, by saltation matrices through its switches and resets.
+#[derive(Clone, Debug)]
+pub struct GeneralExponents {
+    /// System, start, times and method.
+    pub run: GeneralRun,
+    /// Time that is not averaged over.
+    pub transient: f64,
+    /// How many, the largest first.
+    pub count: usize,
+}
+
+/// An exponent with its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MeanRate {
+    /// Per unit time; none if sliding takes the direction away.
+    pub value: Option<f64>,
+    /// Half the width of the interval.
+    pub half_width: f64,
+}
+
+impl Question for GeneralExponents {
+    fn kind(&self) -> &'static str {
+        "general-exponents"
+    }
+
+    fn json(&self) -> Value {
+        let mut json = self.run.json();
+        json["transient"] = self.transient.into();
+        json["count"] = self.count.into();
+        json
+    }
+
+    fn cost(&self) -> f64 {
+        self.run.cost() * self.count as f64
+    }
+
+    /// Facts: `from` and `to` (the times of the mean) and `exponents`, a list of [`MeanRate`]s.
+    fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        let found = exponents(&self.run.model, &self.run.options, self.transient, self.count)?;
+        let list: Vec<MeanRate> = found
+            .values
+            .iter()
+            .zip(&found.errors)
+            .map(|(value, error)| MeanRate { value: value.is_finite().then_some(*value), half_width: *error })
+            .collect();
+        Ok(Answer::of_tables(Vec::new())
+            .with_fact("from", &found.times.0)
+            .with_fact("to", &found.times.1)
+            .with_fact("exponents", &list))
+    }
+}
+
+/// Equilibria and pseudo-equilibria of a general system in a box.
+#[derive(Clone, Debug)]
+pub struct GeneralRests {
+    /// The system.
+    pub model: Model,
+    /// Bounds of each state.
+    pub within: Vec<(f64, f64)>,
+}
+
+/// A rest as a fact.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Resting {
+    /// The state.
+    pub state: Vec<f64>,
+    /// The mode's name.
+    pub mode: String,
+    /// In a field or on a surface.
+    pub place: Standing,
+    /// Real and imaginary parts.
+    pub eigenvalues: Vec<[f64; 2]>,
+    /// What its eigenvalues say: "attracts", "saddle" ...
+    pub kind: String,
+}
+
+/// Where a motion rests.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Standing {
+    /// On a switching surface: its function, the share of f+, and whether sliding attracts.
+    Surface {
+        /// The switching function.
+        surface: String,
+        /// Share of the field with the function above zero.
+        weight: f64,
+        /// Whether motion comes to the surface there.
+        attracting: bool,
+    },
+    /// In a field, away from surfaces.
+    Field,
+}
+
+impl Question for GeneralRests {
+    fn kind(&self) -> &'static str {
+        "general-rests"
+    }
+
+    fn json(&self) -> Value {
+        json!({ "system": self.model.json(), "within": self.within })
+    }
+
+    /// Facts: `states` (their names) and `rests`, a list of [`Resting`]s.
+    fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        let found = rests(&self.model, &self.within)?;
+        let modes = self.model.definition().modes();
+        let list: Vec<Resting> = found
+            .iter()
+            .map(|rest| Resting {
+                state: rest.x.clone(),
+                mode: modes[rest.mode].name.clone(),
+                place: match &rest.place {
+                    Place::Field => Standing::Field,
+                    Place::Surface { surface, weight, attracting } => {
+                        Standing::Surface { surface: surface.clone(), weight: *weight, attracting: *attracting }
+                    }
+                },
+                eigenvalues: rest.eigenvalues.clone(),
+                kind: rest.kind().to_owned(),
+            })
+            .collect();
+        Ok(Answer::of_tables(Vec::new()).with_fact("states", &self.model.coordinates()).with_fact("rests", &list))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use twofold_hybrid::Definition;
+
+    fn run(text: &str, t_end: f64) -> GeneralRun {
+        let model = Model::new(Definition::from_toml(text, "f").unwrap());
+        GeneralRun { model, options: Options { t_end, ..Options::default() } }
+    }
+
+    const DRIVEN: &str = "states = ['x']\nstart = [0]\nf = ['-x + 4*if(mod(t, 1) < 0.5, 1, 0)']";
+
+    /// x' = -x + 4 in the first half of each period of 1, -x in the other: the multiplier is 1/e, and from x at the period's start it is
+    /// x/e + 4 (1 - e^(-1/2)) e^(-1/2) at its end.
+    #[test]
+    fn a_driven_orbit_closes_as_its_formula_says() {
+        let question = GeneralOrbit { run: run(DRIVEN, 10.0), settle: 0.5, after: Return::Period(1.0) };
+        let answer = Executor::quiet().ask(&question).unwrap();
+        let point: Vec<f64> = answer.fact("point").unwrap();
+        let multipliers: Vec<[f64; 2]> = answer.fact("multipliers").unwrap();
+        let half = (-0.5_f64).exp();
+        let expected = 4.0 * (1.0 - half) * half / (1.0 - half * half);
+        assert!((point[0] - expected).abs() < 1e-9, "{point:?} {expected}");
+        assert!((multipliers[0][0] - half * half).abs() < 1e-8, "{multipliers:?}");
+    }
+
+    #[test]
+    fn runs_differ_in_their_questions_where_they_differ() {
+        let (a, b) = (run(DRIVEN, 10.0), run(DRIVEN, 11.0));
+        assert_ne!(Question::json(&a), Question::json(&b));
+        let answer = Executor::quiet().ask(&a).unwrap();
+        assert_eq!(answer.table("path").unwrap().numbers("t").last(), Some(&10.0));
+    }
+
+    #[test]
+    fn what_the_asker_can_mend_is_said_to_be_so() {
+        let mut wrong = run(DRIVEN, 10.0);
+        wrong.options.start = Some(vec![1.0, 2.0]);
+        assert!(Executor::quiet().ask(&wrong).unwrap_err().is_bad_question());
+        let leaves = run("states = ['x']\nstart = [1]\nf = ['-sqrt(x) - 1']", 10.0);
+        assert!(!Executor::quiet().ask(&leaves).unwrap_err().is_bad_question());
     }
 }

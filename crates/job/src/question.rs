@@ -9,6 +9,8 @@ use super::answer::{Answer, NoSuchFact};
 use super::executor::Executor;
 use super::spec::SpecError;
 use crate::record::Hash;
+use twofold_hybrid::HybridError;
+use twofold_hybrid::rests::RestError;
 use twofold_integrate::filippov::FilippovError;
 use twofold_integrate::{Failure, Watch};
 use twofold_system::BindError;
@@ -102,6 +104,12 @@ pub enum JobError {
         /// The limit.
         limit: usize,
     },
+    /// A general system could not be followed.
+    #[error(transparent)]
+    General(#[from] HybridError),
+    /// The rests of a general system could not be sought.
+    #[error(transparent)]
+    Rests(#[from] RestError),
     /// The question is for systems with another number of states.
     #[error(transparent)]
     Dimension(#[from] BindError),
@@ -119,7 +127,12 @@ pub enum JobError {
 impl JobError {
     /// Whether the question itself is at fault, not the computation.
     pub fn is_bad_question(&self) -> bool {
-        matches!(self, JobError::Spec(_) | JobError::Dimension(_))
+        match self {
+            JobError::Spec(_) | JobError::Dimension(_) => true,
+            JobError::General(e) => matches!(e, HybridError::Equation(_) | HybridError::Start(_) | HybridError::Bad(_)),
+            JobError::Rests(e) => !matches!(e, RestError::Driven),
+            _ => false,
+        }
     }
 }
 

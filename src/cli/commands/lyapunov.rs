@@ -9,9 +9,8 @@ use crate::cli::general;
 use crate::cli::progress::Progress;
 use crate::cli::speak::{Delivery, deliver, try_delivery};
 use crate::cli::{CliError, Exit};
-use crate::hybrid::motion::tangent::exponents;
 use crate::integrate::StepCap;
-use crate::job::general::GeneralRun;
+use crate::job::general::{GeneralExponents, GeneralRun, MeanRate};
 use crate::job::{Executor, JobError, LargestExponent, Question, Stop, encode};
 use crate::num::elementary::log10;
 
@@ -132,33 +131,27 @@ fn of_general(arguments: &Arguments, mut run: GeneralRun) -> Result<Exit, CliErr
     let format = ending::format(out, arguments.format, Format::Text)?;
     try_delivery(out)?;
     let count = run.model.coordinates().len().min(MOST_EXPONENTS);
-    let found = exponents(&run.model, &run.options, transient, count).map_err(general::failed)?;
-    let (from, until) = found.times;
-    let pairs = || found.values.iter().zip(&found.errors);
+    let progress = Progress::with_grace(arguments.delivery.quiet);
+    let question = GeneralExponents { run, transient, count };
+    let answer = Executor::new(None, &progress).ask(&question)?;
+    let fact = |e| CliError::Job(JobError::Fact(e));
+    let found: Vec<MeanRate> = answer.fact("exponents").map_err(fact)?;
+    let (from, until): (f64, f64) = (answer.fact("from").map_err(fact)?, answer.fact("to").map_err(fact)?);
     let bytes = match format {
-        Format::Json => {
-            let list: Vec<_> = pairs()
-                .map(|(value, error)| json!({ "value": value.is_finite().then_some(value), "half_width": error }))
-                .collect();
-            let about = json!({ "kind": "general-exponents", "question": run.json(), "transient": transient });
-            let mut bytes =
-                serde_json::to_vec_pretty(&json!({ "about": about, "from": from, "to": until, "exponents": list }))
-                    .expect("plain data: string keys, no failing serialisers");
-            bytes.push(b'\n');
-            bytes
-        }
+        Format::Json => encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() })),
         Format::Text => {
             let mut text = String::new();
-            for (i, (value, error)) in pairs().enumerate() {
+            for (i, MeanRate { value, half_width }) in found.iter().enumerate() {
+                let value = value.unwrap_or(f64::NEG_INFINITY);
                 let meaning = match () {
-                    () if *value == f64::NEG_INFINITY => "sliding takes this direction away",
-                    () if value.abs() <= *error => "not distinguishable from zero",
-                    () if *value > 0.0 => "neighbours part",
+                    () if value == f64::NEG_INFINITY => "sliding takes this direction away",
+                    () if value.abs() <= *half_width => "not distinguishable from zero",
+                    () if value > 0.0 => "neighbours part",
                     () => "neighbours approach",
                 };
                 let mean =
                     if i == 0 { format!("; mean over t = {from} to {until}, 95 % interval") } else { String::new() };
-                text += &format!("{value:.6} +- {error:.1e} per unit time ({meaning}{mean})\n");
+                text += &format!("{value:.6} +- {half_width:.1e} per unit time ({meaning}{mean})\n");
             }
             text.into_bytes()
         }

@@ -14,9 +14,8 @@ use crate::cli::progress::Progress;
 use crate::cli::speak::{Delivery, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::hybrid::motion::Record;
-use crate::hybrid::motion::tangent::{Return, closed_orbit};
-use crate::hybrid::{Options, follow};
-use crate::job::general::GeneralRun;
+use crate::hybrid::motion::tangent::Return;
+use crate::job::general::{GeneralOrbit, GeneralRun};
 use crate::job::orbit::Along;
 use crate::job::rest::{Rest, Stability as RestStability};
 use crate::job::spec::Observation;
@@ -192,47 +191,39 @@ fn of_general(arguments: &Arguments, mut run: GeneralRun) -> Result<Exit, CliErr
         return Err(CliError::Usage("--format csv: of a general system's orbit give text or json".into()));
     }
     try_delivery(out)?;
-    // The phase of a drive is kept: whole periods.
-    let settle = match after {
-        Return::Period(period) => (settle / period).ceil() * period,
-        Return::Crossings(_) => settle,
-    };
-    if settle > 0.0 {
-        let t_end = run.options.t_start + settle;
-        let settling = Options { t_end, record: Record::Times { every: f64::INFINITY }, ..run.options.clone() };
-        let end = follow(&run.model, &settling, &mut |_| true).map_err(general::failed)?;
-        run.options.start = Some(end.x);
-    }
     run.options.t_end = run.options.t_start + arguments.longest_return;
-    let found = closed_orbit(&run.model, &run.options, &after).map_err(general::failed)?;
-    let largest = found.multipliers.first().map_or(0.0, |[re, im]| (re * re + im * im).sqrt());
-    let names = run.model.coordinates();
-    let bytes = match format {
-        Format::Json => {
-            let about = json!({ "kind": "general-orbit", "question": run.json() });
-            let value = json!({
-                "about": about, "states": names, "point": found.x, "period": found.period,
-                "multipliers": found.multipliers, "gap": found.gap,
-            });
-            let mut bytes = serde_json::to_vec_pretty(&value).expect("plain data: string keys, no failing serialisers");
-            bytes.push(b'\n');
-            bytes
+    let question = GeneralOrbit { run, settle, after };
+    let progress = Progress::with_grace(arguments.delivery.quiet);
+    let answer = match Executor::new(None, &progress).ask(&question) {
+        Err(JobError::Interrupted) if progress.asked_to_stop().is_some() => {
+            let exit = progress.asked_to_stop().unwrap_or(Exit::Interrupted);
+            return Err(CliError::Stopped { said: "interrupted before an orbit was found".into(), exit });
         }
+        other => other?,
+    };
+    let fact = |e| CliError::Job(JobError::Fact(e));
+    let multipliers: Vec<[f64; 2]> = answer.fact("multipliers").map_err(fact)?;
+    let point: Vec<f64> = answer.fact("point").map_err(fact)?;
+    let (period, gap): (f64, f64) = (answer.fact("period").map_err(fact)?, answer.fact("gap").map_err(fact)?);
+    let largest = multipliers.first().map_or(0.0, |[re, im]| (re * re + im * im).sqrt());
+    let names = question.run.model.coordinates();
+    let bytes = match format {
+        Format::Json => encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() })),
         _ => {
             let mut text = String::new();
             let mut line = |label: &str, what: String| {
                 let _ = writeln!(text, "{label:<13} {what}");
             };
-            line("period", format!("{}", found.period));
-            line("point", names.iter().zip(&found.x).map(|(n, x)| format!("{n} = {x}")).collect::<Vec<_>>().join(", "));
-            line("multipliers", complex(&found.multipliers));
+            line("period", format!("{period}"));
+            line("point", names.iter().zip(&point).map(|(n, x)| format!("{n} = {x}")).collect::<Vec<_>>().join(", "));
+            line("multipliers", complex(&multipliers));
             let stability = match () {
                 () if (largest - 1.0).abs() < 1e-6 => "neutral: a multiplier is on the unit circle within its error",
                 () if largest < 1.0 => "attracts",
                 () => "repels",
             };
             line("stability", stability.into());
-            line("closed to", format!("{:.1e} of the largest state", found.gap));
+            line("closed to", format!("{gap:.1e} of the largest state"));
             text.into_bytes()
         }
     };

@@ -230,8 +230,7 @@ fn draw_general(arguments: &Arguments, mut run: GeneralRun, format: Format) -> R
     plot::axes(&frame, look.kind, &look.axes).map_err(unsuitable)?;
     try_delivery(Some(&arguments.out))?;
     let progress = Progress::new(arguments.quiet);
-    let reached = |_: f64| progress.asked_to_stop().is_none();
-    let answer = run.compute(&reached).map_err(general::failed)?;
+    let answer = Executor::new(None, &progress).ask(&run)?;
     let mut small_print = vec![format!(
         "*t* = {} … {}, event-driven, {}, rtol {}",
         number(run.options.t_start),

@@ -5,8 +5,8 @@ use serde_json::json;
 use crate::cli::general;
 use crate::cli::speak::{Delivery, deliver, try_delivery};
 use crate::cli::{CliError, Exit, ending};
-use crate::hybrid::rests::{Place, Rest, RestError, rests};
-use crate::job::JobError;
+use crate::job::general::{GeneralRests, Resting, Standing};
+use crate::job::{Executor, JobError, Question, encode};
 
 /// Find the rests of a system in a box: equilibria of its fields and pseudo-equilibria on its switching surfaces, with eigenvalues and stability.
 ///
@@ -57,48 +57,29 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let out = arguments.delivery.out.as_deref();
     let format = ending::format(out, arguments.format, Format::Text)?;
     try_delivery(out)?;
-    let found = rests(&model, &within).map_err(|error| match error {
-        RestError::Driven => CliError::Job(JobError::Other(error.to_string())),
-        other => CliError::Usage(other.to_string()),
-    })?;
-    let modes = model.definition().modes();
+    let question = GeneralRests { model, within };
+    let answer = Executor::quiet().ask(&question)?;
+    let names = question.model.coordinates();
+    let several = question.model.definition().modes().len() > 1;
     let bytes = match format {
         Format::Text => {
-            let lines: Vec<String> =
-                found.iter().map(|rest| line(rest, &names, modes.len() > 1, &modes[rest.mode].name)).collect();
+            let found: Vec<Resting> = answer.fact("rests").map_err(JobError::from)?;
+            let lines: Vec<String> = found.iter().map(|rest| line(rest, &names, several)).collect();
             let none = "no rest was found in the box (--within)".to_owned();
             format!("{}\n", if lines.is_empty() { none } else { lines.join("\n") }).into_bytes()
         }
-        Format::Json => {
-            let list: Vec<_> = found
-                .iter()
-                .map(|rest| {
-                    let place = match &rest.place {
-                        Place::Field => json!("field"),
-                        Place::Surface { surface, weight, attracting } => {
-                            json!({ "surface": surface, "weight": weight, "attracting": attracting })
-                        }
-                    };
-                    json!({ "state": rest.x, "mode": modes[rest.mode].name, "place": place, "eigenvalues": rest.eigenvalues, "kind": rest.kind() })
-                })
-                .collect();
-            let about = json!({ "system": model.json(), "within": within });
-            let mut bytes = serde_json::to_vec_pretty(&json!({ "about": about, "states": names, "rests": list }))
-                .expect("plain data");
-            bytes.push(b'\n');
-            bytes
-        }
+        Format::Json => encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() })),
     };
     deliver(out, &bytes)?;
     Ok(Exit::Fine)
 }
 
-fn line(rest: &Rest, names: &[&str], with_mode: bool, mode: &str) -> String {
-    let state: Vec<String> = names.iter().zip(&rest.x).map(|(n, v)| format!("{n} = {v}")).collect();
-    let mode = if with_mode { format!(", mode {mode}") } else { String::new() };
+fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
+    let state: Vec<String> = names.iter().zip(&rest.state).map(|(n, v)| format!("{n} = {v}")).collect();
+    let mode = if with_mode { format!(", mode {}", rest.mode) } else { String::new() };
     let place = match &rest.place {
-        Place::Field => "equilibrium".to_owned(),
-        Place::Surface { surface, weight, attracting } => {
+        Standing::Field => "equilibrium".to_owned(),
+        Standing::Surface { surface, weight, attracting } => {
             let moves = if *attracting { "attracts" } else { "repels" };
             format!("pseudo-equilibrium on {surface} = 0, which {moves} (weight {weight})")
         }
@@ -113,5 +94,5 @@ fn line(rest: &Rest, names: &[&str], with_mode: bool, mode: &str) -> String {
         })
         .collect();
     let values = if values.is_empty() { String::new() } else { format!("; eigenvalues {}", values.join(", ")) };
-    format!("{place}{mode}: {}; {}{values}", state.join(", "), rest.kind())
+    format!("{place}{mode}: {}; {}{values}", state.join(", "), rest.kind)
 }

@@ -93,18 +93,17 @@ fn general_run(arguments: &Arguments, run: &GeneralRun) -> Result<Exit, CliError
     try_delivery(out)?;
     let progress = Progress::with_grace(arguments.delivery.quiet);
     let title = run.model.definition().title();
+    if let Format::Json = format {
+        let answer = Executor::new(None, &progress).ask(run)?;
+        let bytes = encode::json(&answer, &run.about());
+        let stopped = if answer.stop == Stop::Interrupted { progress.asked_to_stop() } else { None };
+        return deliver_whole_or_part(&answer, &bytes, out, stopped).map(|()| said_how_it_ended(&answer));
+    }
     let watch = job::Progress::begin(&progress, if title.is_empty() { "run" } else { title }, run.options.t_end);
     let reached = |t: f64| {
         watch.reached(t);
         progress.asked_to_stop().is_none()
     };
-    if let Format::Json = format {
-        let answer = run.compute(&reached).map_err(general::failed)?;
-        watch.done(&format!("{} rows", answer.rows()));
-        let bytes = encode::json(&answer, &run.about());
-        let stopped = if answer.stop == Stop::Interrupted { progress.asked_to_stop() } else { None };
-        return deliver_whole_or_part(&answer, &bytes, out, stopped).map(|()| said_how_it_ended(&answer));
-    }
     let file = out.filter(|f| !is_standard_output(f));
     let mut rows = match file {
         Some(file) => Rows::File(Growing::begin(file)?),
