@@ -12,7 +12,7 @@ use nalgebra::{SVector, vector};
 use serde_json::{Value, json};
 use twofold::analyse::attractor::{Question, SectionPoint, Thresholds, classify};
 use twofold::analyse::{Crossing, Direction};
-use twofold::integrate::delay::{Delayed, DelayedSwitch, History, Own, Sides};
+use twofold::integrate::delay::{Delayed, History, LateSwitch, Own, Sides};
 use twofold::integrate::roots::CrossingFinder;
 use twofold::integrate::{Dopri5, Failure, Method, Schedule, Stepper, Tolerance, WithStepper};
 use twofold::job::recording::Data;
@@ -216,7 +216,7 @@ fn passages(reading: Reading, rule: Rule, number: u64) -> Result<Passed, Box<dyn
         let beyond = beyond * scale(rule);
         match (delay(rule), relaxation(rule)) {
             (Some(delay), _) => {
-                let switch = DelayedSwitch { delay, smooth: None, history: History::Constant };
+                let switch = LateSwitch::Delayed { delay, smooth: None, history: History::Constant };
                 let delayed = Delayed { sides: Sides::new(&caricature, &data), switch, x0 };
                 delayed.with_stepper(Method::Taylor, None, TOLERANCE, Late(&mut passed, x0, beyond))??;
             }

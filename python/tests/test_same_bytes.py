@@ -34,6 +34,10 @@ RUNS = {
         ["--t-end", "10", "--switch", "delayed", "--delay", "0.02", "--eps", "0.01", "--transition", "erf", "--method", "radau5"],
         dict(switch="delayed", delay=0.02, eps=0.01, transition="erf", method="radau5"),
     ),
+    "relay": (
+        ["--t-end", "30", "--switch", "relay", "--band", "0.3", "--inside", "minus", "--section", "y=0"],
+        dict(switch="relay", band=0.3, inside="minus", plane="y=0"),
+    ),
     "perturbed": (["--t-end", "30", "--method", "dopri5", "--sigma", "0.1"], dict(sigma=0.1)),
     "arctan": (["--t-end", "30", "--method", "dopri5", "--transition", "arctan"], dict(transition="arctan")),
     "times": (["--t-end", "30", "--method", "dopri5", "--every", "0.5"], dict(every=0.5)),

@@ -105,6 +105,8 @@ def _spec(
     switch: str = "smoothed",
     delay: Optional[float] = None,
     history: Optional[str] = None,
+    band: Optional[float] = None,
+    inside: Optional[str] = None,
     eps: Optional[float] = None,
     transition: Optional[str] = None,
     sigma: Optional[float] = None,
@@ -152,6 +154,8 @@ def _spec(
         shape = {"perturbed-tanh": {"sigma": _finite("sigma", sigma)}}
     if switch != "delayed":
         _refuse({"delay": delay, "history": history}, 'it belongs to switch="delayed"')
+    if switch != "relay":
+        _refuse({"band": band, "inside": inside}, 'it belongs to switch="relay"')
     model: Any
     if switch == "smoothed":
         _refuse(of_hysteresis, 'it belongs to switch="hysteretic"')
@@ -167,6 +171,14 @@ def _spec(
             _refuse(of_smoothing, "the sharp delayed switch has no transition; give eps, too")
         else:
             model["delayed"].update(eps=width, transition=shape)
+    elif switch == "relay":
+        _refuse({"eps": eps}, "a relay has a band and no eps")
+        _refuse(of_smoothing, 'it belongs to switch="smoothed"')
+        _refuse(of_hysteresis, 'it belongs to switch="hysteretic"')
+        _refuse(of_filippov, 'it belongs to switch="filippov"')
+        if band is None:
+            raise SpecError('switch="relay" needs its band: give half its width, such as band=1e-3', "band")
+        model = {"relay": {"band": _finite("band", band), "inside": inside or "sign"}}
     elif switch == "hysteretic":
         _refuse(of_smoothing, 'it belongs to switch="smoothed"')
         _refuse(of_filippov, 'it belongs to switch="filippov"')
@@ -176,7 +188,7 @@ def _spec(
         _refuse({"eps": eps}, "the discontinuous system has no eps")
         _refuse(of_smoothing, 'it belongs to switch="smoothed"')
         _refuse(of_hysteresis, 'it belongs to switch="hysteretic"')
-        _refuse({"restart": restart, "kick_every": kick_every, **kicks}, "restarts and kicks belong to smoothed, hysteretic and delayed runs")
+        _refuse({"restart": restart, "kick_every": kick_every, **kicks}, "restarts and kicks belong to the other switches' runs")
         if funnel is not None:
             _refuse({"plus_probability": plus_probability, "seed": seed, "stream": stream}, "nothing in a funnel is random")
             model = {"filippov": {"exit": "all", "funnel": funnel}}
@@ -189,7 +201,7 @@ def _spec(
         else:
             model = {"filippov": {"exit": _exit(exit, plus_probability, seed, stream)}}
     else:
-        raise SpecError(f'switch is {switch!r}: give "smoothed", "hysteretic", "delayed" or "filippov"', "switch")
+        raise SpecError(f'switch is {switch!r}: give "smoothed", "hysteretic", "delayed", "relay" or "filippov"', "switch")
     kick = None
     if switch != "filippov":
         if kick_every is None:
@@ -582,6 +594,8 @@ def solve(
     switch: str = "smoothed",
     delay: Optional[float] = None,
     history: Optional[str] = None,
+    band: Optional[float] = None,
+    inside: Optional[str] = None,
     eps: Optional[float] = None,
     transition: Optional[str] = None,
     sigma: Optional[float] = None,
@@ -616,14 +630,19 @@ def solve(
         Initial state; without it the one that the system suggests.
     t_end : float
         Final time, in the system's unit of time.
-    switch : {"smoothed", "hysteretic", "delayed", "filippov"}
+    switch : {"smoothed", "hysteretic", "delayed", "relay", "filippov"}
         What stands in for the discontinuity at h = 0: a smooth transition of width ``eps``; a loop of half-width ``eps`` with a state of its
-        own; a switch that acts late, on h(x(t - delay)); or nothing: the discontinuous system, in Filippov's sense, event by event.
+        own; a switch that acts late, on h(x(t - delay)); a relay with memory, f+ until h falls to -band, then f- until it rises to
+        band; or nothing: the discontinuous system, in Filippov's sense, event by event.
     delay : float
         Delay of a delayed switch, in units of time.
     history : {"constant", "flow"}
         Where the orbit was before the start of a run with a delayed switch: at the start, or on the orbit without delay that leads
         there [default "constant"].
+    band : float
+        Half the width of a relay's band, in units of h.
+    inside : {"sign", "plus", "minus"}
+        What a relay begins with where the start lies inside its band: f+ if h > 0 and f- otherwise, f+, or f- [default "sign"].
     eps : float
         Width of the layer, in units of h [default 1e-3; of a delayed switch none, which is the sharp rule].
     transition : {"tanh", "arctan", "algebraic", "erf"}
@@ -640,8 +659,8 @@ def solve(
     plus_probability : float
         Probability of leaving to h > 0 under a random exit [default 0.5].
     method : {"dopri5", "lsoda", "radau5", "taylor", "taylor-extended", "layered"}
-        Integration method. Filippov motion is integrated by dopri5, a sharp delayed switch by dopri5, taylor or
-        taylor-extended, a smooth one by dopri5 or radau5.
+        Integration method. Filippov motion is integrated by dopri5, a sharp delayed switch and a relay by dopri5,
+        taylor or taylor-extended, a smooth delayed switch by dopri5 or radau5.
     rtol, atol : float
         Tolerances of a step's local error [default 10^-7.97727, NDSolve's; 1e-32 for taylor-extended, or what ``precision`` allows].
     max_step : float

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 
 use super::CliError;
-use super::words::{History, KickLaw, Method, Reading, Relaxation, Transition};
+use super::words::{History, Inside, KickLaw, Method, Reading, Relaxation, Transition};
 use crate::integrate;
 use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use crate::integrate::{Kick, Schedule, StepCap, Tolerance};
@@ -55,6 +55,12 @@ pub struct RunFlags {
     /// Where the orbit was before the start of a run with a delayed switch [default: constant].
     #[arg(long, value_enum, help_heading = "System")]
     pub history: Option<History>,
+    /// Half the width of a relay's band.
+    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    pub band: Option<f64>,
+    /// What a relay begins with where the start lies inside its band [default: sign].
+    #[arg(long, value_enum, help_heading = "System")]
+    pub inside: Option<Inside>,
     /// Width of the layer of a smoothed switch, or half the band of a hysteretic one [default: 0.001; with --switch delayed none, which is the sharp rule].
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub eps: Option<f64>,
@@ -79,7 +85,7 @@ pub struct RunFlags {
     /// Final time [default: 150; of an exponent 10000].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub t_end: Option<f64>,
-    /// Integration method [default: lsoda; dopri5 with --switch filippov or delayed].
+    /// Integration method [default: lsoda; dopri5 with --switch filippov, delayed or relay].
     #[arg(long, value_enum, help_heading = "Method")]
     pub method: Option<Method>,
     /// Relative tolerance [default: 10^-7.97727, NDSolve's; with taylor-extended 1e-32 or what --precision allows; of exponents 1e-9, of closed orbits 1e-11].
@@ -165,6 +171,8 @@ pub enum Switch {
     Hysteretic,
     /// f+ while h(x(t - delay)) > 0; smooth with --eps.
     Delayed,
+    /// A relay with memory: f+ until h falls to -band, then f- until it rises to band.
+    Relay,
     /// The discontinuous system itself.
     Filippov,
 }
@@ -260,15 +268,16 @@ const OF_THE_CARICATURE: &str = "it belongs to the caricature, and --set NAME=VA
 const OF_FUNNELS: &str =
     "it describes the futures that --switch filippov --exit all follows; leave it out, or follow them";
 const OF_RANDOM: &str = "nothing in this run is random; leave it out, or give --kick-every or a random --exit";
-const NOT_FILIPPOV: &str = "restarts and kicks belong to smoothed, hysteretic and delayed runs (kicks to exponents, too); leave it out, or choose another --switch";
+const NOT_FILIPPOV: &str = "restarts and kicks belong to the other switches' runs (kicks to exponents, too); leave it out, or choose another --switch";
 const OF_DELAYS: &str = "it belongs to the delayed switch; leave it out, or use --switch delayed";
+const OF_RELAYS: &str = "it belongs to the relay; leave it out, or use --switch relay";
 const OF_ORBITS: &str = "a closed orbit's steps are chosen by its tolerance alone; leave it out";
 const OF_EXTENDED: &str =
     "other methods compute in f64, and choose their order; leave it out, or use --method taylor-extended";
 const OF_KICKS: &str = "there are no kicks; leave it out, or give --kick-every";
 
 /// The table. Every flag of [`RunFlags`] but --spec stands in it once.
-const EFFECTS: [Effect; 41] = {
+const EFFECTS: [Effect; 43] = {
     const fn always(flag: &'static str, given: fn(&RunFlags) -> bool) -> Effect {
         Effect { flag, given, works: |_, _| true, why: "" }
     }
@@ -299,11 +308,13 @@ const EFFECTS: [Effect; 41] = {
         when("--v-minus", |f| f.v_minus.is_some(), |f, _| f.caricature() && !f.sets("v_minus"), OF_THE_CARICATURE),
         when("--delay", |f| f.delay.is_some(), |f, _| f.switch() == Switch::Delayed, OF_DELAYS),
         when("--history", |f| f.history.is_some(), |f, _| f.switch() == Switch::Delayed, OF_DELAYS),
+        when("--band", |f| f.band.is_some(), |f, _| f.switch() == Switch::Relay, OF_RELAYS),
+        when("--inside", |f| f.inside.is_some(), |f, _| f.switch() == Switch::Relay, OF_RELAYS),
         when(
             "--eps",
             |f| f.eps.is_some(),
-            |f, _| !f.filippov(),
-            "the discontinuous system has no eps; leave it out, or choose another --switch",
+            |f, _| !matches!(f.switch(), Switch::Filippov | Switch::Relay),
+            "the discontinuous system and the relay have no eps; leave it out, or choose another --switch",
         ),
         when(
             "--transition",
@@ -449,10 +460,16 @@ enum Misuse {
     NoTangentFlow,
     #[error("--switch delayed needs its delay: give one by --delay, such as --delay 0.001")]
     NoDelay,
+    #[error("--switch relay needs its band: give half its width by --band, such as --band 0.001")]
+    NoBand,
     #[error(
         "--switch delayed: the state is the whole past, of which neither closed orbits nor exponents are computed; follow a long run (twofold run, twofold sweep), or give another --switch"
     )]
     Past,
+    #[error(
+        "--switch relay: the state has a mode beside it, with which neither closed orbits nor exponents are computed; follow a long run (twofold run, twofold sweep), or give another --switch"
+    )]
+    Mode,
     #[error(
         "--system {system}: a general system (f, events, modes or tables) is taken by `twofold run`, `plot`, `orbit`, `lyapunov` and `rests`; this command needs one with h, plus and minus"
     )]
@@ -616,6 +633,11 @@ impl RunFlags {
                 transition: self.eps.map(|_| transition),
                 history: self.history.map(Into::into).unwrap_or_default(),
             },
+            Switch::Relay if !command.is_a_run() => return Err(Misuse::Mode),
+            Switch::Relay => SwitchSpec::Relay {
+                band: self.band.ok_or(Misuse::NoBand)?,
+                inside: self.inside.map(Into::into).unwrap_or_default(),
+            },
             Switch::Filippov if command == Use::Exponent => return Err(Misuse::NoTangentFlow),
             Switch::Filippov => {
                 let exit = self.exit_rule()?;
@@ -640,7 +662,7 @@ impl RunFlags {
             }
             Some(numbers) => numbers.clone(),
         };
-        let by_events = matches!(self.switch(), Switch::Delayed | Switch::Filippov);
+        let by_events = matches!(self.switch(), Switch::Delayed | Switch::Relay | Switch::Filippov);
         let method = self.method.unwrap_or(if by_events { Method::Dopri5 } else { Method::Lsoda });
         let mut defaults = MethodSpec::defaults(integrate::Method::from(method));
         if let Some(bits) = self.precision {
@@ -812,10 +834,10 @@ mod tests {
 
     /// Every flag with a value that no default has and that every run allows on which the flag has an effect; several, if
     /// none differs from every default.
-    const SAMPLES: [(&str, &[&str]); 41] = [
+    const SAMPLES: [(&str, &[&str]); 43] = [
         ("--system", &["wheel", "two-fold"]),
         ("--set", &["alpha=0.3", "omega0=1.1"]),
-        ("--switch", &["smoothed", "hysteretic", "delayed", "filippov"]),
+        ("--switch", &["smoothed", "hysteretic", "delayed", "relay", "filippov"]),
         ("--reading", &["reconstructed"]),
         ("--alpha", &["0.01"]),
         ("--beta", &["0.02"]),
@@ -823,6 +845,8 @@ mod tests {
         ("--v-minus", &["-1.5"]),
         ("--delay", &["0.05"]),
         ("--history", &["flow"]),
+        ("--band", &["0.4"]),
+        ("--inside", &["minus"]),
         ("--eps", &["0.002"]),
         ("--transition", &["arctan"]),
         ("--sigma", &["0.1"]),
@@ -867,6 +891,7 @@ mod tests {
                 vec!["--switch", "hysteretic", "--kick-every", "0.3"],
                 vec!["--switch", "delayed", "--delay", "0.02"],
                 vec!["--switch", "delayed", "--delay", "0.02", "--eps", "0.01"],
+                vec!["--switch", "relay", "--band", "0.3"],
                 vec!["--switch", "filippov", "--exit", "after-time:0.3:minus"],
                 vec!["--switch", "filippov", "--exit", "random:exponential:0.5"],
                 vec!["--switch", "filippov", "--exit", "all"],
@@ -912,11 +937,11 @@ mod tests {
                             kind.contains(&"all") || kind.contains(&"--every") || !kind.contains(&"--exit")
                         }
                         Use::Orbit => {
-                            let other = ["--kick-every", "--exit", "delayed"];
+                            let other = ["--kick-every", "--exit", "delayed", "relay"];
                             !kind.contains(&"--section") || kind.iter().any(|k| other.contains(k))
                         }
                         Use::Exponent => {
-                            kind.iter().any(|k| ["filippov", "delayed", "--section", "--every"].contains(k))
+                            kind.iter().any(|k| ["filippov", "delayed", "relay", "--section", "--every"].contains(k))
                         }
                     };
                     assert!(fine, "{command:?} {kind:?}");
@@ -965,6 +990,7 @@ mod tests {
             "eps=0.01,0.02",
             "eps-prime=0.01,0.02",
             "delay=0.01,0.02",
+            "band=0.25,0.35",
             "sigma=0.3,0.4",
             "kick-every=1,2",
             "kick-size=1,2",

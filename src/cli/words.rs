@@ -65,6 +65,18 @@ mirror! {
 }
 
 mirror! {
+    /// What a relay begins with inside its band.
+    Inside = integrate::delay::Inside {
+        /// f+ where h > 0, f- otherwise.
+        Sign,
+        /// f+.
+        Plus,
+        /// f-.
+        Minus,
+    }
+}
+
+mirror! {
     /// The law of a kick of size s.
     KickLaw = integrate::KickLaw {
         /// Length exactly s, direction uniform on the sphere.

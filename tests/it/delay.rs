@@ -1,4 +1,4 @@
-//! The delayed switch against programs that share nothing with this one but the equations.
+//! Switches with a past, delayed ones and relays, against formulas and against programs that share nothing with this one but the equations.
 
 #[allow(dead_code)] // the examples' own main functions
 #[path = "../../examples/delay_growth.rs"]
@@ -13,16 +13,17 @@ use crate::claims::Reads;
 use twofold::analyse::delay::LateRule;
 use twofold::analyse::passage::Predicted;
 use twofold::analyse::{Crossing, Direction};
-use twofold::integrate::delay::History;
+use twofold::integrate::delay::{History, Inside};
 use twofold::integrate::{Kick, KickLaw, Schedule, StepCap, Tolerance};
 use twofold::job::recording::Data;
 use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::job::{Executor, Run};
+use twofold::num::elementary::ln;
 use twofold::paper::claims::claims;
 use twofold::paper::similarity::{Rule, Similar, WAYS};
 use twofold::paper::{Reading, figures};
-use twofold::system::{Caricature, Transition};
+use twofold::system::{Caricature, Definition, System, Transition};
 
 fn spec(alpha: f64, switch: SwitchSpec, method: Method, tolerance: f64, t_end: f64) -> RunSpec {
     RunSpec {
@@ -139,6 +140,7 @@ fn an_answer_is_its_questions() {
 fn kicks_and_restarts_are_as_with_other_switches() {
     for switch in [
         SwitchSpec::delayed(1e-2),
+        SwitchSpec::relay(1e-2),
         SwitchSpec::Delayed {
             delay: 1e-2,
             eps: Some(1e-2),
@@ -155,6 +157,53 @@ fn kicks_and_restarts_are_as_with_other_switches() {
         let c = simulate(&kicked, &()).unwrap();
         assert!((0..3).any(|i| (a.x[i] - c.x[i]).abs() > 1e-3) && c.x.iter().all(|x| x.abs() < 5.0), "{:?}", c.x);
     }
+}
+
+/// The thermostat of systems/general/relay-hysteresis.toml, as a relay: the period that its file states.
+#[test]
+fn a_thermostat_has_its_period() {
+    let text = "states = ['T']\nh = 'T - 20'\nplus = ['0.1*(10 - T)']\nminus = ['0.1*(30 - T)']";
+    let system = System::new(Definition::from_toml(text, "").unwrap());
+    let period = 2.0 * ln(12.0 / 8.0) / 0.1;
+    for (method, tolerance) in [(Method::Dopri5, 1e-12), (Method::Taylor, 1e-15), (Method::TaylorExtended, 1e-30)] {
+        let observe = Observation::Section { coordinate: 0, value: 20.0 };
+        let run = spec(1e-1, SwitchSpec::relay(2.0), method, tolerance, 50.0);
+        let run = RunSpec { system: system.clone(), start: vec![18.0], observe, ..run };
+        let answer = Executor::quiet().ask(&Run(run)).unwrap();
+        let table = answer.table("section").unwrap();
+        let t = table.numbers("t");
+        assert!(t.len() > 9 && t.windows(3).all(|t| (t[2] - t[0] - period).abs() < 1e-9), "{method:?}: {t:?} {period}");
+    }
+}
+
+/// The same bytes as plain data; the answer says what was chosen inside the band, and what that came to.
+#[test]
+fn a_relays_answer_names_its_beginning() {
+    let begins = |switch: SwitchSpec| {
+        let run = spec(1e-1, switch, Method::Dopri5, 1e-9, 1.0);
+        let json = serde_json::to_string(&run).unwrap();
+        assert_eq!(serde_json::from_str::<RunSpec>(&json).unwrap(), run);
+        let answer = Executor::quiet().ask(&Run(run)).unwrap();
+        [answer.fact::<String>("inside").unwrap(), answer.fact::<String>("begins").unwrap()]
+    };
+    assert_eq!(begins(SwitchSpec::relay(1e-3)), ["sign", "plus"]);
+    assert_eq!(begins(SwitchSpec::Relay { band: 0.3, inside: Inside::Minus }), ["minus", "minus"]);
+    let json = serde_json::to_value(SwitchSpec::relay(0.25)).unwrap();
+    assert_eq!(json, serde_json::json!({ "relay": { "band": 0.25, "inside": "sign" } }));
+}
+
+/// A band that narrows: the mean of the chatter tends to Filippov's motion, linearly.
+#[test]
+fn a_relays_mean_tends_to_filippovs_motion() {
+    let at = |switch, tolerance| simulate(&spec(1e-1, switch, Method::Dopri5, tolerance, 9.0), &()).unwrap().x;
+    let exit = twofold::integrate::filippov::ExitRule::Undecided;
+    let limit = at(SwitchSpec::Filippov { exit, funnel: None }, 1e-11);
+    let apart = [1e-2, 2.5e-3, 6.25e-4].map(|band| {
+        let x = at(SwitchSpec::relay(band), 1e-9);
+        assert!(x[0].abs() < 1.001 * band, "outside the band: {x:?}");
+        (x[1] - limit[1]).abs()
+    });
+    assert!(apart[2] < 2e-3 && apart[2] < 0.5 * apart[0], "{apart:?}");
 }
 
 /// While it slides at t = 9, without a choice before: the mean of the chatter is Filippov's motion, up to the delay's first power.
@@ -266,17 +315,55 @@ fn the_effect_is_in_some_ways_similar_to_hysteresis() {
     );
 }
 
+/// The exit code and what was said.
+fn told(base: &[&str], arguments: &str) -> (Option<i32>, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_twofold"))
+        .args(base.iter().copied().chain(arguments.split_whitespace()))
+        .output()
+        .unwrap();
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// The same of a relay; and what cannot follow one says so.
+#[test]
+fn a_relay_is_refused_by_name_where_it_cannot_be_followed() {
+    for (command, arguments, word) in [
+        ("run", "", "--band"),
+        ("run", "--band 0", "above zero"),
+        ("run", "--band nan", "finite"),
+        ("run", "--band 0.1 --inside plus", "outside the band"),
+        ("run", "--band 0.1 --method lsoda", "dopri5, taylor or taylor-extended"),
+        ("run", "--band 0.1 --eps 0.1", "--eps"),
+        ("run", "--band 0.1 --delay 0.1", "--delay"),
+        ("run", "--band 0.1 --history flow", "--history"),
+        ("run", "--band 0.1 --system relay-square --start=1,1", "one switching surface"),
+        ("orbit", "--band 0.1 --section y=0", "--switch relay"),
+        ("lyapunov", "--band 0.1", "--switch relay"),
+    ] {
+        let t_end: &[&str] = if command == "orbit" { &[] } else { &["--t-end", "1"] };
+        let base = [&[command, "--switch", "relay"], t_end].concat();
+        let (code, said) = told(&base, arguments);
+        assert!(code == Some(2) && said.contains(word), "{command} {arguments}: {code:?} {said}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let out = |name: &str| folder.path().join(name).display().to_string();
+    let relay = ["--switch", "relay", "--band", "0.01", "--t-end", "3", "--quiet"];
+    for (command, more) in [
+        ("run", vec!["--kick-every", "0.5", "--kick-size", "0.02", "--restart", "0.7", "--out", "-"]),
+        ("plot", vec!["--out", &out("relay.png")]),
+        ("sweep", vec!["--over", "band=1e-2,2e-2", "--out", &out("relay.csv")]),
+    ] {
+        let (code, said) = told(&[&[command], &relay[..], &more[..]].concat(), "");
+        assert!(code == Some(0), "{command}: {said}");
+    }
+    let table = std::fs::read_to_string(out("relay.csv")).unwrap();
+    assert!(table.lines().next().unwrap().contains("band") && table.contains("0.02"), "{table}");
+}
+
 /// What is wrong is said before anything is computed, with exit code 2.
 #[test]
 fn wrong_questions_are_refused() {
-    let told = |arguments: &str| {
-        let base = ["run", "--switch", "delayed", "--t-end", "1", "--out", "-"];
-        let output = Command::new(env!("CARGO_BIN_EXE_twofold"))
-            .args(base.iter().copied().chain(arguments.split_whitespace()))
-            .output()
-            .unwrap();
-        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
-    };
+    let told = |arguments: &str| told(&["run", "--switch", "delayed", "--t-end", "1", "--out", "-"], arguments);
     for (arguments, word) in [
         ("", "--delay"),
         ("--delay 0", "above zero"),

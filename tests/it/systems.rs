@@ -45,6 +45,7 @@ fn every_dimension_by_every_switch() {
             // phi starts where h says: below the surface.
             SwitchSpec::Hysteretic { eps: 1e-3, eps_prime: 1e-2, relaxation: Relaxation::Single, phi0: 0.0 },
             SwitchSpec::delayed(1e-2),
+            SwitchSpec::relay(1e-2),
             SwitchSpec::Filippov { exit: ExitRule::AtOnce { side: Side::Plus }, funnel: None },
         ];
         for switch in switches {

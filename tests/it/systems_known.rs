@@ -211,24 +211,26 @@ fn friction_pair_loses_amplitude_linearly_and_sticks() {
     assert!((end[0] - end[2] - (x[0] - x[2])).abs() < 1e-9 && (end[1] - end[3]).abs() < 1e-9, "{end:?}");
 }
 
+/// Where three lags are as the relay turns to -1 in a symmetric cycle of half period h, from the output: x(h) = E x + (1 - E)(-1, -1, -1) with
+/// E = e^(A h), and x(h) = -x.
+fn lags_start(h: f64) -> [f64; 3] {
+    let e = (-h).exp();
+    // e^(A h) of three equal lags, A = -1 + shift.
+    let matrix = [[e, e * h, 0.5 * e * h * h], [0.0, e, e * h], [0.0, 0.0, e]];
+    // (1 + E) x = (1 - E)(1, 1, 1), from the last row up.
+    let mut x = [0.0; 3];
+    for i in (0..3).rev() {
+        let driven = 1.0 - matrix[i].iter().sum::<f64>();
+        let known: f64 = (i + 1..3).map(|j| matrix[i][j] * x[j]).sum();
+        x[i] = (driven - known) / (1.0 + matrix[i][i]);
+    }
+    x
+}
+
 /// Tsypkin's condition for a symmetric limit cycle of half period h: the output of the lags, driven by the relay, is zero where it switches.
 #[test]
 fn relay_third_order_period() {
-    // States from the output: x(h) = E x(0) + (1 - E)(-1, -1, -1), E = e^(A h), and x(h) = -x(0); p(0) = 0.
-    let start = |h: f64| {
-        let e = (-h).exp();
-        // e^(A h) of three equal lags, A = -1 + shift.
-        let matrix = [[e, e * h, 0.5 * e * h * h], [0.0, e, e * h], [0.0, 0.0, e]];
-        // (1 + E) x = (1 - E)(1, 1, 1), from the last row up.
-        let mut x = [0.0; 3];
-        for i in (0..3).rev() {
-            let driven = 1.0 - matrix[i].iter().sum::<f64>();
-            let known: f64 = (i + 1..3).map(|j| matrix[i][j] * x[j]).sum();
-            x[i] = (driven - known) / (1.0 + matrix[i][i]);
-        }
-        x
-    };
-    let half = zero(|h| start(h)[0], 1.0, 3.0);
+    let half = zero(|h| lags_start(h)[0], 1.0, 3.0);
     let s = system("relay-third-order");
     // Through q = 0, which is met in flight.
     let found = ask(&orbit(&s, FILIPPOV, 1, 100.0));
@@ -239,6 +241,24 @@ fn relay_third_order_period() {
     assert!((period - described).abs() > 1e-3 && (period - described).abs() < 0.1, "{period} {described}");
     let modulus: f64 = found.fact("largest_modulus").unwrap();
     assert!(modulus < 0.5, "{modulus}");
+}
+
+/// The same condition with a band: the relay turns where the output is at the band's edge.
+#[test]
+fn relay_third_order_with_a_band_has_its_period() {
+    let s = system("relay-third-order");
+    let mut longer = 0.0;
+    for band in [0.02, 0.1, 0.3] {
+        let half = zero(|h| lags_start(h)[0] - band, 1.0, 9.0);
+        assert!(half > longer, "a wider band, a longer period");
+        longer = half;
+        let answer = run(&s, SwitchSpec::relay(band), 150.0, Observation::Section { coordinate: 1, value: 0.0 });
+        let table = answer.table("section").unwrap();
+        let up: Vec<f64> =
+            table.numbers("t").iter().zip(table.words("direction")).filter(|c| c.1 == "up").map(|c| *c.0).collect();
+        let last = up[up.len() - 1] - up[up.len() - 2];
+        assert!((last - 2.0 * half).abs() < 1e-9, "{band}: {last} {}", 2.0 * half);
+    }
 }
 
 /// Matsumoto, Chua & Komuro (1985): eigenvalues at the rest points as printed there. Sprott (2003): the largest exponent 0.3271. (The

@@ -6,12 +6,12 @@
 
 use nalgebra::SVector;
 
-use twofold_integrate::delay::{DelayError, Delayed, DelayedSwitch, History, Own, Sides};
+use twofold_integrate::delay::{DelayError, Delayed, History, Inside, LateSwitch, Own, Sides};
 use twofold_integrate::roots::CrossingFinder;
-use twofold_integrate::{Failure, Method, Stepper, Taylor, Tolerance, WithStepper};
+use twofold_integrate::{Failure, Method, Stepper, Tolerance, WithStepper};
 use twofold_num::elementary::sqrt;
 use twofold_system::filippov::{gradient, lie_derivatives};
-use twofold_system::{Field, PiecewiseSmooth, System, Transition};
+use twofold_system::{PiecewiseSmooth, System, Transition};
 
 /// When the fields change.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -155,12 +155,14 @@ pub fn late_exit<P: PiecewiseSmooth<3> + Clone>(
 ) -> Result<SVector<f64, 3>, Failure> {
     let x0 = SVector::from(question.start) + at_start;
     let follow = Follow { system, question, x0, kick: at_kick };
-    let (delay, smooth, method, tolerance) = match question.rule {
-        LateRule::Sharp { delay } => (delay, None, Method::Taylor, TOLERANCE),
-        LateRule::Smooth { delay, eps } => (delay, Some((Transition::Tanh, eps)), Method::Dopri5, SMOOTH_TOLERANCE),
-        LateRule::Relay { band } => return follow.with_memory(data, band),
+    let delayed = |delay, smooth| LateSwitch::Delayed { delay, smooth, history: History::Constant };
+    let (switch, method, tolerance) = match question.rule {
+        LateRule::Sharp { delay } => (delayed(delay, None), Method::Taylor, TOLERANCE),
+        LateRule::Smooth { delay, eps } => {
+            (delayed(delay, Some((Transition::Tanh, eps))), Method::Dopri5, SMOOTH_TOLERANCE)
+        }
+        LateRule::Relay { band } => (LateSwitch::Relay { band, inside: Inside::Sign }, Method::Taylor, TOLERANCE),
     };
-    let switch = DelayedSwitch { delay, smooth, history: History::Constant };
     let delayed = Delayed { sides: Sides::new(system, data), switch, x0 };
     delayed.with_stepper(method, None, tolerance, follow).unwrap_or_else(|error| Err(refused(&error)))
 }
@@ -193,58 +195,6 @@ impl<P: PiecewiseSmooth<3>> Follow<'_, P> {
     fn late(&self) -> Failure {
         let why = format!("the orbit does not leave the two-fold until t = {}", self.question.by);
         Failure::NotApplicable { method: Method::Taylor.name(), why }
-    }
-
-    /// Under a relay with memory: the same series, begun anew at each switch.
-    fn with_memory(&self, data: &System, band: f64) -> Result<SVector<f64, 3>, Failure> {
-        let fields = [Field::minus(data).bind::<3>(), Field::plus(data).bind::<3>()];
-        let [Ok(minus), Ok(plus)] = fields else { return Err(self.late()) };
-        let fields = [minus, plus];
-        let mut methods = [Taylor::<3>::new(TOLERANCE), Taylor::<3>::new(TOLERANCE)];
-        let h = |x: &SVector<f64, 3>| self.system.switching(x);
-        let by = self.question.by;
-        let (mut t, mut x, mut passed) = (0.0, self.x0, false);
-        let mut is_plus = h(&x) > 0.0;
-        let (mut passages, mut met) = (CrossingFinder::starting(is_plus), [false; 2]);
-        while t < by {
-            let i = usize::from(is_plus);
-            let (field, method) = (&fields[i], &mut methods[i]);
-            if met[i] {
-                method.restart_again(field, t, x, by, f64::INFINITY)?;
-            } else {
-                method.restart(field, t, x, by, f64::INFINITY)?;
-            }
-            met[i] = true;
-            let edge = if is_plus { -band } else { band };
-            // Of the sign that h has until the switch.
-            let mut switches = CrossingFinder::starting(is_plus);
-            loop {
-                let step = method.step(field)?;
-                let switch = switches.in_step(&step, |x| h(x) - edge).first().copied();
-                let end = switch.map_or(1.0, |switch| switch.theta);
-                for passage in passages.in_step(&step, h).into_iter().filter(|p| p.theta <= end) {
-                    let place = step.at(passage.theta);
-                    if passed && self.is_out(&place) {
-                        return Ok(place);
-                    }
-                }
-                (t, x) = (step.time(end), step.at(end));
-                let turns = !passed && self.repels(&x);
-                if turns {
-                    passed = true;
-                    x += self.kick;
-                }
-                if switch.is_some() {
-                    // What a step would have done beyond the switch is no passage.
-                    passages = CrossingFinder::starting(h(&x) > 0.0);
-                    is_plus = !is_plus;
-                }
-                if switch.is_some() || turns || t >= by {
-                    break;
-                }
-            }
-        }
-        Err(self.late())
     }
 }
 

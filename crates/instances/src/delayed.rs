@@ -1,13 +1,13 @@
-//! Orbits of systems with a delayed switch.
+//! Orbits of systems whose switch depends on the past.
 
 use nalgebra::SVector;
-use twofold_integrate::delay::{DelayError, Delayed, DelayedSwitch, Own, Sides};
+use twofold_integrate::delay::{DelayError, Delayed, LateSwitch, Own, Sides};
 use twofold_integrate::{Failure, Observer, Summary, Watch};
 use twofold_system::{BindError, Bound, Caricature, Compiled, PiecewiseSmooth, System};
 
 use crate::orbit::{How, Waiting};
 
-/// A system of `N` states whose switch may act late.
+/// A system of `N` states whose switch may act late or have a memory.
 pub trait Late<const N: usize> {
     /// The orbit of `x0`; `data` describes this system.
     ///
@@ -16,7 +16,7 @@ pub trait Late<const N: usize> {
     fn late_orbit(
         &self,
         data: &System,
-        switch: DelayedSwitch,
+        switch: LateSwitch,
         x0: SVector<f64, N>,
         how: &How,
         observer: &mut dyn Observer<N>,
@@ -27,7 +27,7 @@ pub trait Late<const N: usize> {
 fn late_orbit<P: PiecewiseSmooth<N> + Clone, const N: usize>(
     system: &P,
     data: &System,
-    switch: DelayedSwitch,
+    switch: LateSwitch,
     x0: SVector<f64, N>,
     how: &How,
     observer: &mut dyn Observer<N>,
@@ -44,7 +44,7 @@ macro_rules! late {
             fn late_orbit(
                 &self,
                 data: &System,
-                switch: DelayedSwitch,
+                switch: LateSwitch,
                 x0: SVector<f64, $n>,
                 how: &How,
                 observer: &mut dyn Observer<$n>,

@@ -7,13 +7,13 @@ use serde_json::Value;
 use super::answer::{Answer, Stop};
 use super::executor::Executor;
 use super::question::{JobError, Question};
+use super::rest::switching;
 use super::spec::SwitchSpec;
 use twofold_analyse::lyapunov::{self, Estimate, Exponent};
 use twofold_analyse::tangent::Tangent;
 use twofold_instances::{Exponents, Growth};
 use twofold_integrate::Watch;
 use twofold_integrate::ensemble::InstructionSet;
-use twofold_num::tape::Program;
 use twofold_system::{BoundField, Compiled, Field, Hysteretic, ParameterBatch, Smoothed, System};
 
 /// The largest Lyapunov exponent of the orbit from `start`. Facts: `exponent` ([`Exponent`]), `half_width` of its 95 % interval and `sign`
@@ -115,7 +115,7 @@ impl LargestExponent {
             (SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. }, _) => {
                 Field::hysteretic(&self.system, eps, eps_prime, relaxation)
             }
-            (SwitchSpec::Delayed { .. }, _) => return Err(DELAYED.into()),
+            (SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. }, _) => return Err(DELAYED.into()),
             (SwitchSpec::Filippov { .. }, _) => return Err("a set-valued motion has no tangent flow".into()),
         };
         let tangent = field.variational(1);
@@ -145,9 +145,7 @@ impl LargestExponent {
 
     /// phi at the start: within its relaxation time of the side that h says.
     fn phi(&self) -> f64 {
-        let mut h = [f64::NAN];
-        Program::new(&self.system.tape().select([0])).evaluate(&self.start, &mut h);
-        if h[0] > 0.0 { 1.0 } else { 0.0 }
+        if switching(&self.system, &self.start) > 0.0 { 1.0 } else { 0.0 }
     }
 }
 

@@ -52,13 +52,20 @@ pub struct ClosedOrbit {
     pub along: Option<Along>,
 }
 
-/// Why closed orbits of a delayed switch are not looked for.
-fn delayed() -> SpecError {
-    SpecError {
-        field: "switch",
-        value: "delayed".into(),
-        rule: "a closed orbit of a delayed switch is a closed path of pasts, which this method does not look for; see what a long run settles on",
-    }
+/// Why closed orbits of a switch that depends on the past are not looked for; none of another.
+fn has_past(switch: SwitchSpec) -> Option<SpecError> {
+    let (value, rule) = match switch {
+        SwitchSpec::Delayed { .. } => (
+            "delayed",
+            "a closed orbit of a delayed switch is a closed path of pasts, which this method does not look for; see what a long run settles on",
+        ),
+        SwitchSpec::Relay { .. } => (
+            "relay",
+            "a closed orbit of a relay with memory has its mode as a state, which this method does not carry; see what a long run settles on",
+        ),
+        _ => return None,
+    };
+    Some(SpecError { field: "switch", value: value.into(), rule })
 }
 
 /// A parameter, and from where to where.
@@ -206,8 +213,8 @@ impl ClosedOrbit {
                 "closed orbits are looked for in systems of 2 to 8 states",
             );
         }
-        if let SwitchSpec::Delayed { .. } = self.switch {
-            return Err(delayed().into());
+        if let Some(refused) = has_past(self.switch) {
+            return Err(refused.into());
         }
         if self.plane.axis >= n {
             return wrong(
@@ -252,7 +259,6 @@ impl ClosedOrbit {
                 SwitchSpec::Hysteretic { eps_prime, relaxation, phi0, .. } if value > 0.0 => {
                     SwitchSpec::Hysteretic { eps: value, eps_prime, relaxation, phi0 }
                 }
-                SwitchSpec::Delayed { .. } => return Err(delayed().into()),
                 SwitchSpec::Filippov { .. } => {
                     return Err(JobError::Other("the discontinuous system has no eps to follow".into()));
                 }
@@ -479,7 +485,7 @@ impl Map<'_> {
                     n => Err(JobError::Other(format!("no closed orbits with {n} states")).into()),
                 };
             }
-            SwitchSpec::Delayed { .. } => return Err(JobError::from(delayed()).into()),
+            SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } => unreachable!("refused by `validate`"),
             SwitchSpec::Smoothed { eps, transition } => Field::smoothed(&system, transition, eps),
             SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. } => {
                 Field::hysteretic(&system, eps, eps_prime, relaxation)

@@ -114,9 +114,9 @@ impl Leaving {
     fn eps(&self) -> Result<f64, JobError> {
         match self.switch {
             SwitchSpec::Smoothed { eps, .. } | SwitchSpec::Hysteretic { eps, .. } => Ok(eps),
-            SwitchSpec::Delayed { .. } => Err(SpecError {
+            SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } => Err(SpecError {
                 field: "switch",
-                value: "delayed".into(),
+                value: if let SwitchSpec::Relay { .. } = self.switch { "relay" } else { "delayed" }.into(),
                 rule: "leaving is measured in units of eps, for smoothed and hysteretic runs",
             }
             .into()),
@@ -185,7 +185,9 @@ impl Question for Leaving {
                 let field = instances::hysteretic(&self.system, eps, eps_prime, relaxation)?;
                 self.each(&*field, eps, |[x, y, z]| vector![x, y, z, phi0])
             }
-            SwitchSpec::Delayed { .. } | SwitchSpec::Filippov { .. } => unreachable!("refused above"),
+            SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } | SwitchSpec::Filippov { .. } => {
+                unreachable!("refused above")
+            }
         }
     }
 }

@@ -12,6 +12,7 @@ use nalgebra::SVector;
 
 use super::answer::{Answer, NoSuchFact, Stop};
 use super::question::JobError;
+use super::rest::switching;
 use super::spec::{RunSpec, SwitchSpec};
 use super::table::{Cells, Column, Entry, Table};
 use crate::record::hash::canonical_json;
@@ -120,6 +121,10 @@ impl<const D: usize> Recording<D> {
                 .with_fact("most_steps_in_segment", &self.most_steps_in_segment);
         match run.switch {
             SwitchSpec::Delayed { history, .. } => answer.with_fact("history", &history),
+            SwitchSpec::Relay { band, inside } => {
+                let plus = inside.begins_with_plus(switching(&run.system, &run.start), band);
+                answer.with_fact("inside", &inside).with_fact("begins", if plus { &Side::Plus } else { &Side::Minus })
+            }
             _ => answer,
         }
     }

@@ -158,7 +158,7 @@ pub(super) fn field(system: &System, switch: SwitchSpec) -> Option<Field> {
 }
 
 /// The value of h.
-fn switching<S: Elementary>(system: &System, x: &[S]) -> S {
+pub(super) fn switching<S: Elementary>(system: &System, x: &[S]) -> S {
     let mut h = [S::from_f64(f64::NAN)];
     Program::new(&system.tape().select([0])).evaluate(x, &mut h);
     let [h] = h;

@@ -10,7 +10,8 @@ use super::spec::{Method, RunSpec, SwitchSpec};
 use twofold_integrate::Watch;
 
 /// A run, and what is recorded of it: see [`Recording`](super::Recording) for the answer's tables. Facts: `t` and `state` at the end,
-/// `most_steps_in_segment`; of a delayed switch its `history`.
+/// `most_steps_in_segment`; of a delayed switch its `history`; of a relay what it takes
+/// `inside` its band, and whether it `begins` with f+ or f-.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run(pub RunSpec);
 
@@ -37,7 +38,7 @@ impl Question for Run {
         let switch = match self.0.switch {
             SwitchSpec::Hysteretic { .. } => 6.0,
             SwitchSpec::Smoothed { .. } => 1.0,
-            SwitchSpec::Delayed { .. } => 2.0,
+            SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } => 2.0,
             SwitchSpec::Filippov { .. } => 0.1,
         };
         let method = match self.0.method.name {

@@ -12,7 +12,7 @@ use super::table::Table;
 use twofold_analyse::path::MOST_POINTS;
 use twofold_analyse::{Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder, TimedMotion, TimesRecorder};
 use twofold_instances::{self as instances, How, Late, Motions, Orbits, TwoSurfaces};
-use twofold_integrate::delay::{DelayError, DelayedSwitch};
+use twofold_integrate::delay::{DelayError, History};
 use twofold_integrate::filippov::{
     self, AllModes, ExitRule, Faces, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent,
 };
@@ -320,9 +320,8 @@ fn three_states(spec: &RunSpec, aside: &mut Aside<'_, 3>, watch: &dyn Watch) -> 
             let field = instances::hysteretic(&spec.system, eps, eps_prime, relaxation)?;
             observe(spec, &*field, vector![x0[0], x0[1], x0[2], phi0], aside, watch)
         }
-        SwitchSpec::Delayed { delay, eps, transition, history } => {
-            let switch = DelayedSwitch { delay, smooth: transition.zip(eps), history };
-            late(spec, &*instances::late(&spec.system)?, x0, switch, aside, watch)
+        SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } => {
+            late(spec, &*instances::late(&spec.system)?, x0, aside, watch)
         }
         SwitchSpec::Filippov { exit, funnel } if spec.system.faces().is_none() => {
             discontinuous(spec, &*instances::sliding(&spec.system)?, x0, exit, funnel, aside, watch)
@@ -354,9 +353,8 @@ where
             let x0 = SVector::<f64, M>::from_fn(|i, _| if i < D { x0[i] } else { phi0 });
             observe::<_, D, M>(spec, &field, x0, aside, watch)
         }
-        SwitchSpec::Delayed { delay, eps, transition, history } => {
-            let switch = DelayedSwitch { delay, smooth: transition.zip(eps), history };
-            late(spec, &spec.system.bind::<D>()?, x0, switch, aside, watch)
+        SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } => {
+            late(spec, &spec.system.bind::<D>()?, x0, aside, watch)
         }
         SwitchSpec::Filippov { exit, funnel } => match spec.system.faces() {
             None => discontinuous(spec, &spec.system.bind::<D>()?, x0, exit, funnel, aside, watch),
@@ -496,20 +494,20 @@ fn motion<const D: usize>(trajectory: filippov::Trajectory<D>) -> Motion<D> {
     Motion { pieces, events: trajectory.events }
 }
 
-/// A run with a delayed switch.
+/// A run whose switch depends on the past.
 fn late<P: Late<D> + ?Sized, const D: usize>(
     spec: &RunSpec,
     system: &P,
     x0: SVector<f64, D>,
-    switch: DelayedSwitch,
     aside: &mut Aside<'_, D>,
     watch: &dyn Watch,
 ) -> Result<Recording<D>, JobError> {
+    let Some(switch) = spec.switch.late() else { return Err(JobError::Other("this switch has no past".into())) };
     observed(spec, x0, aside, &mut |observer| {
         let end = system.late_orbit(&spec.system, switch, x0, &how(spec, D), observer, watch);
         let end = end.map_err(|error| match error {
             DelayError::NoHistory { .. } => {
-                let (value, rule) = (format!("{}, and {error}", switch.history.name()), NO_HISTORY);
+                let (value, rule) = (format!("{}, and {error}", History::Flow.name()), NO_HISTORY);
                 JobError::from(SpecError { field: "history", value, rule })
             }
             _ => JobError::Other(error.to_string()),

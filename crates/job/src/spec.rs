@@ -5,8 +5,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::rest::switching;
+
 pub use twofold_integrate::Method;
-use twofold_integrate::delay::{History, SHARP_METHODS, SMOOTH_METHODS};
+use twofold_integrate::delay::{History, Inside, LateSwitch, SHARP_METHODS, SMOOTH_METHODS};
 use twofold_integrate::filippov::ExitRule;
 use twofold_integrate::{PRECISIONS, Schedule, StepCap, Tolerance, layered};
 use twofold_num::elementary::exp10;
@@ -69,6 +71,14 @@ pub enum SwitchSpec {
         #[serde(default)]
         history: History,
     },
+    /// A relay with memory, sharp hysteresis: f+ until h falls to -band, then f- until it rises to band.
+    Relay {
+        /// Half the width of the band.
+        band: f64,
+        /// What the run begins with if it starts inside the band.
+        #[serde(default)]
+        inside: Inside,
+    },
     /// The discontinuous system itself, in Filippov's sense (sec. 3).
     Filippov {
         /// How repelling sliding ends: the choice that the equations do not make.
@@ -104,6 +114,22 @@ impl SwitchSpec {
     /// The sharp delayed switch, from a constant history.
     pub fn delayed(delay: f64) -> Self {
         SwitchSpec::Delayed { delay, eps: None, transition: None, history: History::Constant }
+    }
+
+    /// A relay with memory that begins inside its band by the sign of h.
+    pub fn relay(band: f64) -> Self {
+        SwitchSpec::Relay { band, inside: Inside::Sign }
+    }
+
+    /// The switch if it depends on the past.
+    pub(super) fn late(self) -> Option<LateSwitch> {
+        match self {
+            SwitchSpec::Delayed { delay, eps, transition, history } => {
+                Some(LateSwitch::Delayed { delay, smooth: transition.zip(eps), history })
+            }
+            SwitchSpec::Relay { band, inside } => Some(LateSwitch::Relay { band, inside }),
+            _ => None,
+        }
     }
 
     /// The hysteretic system of sec. 4.3 with eps' = 10 eps and phi(0) = 1.
@@ -283,6 +309,7 @@ impl RunSpec {
                 finite("phi0", phi0)?;
             }
             SwitchSpec::Delayed { delay, eps, transition, .. } => self.validate_delayed(delay, eps, transition)?,
+            SwitchSpec::Relay { band, inside } => self.validate_relay(band, inside)?,
             SwitchSpec::Filippov { exit, funnel } => self.validate_filippov(exit, funnel)?,
         }
         self.method.validate()?;
@@ -325,13 +352,7 @@ impl RunSpec {
             let rule = "the switch would never see the run: give a delay below the end time, or a later end";
             return wrong("delay", delay, rule);
         }
-        if self.system.definition().second().is_some() {
-            return Err(SpecError {
-                field: "switch",
-                value: "delayed".into(),
-                rule: "a delayed switch is for systems with one switching surface; this one has two, so smooth them or take filippov",
-            });
-        }
+        self.validate_one_surface("delayed")?;
         if let Some(eps) = eps {
             positive("eps", eps)?;
         }
@@ -345,17 +366,14 @@ impl RunSpec {
         if let Some(Transition::PerturbedTanh { sigma }) = transition {
             finite("sigma", sigma)?;
         }
-        let name = self.method.name;
-        let refused = |rule| Err(SpecError { field: "method", value: name.name().into(), rule });
-        if eps.is_none() && !SHARP_METHODS.contains(&name) {
-            return refused("it cannot end its steps at a delayed switch; take dopri5, taylor or taylor-extended");
-        }
-        if eps.is_some() && !SMOOTH_METHODS.contains(&name) {
-            return refused("it cannot follow an equation with a past; take dopri5 or radau5");
-        }
-        if let Some(bits) = self.method.precision.filter(|bits| *bits != PRECISIONS[0]) {
-            let rule = "a delayed switch is followed with 106 bits at most; leave it out";
-            return wrong_choice("precision", bits, rule);
+        if eps.is_none() {
+            self.validate_sharp_method()?;
+        } else if !SMOOTH_METHODS.contains(&self.method.name) {
+            return Err(SpecError {
+                field: "method",
+                value: self.method.name.name().into(),
+                rule: "it cannot follow an equation with a past; take dopri5 or radau5",
+            });
         }
         let events = [("restart", self.schedule.restart_every), ("kick-every", self.schedule.kick.map(|k| k.every))];
         for (field, every) in events {
@@ -366,6 +384,45 @@ impl RunSpec {
             }
         }
         Ok(())
+    }
+
+    fn validate_relay(&self, band: f64, inside: Inside) -> Checked {
+        positive("band", band)?;
+        self.validate_one_surface("relay")?;
+        if inside != Inside::Sign && switching(&self.system, &self.start).abs() > band {
+            return Err(SpecError {
+                field: "inside",
+                value: inside.name().into(),
+                rule: "the run starts outside the band, where the sign of h decides; leave it out",
+            });
+        }
+        self.validate_sharp_method()
+    }
+
+    fn validate_one_surface(&self, switch: &str) -> Checked {
+        if self.system.definition().second().is_none() {
+            return Ok(());
+        }
+        Err(SpecError {
+            field: "switch",
+            value: switch.into(),
+            rule: "it is for systems with one switching surface; this one has two, so smooth them or take filippov",
+        })
+    }
+
+    /// Of switches at which a step ends.
+    fn validate_sharp_method(&self) -> Checked {
+        let name = self.method.name;
+        if !SHARP_METHODS.contains(&name) {
+            let rule = "it cannot end its steps at the switches; take dopri5, taylor or taylor-extended";
+            return Err(SpecError { field: "method", value: name.name().into(), rule });
+        }
+        match self.method.precision.filter(|bits| *bits != PRECISIONS[0]) {
+            Some(bits) => {
+                wrong_choice("precision", bits, "such a switch is followed with 106 bits at most; leave it out")
+            }
+            None => Ok(()),
+        }
     }
 
     fn validate_filippov(&self, exit: ExitRule, funnel: Option<FunnelSpec>) -> Checked {
@@ -733,6 +790,28 @@ mod tests {
         assert_eq!(two().validate(), Ok(()));
         let hysteresis: Change = |r| r.switch = SwitchSpec::hysteretic(1e-3, Relaxation::Single);
         refused(two, &[(hysteresis, "switch", "this one has two")]);
+    }
+
+    #[test]
+    fn every_rule_of_a_relays_run_is_kept() {
+        fn relay() -> RunSpec {
+            let switch = SwitchSpec::Relay { band: 0.3, inside: Inside::Minus };
+            let run = RunSpec { switch, start: vec![-0.3, 0.0, -1.0], ..smoothed() };
+            assert_eq!(run.validate(), Ok(()));
+            run
+        }
+        let cases: &[(Change, &str, &str)] = &[
+            (|r| r.switch = SwitchSpec::relay(0.0), "band", "above zero"),
+            (|r| r.switch = SwitchSpec::relay(f64::INFINITY), "band", "finite"),
+            (|r| r.system = two_surfaces(), "switch", "this one has two"),
+            (|r| r.start[0] = -0.31, "inside", "outside the band"),
+            (|r| r.method.name = Method::Lsoda, "method", "taylor-extended"),
+            (|r| r.method.name = Method::Layered, "method", "taylor-extended"),
+            (|r| extended(r, Some(192), None, 1e-30), "precision", "106 bits"),
+        ];
+        refused(relay, cases);
+        let outside = RunSpec { switch: SwitchSpec::relay(0.29), ..relay() };
+        assert_eq!(outside.validate(), Ok(()));
     }
 
     #[test]

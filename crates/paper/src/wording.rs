@@ -84,6 +84,7 @@ pub fn switch(switch: &SwitchSpec) -> String {
             Some(eps) => format!("switch delayed by {}, smoothed, *ε* = {}", number(*delay), number(*eps)),
             None => format!("switch delayed by {}", number(*delay)),
         },
+        SwitchSpec::Relay { band, .. } => format!("relay with memory, band ±{}", number(*band)),
         SwitchSpec::Filippov { exit, .. } => format!("discontinuous (Filippov), exit {}", exit_rule(exit)),
     }
 }

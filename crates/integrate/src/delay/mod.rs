@@ -1,14 +1,17 @@
-//! A switch that acts late: x' = f- + (f+ - f-) phi(h(x(t - delay))/eps), and its limit eps -> 0, f+ while h(x(t - delay)) > 0 and f- otherwise.
+//! Switches with a past. A delayed one: x' = f- + (f+ - f-) phi(h(x(t - delay))/eps), and its limit eps -> 0, f+ while h(x(t - delay)) > 0 and
+//! f- otherwise. A relay with memory: f+ until h falls to -band, f- until it rises to band.
 //!
-//! Jeffrey (2013), end of sec. 4.3, names this fourth way to resolve a discontinuity and leaves it out.
+//! Jeffrey (2013), end of sec. 4.3, names the delay as a fourth way to resolve a discontinuity and leaves it out. The relay is the sharp form of the
+//! hysteresis there (Tsypkin 1984).
 //!
 //! - The sharp rule: between switches the motion is a smooth field's. An orbit's zeros of h are located on dense output, and each is a switch one delay
 //!   later: a queue of coming switches is all the past that is kept. Every switch ends a step.
+//! - The relay: the same with passages of the band's far edge, each of which is a switch at once.
 //! - The smooth rule: the method of steps (Bellman 1961; Hairer, Norsett & Wanner 1993, sec. II.17; Bellen & Zennaro 2003). No step is longer than the delay, so
 //!   that its stages ask only for a past that is known: the continuous extensions of the steps in the last delay. Where a jump of a derivative
 //!   arrives that the method's order can see, a step ends.
 //!
-//! Both are followed by [`Stepper`](super::Stepper)s with the equation inside: the field that a driver hands them is not looked at ([`Own`]).
+//! All are followed by [`Stepper`](super::Stepper)s with the equation inside: the field that a driver hands them is not looked at ([`Own`]).
 
 mod past;
 mod sharp;
@@ -53,11 +56,45 @@ impl History {
     }
 }
 
-/// Why a run with a delayed switch cannot begin.
+/// What a relay begins with inside its band, where both f+ and f- can hold.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Inside {
+    /// f+ where h > 0, f- otherwise.
+    #[default]
+    Sign,
+    /// f+.
+    Plus,
+    /// f-.
+    Minus,
+}
+
+impl Inside {
+    /// The name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Inside::Sign => "sign",
+            Inside::Plus => "plus",
+            Inside::Minus => "minus",
+        }
+    }
+
+    /// Whether a relay with this `band` begins with f+ where the switching function is `h`.
+    pub fn begins_with_plus(self, h: f64, band: f64) -> bool {
+        match self {
+            _ if h.abs() > band => h > 0.0,
+            Inside::Sign => h > 0.0,
+            Inside::Plus => true,
+            Inside::Minus => false,
+        }
+    }
+}
+
+/// Why a run with a delayed switch or a relay cannot begin.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DelayError {
     /// The method cannot follow this switch.
-    #[error("{method} cannot follow a delayed switch of this kind: take {instead}")]
+    #[error("{method} cannot follow a switch of this kind: take {instead}")]
     Method {
         /// Its name.
         method: &'static str,
@@ -74,7 +111,7 @@ pub enum DelayError {
     },
 }
 
-/// Methods that follow the sharp rule.
+/// Methods that follow the sharp rule and the relay.
 pub const SHARP_METHODS: [Method; 3] = [Method::Dopri5, Method::Taylor, Method::TaylorExtended];
 /// Methods that follow the smooth rule.
 pub const SMOOTH_METHODS: [Method; 2] = [Method::Dopri5, Method::Radau5];
@@ -166,14 +203,14 @@ impl<'a, P> Sides<'a, P> {
         self.system.switching(x)
     }
 
-    /// Where the orbit passes the surface in `step`.
-    fn passages<const N: usize>(&self, passages: &mut CrossingFinder, step: &Step<'_, N>) -> Vec<Crossing>
+    /// Where the orbit passes h = `level` in `step`.
+    fn passages<const N: usize>(&self, passages: &mut CrossingFinder, step: &Step<'_, N>, level: f64) -> Vec<Crossing>
     where
         P: PiecewiseSmooth<N>,
     {
         match self.plane {
-            Some(coordinate) => passages.through_plane(step, coordinate, 0.0),
-            None => passages.in_step(step, |x| self.h(x)),
+            Some(coordinate) => passages.through_plane(step, coordinate, level),
+            None => passages.in_step(step, |x| self.h(x) - level),
         }
     }
 }
@@ -219,24 +256,34 @@ fn is_due(due: f64, t: f64) -> bool {
     due - t <= ONE_TIME * due.abs()
 }
 
-/// A switch that acts late.
+/// A switch that depends on the past.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DelayedSwitch {
-    /// The delay.
-    pub delay: f64,
-    /// The transition function and its eps; none: the sharp rule.
-    pub smooth: Option<(Transition, f64)>,
-    /// Where the orbit was before the start.
-    pub history: History,
+pub enum LateSwitch {
+    /// It acts late.
+    Delayed {
+        /// The delay.
+        delay: f64,
+        /// The transition function and its eps; none: the sharp rule.
+        smooth: Option<(Transition, f64)>,
+        /// Where the orbit was before the start.
+        history: History,
+    },
+    /// A relay with memory: f+ until h falls to -band, f- until it rises to band.
+    Relay {
+        /// Half the width of the band, above zero.
+        band: f64,
+        /// What it begins with inside the band.
+        inside: Inside,
+    },
 }
 
-/// A system with a delayed switch, and where it starts.
+/// A system whose switch depends on the past, and where it starts.
 #[derive(Clone, Debug)]
 pub struct Delayed<'a, P, const N: usize> {
     /// The system.
     pub sides: Sides<'a, P>,
     /// Its switch.
-    pub switch: DelayedSwitch,
+    pub switch: LateSwitch,
     /// The start.
     pub x0: SVector<f64, N>,
 }
@@ -256,7 +303,11 @@ impl<P: PiecewiseSmooth<N> + Clone, const N: usize> Delayed<'_, P, N> {
         user: U,
     ) -> Result<U::Answer, DelayError> {
         let refused = |instead| Err(DelayError::Method { method: method.name(), instead });
-        match (self.switch.smooth, method) {
+        let smooth = match self.switch {
+            LateSwitch::Delayed { delay, smooth, history } => smooth.map(|layer| (layer, delay, history)),
+            LateSwitch::Relay { .. } => None,
+        };
+        match (smooth, method) {
             (None, Method::Dopri5) => {
                 let dopri5 = || Cut::new(Guarded::new(Dopri5::new(tolerance), tolerance));
                 Ok(user.with(Sharp::new(self, [dopri5(), dopri5()])?))
@@ -276,11 +327,11 @@ impl<P: PiecewiseSmooth<N> + Clone, const N: usize> Delayed<'_, P, N> {
                 Ok(user.with(Sharp::new(self, [taylor(), taylor()])?))
             }
             (None, _) => refused("dopri5, taylor or taylor-extended"),
-            (Some(layer), Method::Dopri5) => {
-                Ok(user.with(Smooth::new(self, layer, Dopri5::new(tolerance), tolerance)?))
+            (Some(smooth), Method::Dopri5) => {
+                Ok(user.with(Smooth::new(self, smooth, Dopri5::new(tolerance), tolerance)?))
             }
-            (Some(layer), Method::Radau5) => {
-                Ok(user.with(Smooth::new(self, layer, Radau5::new(tolerance), tolerance)?))
+            (Some(smooth), Method::Radau5) => {
+                Ok(user.with(Smooth::new(self, smooth, Radau5::new(tolerance), tolerance)?))
             }
             (Some(_), _) => refused("dopri5 or radau5"),
         }

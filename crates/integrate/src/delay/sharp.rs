@@ -1,10 +1,10 @@
-//! The sharp rule: f+ while h(x(t - delay)) > 0, f- otherwise.
+//! The sharp rule, f+ while h(x(t - delay)) > 0, f- otherwise, and the relay, f+ until h falls to -band, f- until it rises to band.
 
 use std::collections::VecDeque;
 
 use nalgebra::SVector;
 
-use super::{Backwards, Cuttable, DelayError, Delayed, DelayedSwitch, History, ONE_TIME, Sides, is_due};
+use super::{Backwards, Cuttable, DelayError, Delayed, History, LateSwitch, ONE_TIME, Sides, is_due};
 use crate::roots::CrossingFinder;
 use crate::step::{Failure, Statistics, Step, Stepper};
 use crate::taylor::Precision;
@@ -20,11 +20,14 @@ struct Coming<S> {
     plus: bool,
 }
 
-/// The stepper of the sharp rule, which has one method for each mode.
+/// The stepper of the sharp rule, which has one method for each mode. A relay is one whose passages are those of the band's far edge, and switch at once.
 #[derive(Clone, Debug)]
 pub(super) struct Sharp<'a, P, M: Cuttable<N>, const N: usize> {
     sides: Sides<'a, P>,
+    /// Zero for a relay.
     delay: f64,
+    /// Zero for a delayed switch.
+    band: f64,
     methods: [M; 2],
     /// Whether the method has met its field.
     met: [bool; 2],
@@ -33,7 +36,7 @@ pub(super) struct Sharp<'a, P, M: Cuttable<N>, const N: usize> {
     plus: bool,
     /// Switches that are known to come, in their order.
     queue: VecDeque<Coming<M::Number>>,
-    /// On which side of the surface the orbit was last.
+    /// On which side of the surface, or of the band's far edge, the orbit was last.
     positive: bool,
     t_end: f64,
     max_step: f64,
@@ -57,12 +60,17 @@ const AS_BEFORE: f64 = 1.25;
 
 impl<'a, P: PiecewiseSmooth<N> + Clone, M: Cuttable<N>, const N: usize> Sharp<'a, P, M, N> {
     pub(super) fn new(delayed: &Delayed<'a, P, N>, methods: [M; 2]) -> Result<Self, DelayError> {
-        let Delayed { sides, switch: DelayedSwitch { delay, history, .. }, x0 } = delayed;
-        let positive = sides.h(x0) > 0.0;
+        let Delayed { sides, switch, x0 } = delayed;
+        let h = sides.h(x0);
+        let (delay, band, history, positive) = match *switch {
+            LateSwitch::Delayed { delay, history, .. } => (delay, 0.0, history, h > 0.0),
+            LateSwitch::Relay { band, inside } => (0.0, band, History::Constant, inside.begins_with_plus(h, band)),
+        };
         let mut sharp = Self {
             reached: methods[0].exactly(0.0, *x0),
             sides: sides.clone(),
-            delay: *delay,
+            delay,
+            band,
             methods,
             met: [false; 2],
             plus: positive,
@@ -77,7 +85,7 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M: Cuttable<N>, const N: usize> Sharp<'a
             steps: 0,
             again: 0,
         };
-        if *history == History::Flow {
+        if history == History::Flow {
             sharp.look_back()?;
         }
         Ok(sharp)
@@ -105,7 +113,7 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
                 let method = &mut self.methods[usize::from(positive)];
                 method.advance(&field).map_err(failed)?;
                 let step = method.last();
-                let found = self.sides.passages(&mut passages, &step);
+                let found = self.sides.passages(&mut passages, &step, 0.0);
                 // Of the passage that it has just come from it must not be seen again.
                 let is_new = |theta: f64| crossed_at.is_none_or(|t| step.time(theta) - t > SAME_PASSAGE * self.delay);
                 if let Some(passage) = found.into_iter().find(|p| is_new(p.theta)) {
@@ -131,6 +139,11 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
         Ok(())
     }
 
+    /// The value of h whose passage matters next.
+    fn edge(&self) -> f64 {
+        if self.positive { -self.band } else { self.band }
+    }
+
     /// Whether orbits cross the surface at `x` upwards; `None` where they do not cross.
     fn crosses(&self, x: &SVector<f64, N>) -> Option<bool> {
         let (p, q) = lie_derivatives(self.sides.system, x);
@@ -143,7 +156,7 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
         }
     }
 
-    /// The time of the zero of h near the fraction `theta` of the last step, in the method's numbers: by the secant method.
+    /// The time at which h passes the edge near the fraction `theta` of the last step, in the method's numbers: by the secant method.
     fn refined(&self, plus: bool, theta: f64) -> M::Number {
         let method = &self.methods[usize::from(plus)];
         let (from, to) = (method.start(), method.reached().0);
@@ -152,7 +165,8 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
         if M::Number::EPSILON >= f64::EPSILON {
             return time(first);
         }
-        let h = |theta: M::Number| self.sides.h.evaluate_decimal(method.at(theta).as_slice())[0];
+        let edge = M::Number::from_f64(self.edge());
+        let h = |theta: M::Number| self.sides.h.evaluate_decimal(method.at(theta).as_slice())[0] - edge;
         let mut a = M::Number::from_f64(if theta > 0.5 { theta - NEAR } else { theta + NEAR });
         let (mut b, mut ha, mut hb) = (first, h(a), h(first));
         for _ in 0..8 {
@@ -196,8 +210,8 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
     /// A step of the present mode, which ends at the next switch at the latest.
     fn advance(&mut self) -> Result<(), Failure> {
         self.switch();
-        let i = usize::from(self.plus);
         if self.end.is_none() {
+            let i = usize::from(self.plus);
             let guess = AS_BEFORE * self.lasted[i];
             let alone = self.queue.is_empty() && !M::CUTS_EXACTLY && self.since == self.reached.0.to_f64();
             self.begin(if alone { self.max_step.min(guess) } else { self.max_step })?;
@@ -208,14 +222,27 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
         }
         let delay = M::Number::from_f64(self.delay);
         loop {
+            let i = usize::from(self.plus);
             self.methods[i].advance(self.sides.field(self.plus))?;
             let mut passages = CrossingFinder::starting(self.positive);
-            let found = self.sides.passages(&mut passages, &self.methods[i].last());
+            let mut found = self.sides.passages(&mut passages, &self.methods[i].last(), self.edge());
+            if self.band > 0.0 {
+                // Beyond a switch the step is not the orbit's.
+                found.truncate(1);
+            }
             let Some(first) = found.first() else { return Ok(()) };
             let (from, (to, _)) = (self.methods[i].start(), self.methods[i].reached());
             let due = self.refined(self.plus, first.theta) + delay;
             // What a passage causes is the first switch to come, if none is known: it may be due within this very step.
             let cut = self.queue.is_empty() && (to - due).to_f64() > ONE_TIME * to.to_f64().abs();
+            if cut && is_due(due.to_f64(), from.to_f64()) {
+                // A relay on the edge of its band: the switch comes before the step.
+                self.queue.push_back(Coming { at: from, plus: first.upward });
+                self.positive = first.upward;
+                self.switch();
+                self.begin(self.max_step)?;
+                continue;
+            }
             if cut && !M::CUTS_EXACTLY && ((due - from) / (to - from)).to_f64() < KEPT {
                 self.again += 1;
                 self.begin(LONGER * (due - from).to_f64())?;
@@ -257,7 +284,8 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Stepper<N> for Sharp
         max_step: f64,
     ) -> Result<(), Failure> {
         // The past stays: it is part of the equation's state, not of the method's. Who moves the state across the surface moves it for the switch, too.
-        let positive = self.sides.h(&x) > 0.0;
+        let (h, edge) = (self.sides.h(&x), self.edge());
+        let positive = h > edge || (h == edge && edge < 0.0);
         let here = self.methods[0].exactly(t, x);
         if t > 0.0 && x != self.reached.1.map(M::Number::to_f64) && positive != self.positive {
             self.queue.push_back(Coming { at: here.0 + M::Number::from_f64(self.delay), plus: positive });

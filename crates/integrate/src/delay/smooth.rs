@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::past::{Look, Past};
-use super::{Backwards, DelayError, Delayed, DelayedSwitch, History, ONE_TIME, Sides, is_due};
+use super::{Backwards, DelayError, Delayed, History, ONE_TIME, Sides, is_due};
 use crate::driver::{DriveOptions, Observer, drive};
 use crate::guard::Redoable;
 use crate::roots::CrossingFinder;
@@ -72,14 +72,14 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Driven<N> for Weighted<'_, P, N> {
 impl<'a, P: PiecewiseSmooth<N> + Clone, M, const N: usize> Smooth<'a, P, M, N> {
     pub(super) fn new(
         delayed: &Delayed<'a, P, N>,
-        (transition, eps): (Transition, f64),
+        ((transition, eps), delay, history): ((Transition, f64), f64, History),
         method: M,
         tolerance: Tolerance,
     ) -> Result<Self, DelayError> {
-        let Delayed { sides, switch: DelayedSwitch { delay, history, .. }, x0 } = delayed;
+        let Delayed { sides, x0, .. } = delayed;
         let mut smooth = Self {
             sides: sides.clone(),
-            delay: *delay,
+            delay,
             transition,
             eps,
             method,
@@ -91,7 +91,7 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M, const N: usize> Smooth<'a, P, M, N> {
             max_step: f64::INFINITY,
             end: None,
         };
-        if *history == History::Flow {
+        if history == History::Flow {
             smooth.look_back(tolerance)?;
         }
         for k in 1..=SEEN {
@@ -146,7 +146,7 @@ fn in_layer<P: PiecewiseSmooth<N>, const N: usize>(
     passages: &mut CrossingFinder,
     step: &Step<'_, N>,
 ) -> Vec<f64> {
-    let mut times: Vec<f64> = sides.passages(passages, step).iter().map(|p| step.time(p.theta)).collect();
+    let mut times: Vec<f64> = sides.passages(passages, step, 0.0).iter().map(|p| step.time(p.theta)).collect();
     let edge = LAYER * eps;
     let (h0, h1) = (sides.h(&step.x0), sides.h(&step.x1));
     let is_far = |i: usize| h0.abs().min(h1.abs()) - step.interpolant.reach(i) > edge;

@@ -58,6 +58,8 @@ struct How {
     delay: f64,
     smooth: Option<(Transition, f64)>,
     history: History,
+    /// Of a relay.
+    band: Option<(f64, Inside)>,
     method: Method,
     tolerance: f64,
     course: DriveOptions,
@@ -70,16 +72,23 @@ impl How {
             delay,
             smooth: None,
             history: History::Constant,
+            band: None,
             method: Method::Dopri5,
             tolerance: 1e-10,
             course: DriveOptions::to(t_end),
             coordinate: 0,
         }
     }
+    fn relay(band: f64, t_end: f64) -> Self {
+        Self { band: Some((band, Inside::Sign)), ..Self::sharp(0.0, t_end) }
+    }
     fn run<const N: usize>(&self, data: &System, x0: [f64; N]) -> Result<(Seen<N>, Summary<N>), DelayError> {
         let (bound, x0): (Bound<N>, _) = (data.bind().unwrap(), SVector::from(x0));
         let sides = Sides::new(&bound, data);
-        let switch = DelayedSwitch { delay: self.delay, smooth: self.smooth, history: self.history };
+        let switch = match self.band {
+            Some((band, inside)) => LateSwitch::Relay { band, inside },
+            None => LateSwitch::Delayed { delay: self.delay, smooth: self.smooth, history: self.history },
+        };
         let delayed = Delayed { sides, switch, x0 };
         let run = Run { course: self.course, coordinate: self.coordinate, x0 };
         delayed.with_stepper(self.method, None, tolerance(self.tolerance), run)
@@ -109,6 +118,112 @@ fn a_relay_swings_with_four_delays() {
         }
         assert_eq!(end.t, 21.0);
     }
+}
+
+/// A relay with memory swings between the edges of its band with the period 2 band (1/fall + 1/rise).
+#[test]
+fn a_relay_with_memory_swings_between_its_edges() {
+    let (fall, rise, band) = (0.7, 1.9, 0.25);
+    let period = 2.0 * band * (1.0 / fall + 1.0 / rise);
+    for (method, tolerance) in SHARP {
+        let how = How { method, tolerance, ..How::relay(band, 12.0) };
+        let (seen, end) = how.run(&relay(fall, rise), [0.1]).unwrap();
+        // Down from 0.1 with f+; then up for so much of each period.
+        let first = (0.1 + band) / fall;
+        let wave = |t: f64| {
+            let phase = (t - first).rem_euclid(period);
+            let up = 2.0 * band / rise;
+            if t < first {
+                0.1 - fall * t
+            } else if phase < up {
+                rise * phase - band
+            } else {
+                band - fall * (phase - up)
+            }
+        };
+        for (t, x) in &seen.ends {
+            assert!((x[0] - wave(*t)).abs() < 1e-13, "{method:?}: {x} at {t}, not {}", wave(*t));
+        }
+        let up: Vec<f64> = seen.crossings.iter().filter(|c| c.2).map(|c| c.0).collect();
+        assert!(up.len() > 10 && up.windows(2).all(|u| (u[1] - u[0] - period).abs() < 1e-13), "{method:?}: {up:?}");
+        assert_eq!(end.t, 12.0);
+    }
+}
+
+/// Curved flight between switches: x'' = -x under a relay, whose turns are arcs about (-1, 0) and (1, 0). By a surface that is no coordinate, too.
+#[test]
+fn arcs_between_switches_are_right() {
+    let [plane, scaled] = ["x", "x*2 + x"]
+        .map(|h| system(&format!("states = ['x', 'v']\nh = '{h}'\nplus = ['v', '-1 - x']\nminus = ['v', '1 - x']")));
+    let band = 0.3_f64;
+    // From (1, 0): about (-1, 0) with radius 2 until x = -band, then about (1, 0).
+    let first = ((1.0 - band) / 2.0).acos();
+    let v = -2.0 * first.sin();
+    let radius = ((1.0 + band).powi(2) + v * v).sqrt();
+    let angle = (-v).atan2(-(1.0 + band));
+    // v = -radius sin(angle + t): x grows again and meets +band.
+    let second = (2.0 * std::f64::consts::PI - (-(1.0 - band) / radius).acos()) - angle;
+    let after = 0.2;
+    let v2 = -radius * (angle + second).sin();
+    let r2 = ((1.0 + band).powi(2) + v2 * v2).sqrt();
+    let a2 = (-v2).atan2(1.0 + band);
+    let expected = [-1.0 + r2 * (a2 + after).cos(), -r2 * (a2 + after).sin()];
+    for (method, tolerance) in SHARP {
+        for (data, band) in [(&plane, band), (&scaled, 3.0 * band)] {
+            let how = How { method, tolerance, ..How::relay(band, first + second + after) };
+            let end = how.run(data, [1.0, 0.0]).unwrap().1.x;
+            let allowed = if method == Method::Dopri5 { 1e-9 } else { 1e-13 };
+            assert!(
+                (end[0] - expected[0]).abs() < allowed && (end[1] - expected[1]).abs() < allowed,
+                "{method:?} {end} {expected:?}"
+            );
+        }
+    }
+}
+
+/// Inside the band the choice decides, outside the sign of h; an edge belongs to the band.
+#[test]
+fn a_relay_begins_as_it_is_told_inside_its_band() {
+    for (x0, inside, plus) in [
+        (0.1, Inside::Sign, true),
+        (-0.1, Inside::Sign, false),
+        (0.0, Inside::Sign, false),
+        (-0.1, Inside::Plus, true),
+        (0.1, Inside::Minus, false),
+        (0.25, Inside::Minus, false),
+        (-0.25, Inside::Plus, true),
+        (0.26, Inside::Minus, true),
+        (-0.26, Inside::Plus, false),
+    ] {
+        let how = How { band: Some((0.25, inside)), ..How::relay(0.25, 1e-3) };
+        let end = how.run(&relay(1.0, 1.0), [x0]).unwrap().1.x[0];
+        // On an edge that is left at once the switch comes before any step.
+        let at_once = x0.abs() == 0.25 && inside != Inside::Sign;
+        let falls = plus != at_once;
+        assert!((end - x0 - if falls { -1e-3 } else { 1e-3 }).abs() < 1e-15, "{x0} {inside:?}: {end}");
+    }
+}
+
+/// A kick beyond the far edge is a switch at once; one within the band is none; a restart does nothing.
+#[test]
+fn a_kick_beyond_the_band_switches_a_relay() {
+    let kick = |size: f64, seed| Kick { every: 1.0, size, law: KickLaw::Sphere, seed, stream: 0 };
+    let course = |schedule| DriveOptions { schedule, kicked_states: 1, ..DriveOptions::to(1.5) };
+    let run = |schedule| {
+        How { course: course(schedule), ..How::relay(0.5, 1.5) }.run(&relay(1.0, 1.0), [1.2]).unwrap().1.x[0]
+    };
+    let kicked = |size| (0..10).map(move |seed| run(Schedule { restart_every: None, kick: Some(kick(size, seed)) }));
+    assert!((run(Schedule { restart_every: Some(0.4), kick: None }) + 0.3).abs() < 1e-14);
+    // From 0.2 to 2.2 and on down, or to -1.8 and up.
+    let far: Vec<f64> = kicked(2.0).collect();
+    assert!(
+        far.iter().all(|x| (x - 1.7).abs() < 1e-14 || (x + 1.3).abs() < 1e-14) && far.iter().any(|x| *x < 0.0),
+        "{far:?}"
+    );
+    // From 0.2 to 0.6 or to -0.2: f+ goes on.
+    let near: Vec<f64> = kicked(0.4).collect();
+    let goes_on = |x: &f64| (x - 0.1).abs() < 1e-14 || (x + 0.3).abs() < 1e-14;
+    assert!(near.iter().all(goes_on), "{near:?}");
 }
 
 /// The chatter of sliding: x overshoots by what each field does in one delay, and one period is delay (2 + fall/rise + rise/fall).
@@ -246,6 +361,7 @@ const SMOOTH: How = How {
     delay: 1.0,
     smooth: Some((Transition::Algebraic, 1.0)),
     history: History::Constant,
+    band: None,
     method: Method::Dopri5,
     tolerance: 1e-10,
     course: DriveOptions {

@@ -40,6 +40,8 @@ pub enum Coordinate {
     EpsPrime,
     /// `delay` of a delayed switch.
     Delay,
+    /// `band` of a relay.
+    Band,
     /// `sigma`: perturbation of the transition function.
     Sigma,
     /// `kick-every`: time between kicks.
@@ -55,7 +57,7 @@ pub enum Coordinate {
 }
 
 /// The coordinates without a dot, by name.
-const PLAIN: [(&str, Coordinate); 15] = [
+const PLAIN: [(&str, Coordinate); 16] = [
     ("rtol", Coordinate::Rtol),
     ("atol", Coordinate::Atol),
     ("tolerance", Coordinate::Tolerance),
@@ -65,6 +67,7 @@ const PLAIN: [(&str, Coordinate); 15] = [
     ("eps", Coordinate::Eps),
     ("eps-prime", Coordinate::EpsPrime),
     ("delay", Coordinate::Delay),
+    ("band", Coordinate::Band),
     ("sigma", Coordinate::Sigma),
     ("kick-every", Coordinate::KickEvery),
     ("kick-size", Coordinate::KickSize),
@@ -442,6 +445,7 @@ impl Coordinate {
                 SwitchSpec::Delayed { .. } => {
                     return Err("the sharp delayed switch has no eps; give the run one".into());
                 }
+                SwitchSpec::Relay { .. } => return Err("a relay has no eps; vary its band".into()),
                 SwitchSpec::Filippov { .. } => return Err("the discontinuous system has no eps".into()),
             },
             Coordinate::EpsPrime => match &mut run.switch {
@@ -451,6 +455,10 @@ impl Coordinate {
             Coordinate::Delay => match &mut run.switch {
                 SwitchSpec::Delayed { delay, .. } => *delay = number,
                 _ => return Err("delay belongs to the delayed switch".into()),
+            },
+            Coordinate::Band => match &mut run.switch {
+                SwitchSpec::Relay { band, .. } => *band = number,
+                _ => return Err("band belongs to the relay".into()),
             },
             Coordinate::Sigma => match &mut run.switch {
                 SwitchSpec::Smoothed {
@@ -590,13 +598,14 @@ mod tests {
         let arctan =
             RunSpec { switch: SwitchSpec::Smoothed { eps: 1e-3, transition: Transition::Arctan }, ..plain.clone() };
         let delayed = RunSpec { switch: SwitchSpec::delayed(1e-3), ..plain.clone() };
+        let relay = RunSpec { switch: SwitchSpec::relay(1e-3), ..plain.clone() };
         let changed = |run: &RunSpec, text: &str| {
             let axis: Axis = text.parse().unwrap();
             let mut run = run.clone();
             axis.coordinate.apply(&mut run, &axis.value(0, 0.5)).map(|()| serde_json::to_value(&run).unwrap())
         };
         type Change = fn(&mut RunSpec);
-        let cases: [(&RunSpec, &str, Change); 22] = [
+        let cases: [(&RunSpec, &str, Change); 23] = [
             (&tanh, "params.alpha=0.2", |r| r.system = Caricature::with_reinjection(0.2, 1e-5).into()),
             (&tanh, "start.y=7", |r| r.start[1] = 7.0),
             (&tanh, "shift.z=0.25", |r| r.start[2] = 1.25),
@@ -629,6 +638,7 @@ mod tests {
             (&tanh, "method=lsoda,taylor", |r| r.method.name = Method::Lsoda),
             (&plain, "t-end=30", |r| r.t_end = 30.0),
             (&delayed, "delay=1e-2", |r| r.switch = SwitchSpec::delayed(1e-2)),
+            (&relay, "band=1e-2", |r| r.switch = SwitchSpec::relay(1e-2)),
         ];
         for (run, text, change) in cases {
             let mut wanted = run.clone();
@@ -658,6 +668,8 @@ mod tests {
             (&plain, "eps=1", "no eps"),
             (&delayed, "eps=1", "no eps"),
             (&tanh, "delay=1", "delayed switch"),
+            (&relay, "eps=1", "no eps"),
+            (&delayed, "band=1", "the relay"),
             (&tanh, "eps-prime=1", "hysteretic switch"),
             (&plain, "eps-prime=1", "hysteretic switch"),
             (&hysteretic, "sigma=1", "with tanh"),

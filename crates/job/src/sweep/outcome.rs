@@ -189,7 +189,10 @@ impl OutcomeQuestion {
             // Filippov motion has no layer to be stiff in: it gets to its end.
             (
                 Some(is_far),
-                SwitchSpec::Smoothed { .. } | SwitchSpec::Hysteretic { .. } | SwitchSpec::Delayed { .. },
+                SwitchSpec::Smoothed { .. }
+                | SwitchSpec::Hysteretic { .. }
+                | SwitchSpec::Delayed { .. }
+                | SwitchSpec::Relay { .. },
             ) => Ok(simulate_until(run, is_far, watch)?.to_answer(run)),
             _ => Run(run.clone()).compute(executor, watch),
         }
