@@ -123,9 +123,12 @@ pub struct RunFlags {
     /// with an error where a choice is needed.
     #[arg(long, value_name = "RULE", allow_hyphen_values = true, help_heading = "Filippov motion")]
     pub exit: Option<String>,
-    /// Which mixture a general system takes on several surfaces at once where mixtures of its fields have different velocities [default: none, an error].
-    #[arg(long, value_enum, help_heading = "Filippov motion")]
-    pub intersection: Option<Intersection>,
+    /// Which mixture a general system takes on several surfaces at once where mixtures of its fields have different velocities
+    /// [default: none, an error]: bilinear (products of one weight for each surface: equally steep smoothed switches), hull-least-norm
+    /// (the shortest velocity of Filippov's hull that stays on the surfaces), or order:EXPRESSION,... (a hierarchy of the switching
+    /// functions that meet, the fastest first).
+    #[arg(long, value_name = "RULE", allow_hyphen_values = true, help_heading = "Filippov motion")]
+    pub intersection: Option<String>,
     /// Probability of leaving to h > 0 under a random exit rule [default: 0.5].
     #[arg(long, allow_hyphen_values = true, help_heading = "Filippov motion")]
     pub plus_probability: Option<f64>,
@@ -175,15 +178,6 @@ pub enum Switch {
     Relay,
     /// The discontinuous system itself.
     Filippov,
-}
-
-/// A rule for several surfaces at once.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Intersection {
-    /// Products of one weight for each surface: what equally steep smoothed switches tend to.
-    Bilinear,
-    /// The shortest velocity of Filippov's hull that stays on the surfaces.
-    HullLeastNorm,
 }
 
 /// What a command makes of a run.
@@ -867,7 +861,7 @@ mod tests {
         ("--kick-size", &["0.004"]),
         ("--kick-law", &["cube"]),
         ("--exit", &["at-once:plus", "after-arc:0.2:minus"]),
-        ("--intersection", &["bilinear"]),
+        ("--intersection", &["bilinear", "order:x,y"]),
         ("--plus-probability", &["0.4"]),
         ("--funnel-times", &["3"]),
         ("--funnel-shortest", &["0.1"]),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::CliError;
-use super::flags::{Intersection, RunFlags};
+use super::flags::RunFlags;
 use crate::hybrid::definition::is_general;
 use crate::hybrid::model::ModelError;
 use crate::hybrid::motion::{Exit as Side, Method, Record};
@@ -194,13 +194,48 @@ pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
         record,
         exit,
         method,
-        intersection: match flags.intersection {
-            None => Rule::Undecided,
-            Some(Intersection::Bilinear) => Rule::Bilinear,
-            Some(Intersection::HullLeastNorm) => Rule::HullLeastNorm,
-        },
+        intersection: flags.intersection.as_deref().map_or(Ok(Rule::Undecided), |text| intersection(text, &model))?,
     };
     Ok(Some(GeneralRun { model, options }))
+}
+
+/// Reads "bilinear", "hull-least-norm" or "order:x,v - belt".
+fn intersection(text: &str, model: &Model) -> Result<Rule, CliError> {
+    let wrong = |problem: String| usage(format!("--intersection \"{text}\": {problem}"));
+    let named = match text {
+        "bilinear" => return Ok(Rule::Bilinear),
+        "hull-least-norm" => return Ok(Rule::HullLeastNorm),
+        other => other.strip_prefix("order:").ok_or_else(|| {
+            wrong("give bilinear, hull-least-norm, or order: and the switching functions that meet, the fastest first, such as order:x,y".into())
+        })?,
+    };
+    let (mut order, mut depth, mut from) = (Vec::new(), 0, 0);
+    for (i, letter) in named.char_indices().chain([(named.len(), ',')]) {
+        match letter {
+            '(' => depth += 1,
+            ')' => depth -= 1,
+            ',' if depth <= 0 => {
+                order.push(expression(named[from..i].trim(), model).map_err(&wrong)?);
+                from = i + 1;
+            }
+            _ => {}
+        }
+    }
+    if from <= named.len() {
+        return Err(wrong("a bracket is not closed".into()));
+    }
+    Ok(Rule::Order(order))
+}
+
+/// Reads an expression of a system's states, parameters, terms and tables.
+fn expression(text: &str, model: &Model) -> Result<Expression, String> {
+    let definition = model.definition();
+    let terms = definition.document().terms.0.iter().map(|(n, _)| n.as_str());
+    let tables = definition.tables().iter().map(|(n, _)| n.as_str());
+    let parameters = definition.parameters().iter().map(|p| p.name.as_str());
+    let names: Vec<&str> = model.coordinates().into_iter().chain(parameters).chain(terms).chain(tables).collect();
+    Expression::parse_general(text, &names)
+        .map_err(|e| format!("{}{}", e.message, e.help.map_or(String::new(), |h| format!(" ({h})"))))
 }
 
 /// Reads "x - y = 0".
@@ -209,14 +244,8 @@ fn section(text: &str, model: &Model) -> Result<Expression, CliError> {
         usage(format!("--section \"{text}\": {problem}; give an equation such as {}=0", model.coordinates()[0]))
     };
     let (left, right) = text.split_once('=').ok_or_else(|| wrong("there is no \"=\""))?;
-    let definition = model.definition();
-    let terms = definition.document().terms.0.iter().map(|(n, _)| n.as_str());
-    let tables = definition.tables().iter().map(|(n, _)| n.as_str());
-    let parameters = definition.parameters().iter().map(|p| p.name.as_str());
-    let names: Vec<&str> = model.coordinates().into_iter().chain(parameters).chain(terms).chain(tables).collect();
     let read = |side: &str| {
-        let parsed = Expression::parse_general(side, &names)
-            .map_err(|e| wrong(&format!("{}{}", e.message, e.help.map_or(String::new(), |h| format!(" ({h})")))))?;
+        let parsed = expression(side, model).map_err(|e| wrong(&e))?;
         if parsed.is_condition() { Err(wrong("a condition is no number")) } else { Ok(parsed) }
     };
     let (left, right) = (read(left.trim())?, read(right.trim())?);

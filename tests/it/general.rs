@@ -129,6 +129,39 @@ fn switches_and_events_are_where_formulas_have_them() {
 }
 
 /// A tank's steady heights: inflow = outlet h^(1/2), and above the rim also spill (h - rim).
+/// Two relays, the faster of which follows the other: z' is 0.5 or -0.25 by the order.
+#[test]
+fn the_order_of_two_relays_is_taken_and_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "states = ['x', 'y', 'z']\nstart = [0, 0, 0]\n\
+        f = ['-sign(x) + 0.5*sign(y)', '-sign(y) - 0.25*sign(x)', 'sign(x)*sign(y)']";
+    fs::write(folder.path().join("relays.toml"), text).unwrap();
+    for (order, z) in [("x,y", 1.0), ("y,x", -0.5)] {
+        let rule = format!("order:{order}");
+        let arguments = ["--system", "relays.toml", "--t-end", "2", "--intersection", &rule];
+        let table = run(folder.path(), &arguments);
+        near(*table.numbers("z").last().unwrap(), z, 1e-12);
+        let (data, _) = json(folder.path(), &arguments);
+        let named: Vec<&str> = order.split(',').collect();
+        assert_eq!(data["about"]["question"]["intersection"]["order"], serde_json::json!(named));
+    }
+    for (rule, said) in [
+        ("order:x", "does not name y = 0"),
+        ("order:x,q", "unknown name `q`"),
+        ("order:x,z", "`z` is no switching function; give those that may meet, of x, y"),
+        ("order:min(x,y", "a bracket is not closed"),
+        ("fastest", "give bilinear, hull-least-norm, or order:"),
+    ] {
+        let code = if rule == "order:x" { 3 } else { 2 };
+        refused(
+            folder.path(),
+            &["run", "--quiet", "--system", "relays.toml", "--t-end", "2", "--out", "r.csv", "--intersection", rule],
+            code,
+            &[said],
+        );
+    }
+}
+
 #[test]
 fn a_tank_follows_its_table_to_the_steady_heights() {
     let folder = tempfile::tempdir().unwrap();

@@ -269,6 +269,15 @@ impl Equation {
         self.by_text.get(&key).copied().unwrap_or((0, false))
     }
 
+    /// The switching function that an expression or its negative is.
+    pub fn switching(&self, e: &Expression) -> Option<usize> {
+        let key = match e {
+            Expression::Greater(a, b) => difference(a, b).to_string(),
+            other => other.to_string(),
+        };
+        self.by_text.get(&key).or_else(|| self.by_text.get(&format!("whole {key}"))).map(|(i, _)| *i)
+    }
+
     /// Whether a condition holds in a configuration.
     pub fn holds(&self, e: &Expression, at: &Configuration) -> bool {
         match e {

@@ -26,7 +26,7 @@ use crate::definition::{Direction, When};
 use crate::equation::{Compiled, Configuration, Equation, EquationError};
 use crate::model::Model;
 use crate::roots::{PLACES, first, stays};
-use crate::selection::{Intersection, MOST_TOGETHER, Way, groups, mixture, possibilities};
+use crate::selection::{Intersection, MOST_TOGETHER, Mixture, Way, groups, mixture, possibilities};
 use crate::step::Step;
 
 /// What is recorded.
@@ -348,6 +348,8 @@ struct Follower<'a> {
     base: Vec<(Rc<Compiled>, Vec<f64>)>,
     /// Where mixtures differ: the fields on all sides of the surfaces slid upon, for the rule that chooses among them.
     corners: Vec<(Rc<Compiled>, Vec<f64>)>,
+    /// The surfaces of [`Intersection::Order`].
+    order: Vec<usize>,
     /// Surfaces slid upon that know nothing of each other: the one that each state's derivative depends on.
     separate: Option<Vec<Option<usize>>>,
     contacts: Vec<Contact>,
@@ -405,6 +407,22 @@ fn scale_now(follower: &Follower, step: &Step) -> Vec<f64> {
         }
     };
     (0..step.x.len()).map(scale).collect()
+}
+
+/// The switching functions that the rule orders.
+fn order(equation: &Equation, rule: &Intersection) -> Result<Vec<usize>, HybridError> {
+    let Intersection::Order(named) = rule else { return Ok(Vec::new()) };
+    let mut order = Vec::new();
+    for e in named {
+        let found = equation.switching(e).filter(|guard| !order.contains(guard));
+        order.push(found.ok_or_else(|| {
+            let known: Vec<String> = equation.guards.iter().map(|g| g.expression.to_string()).collect();
+            let known = if known.is_empty() { "none".into() } else { known.join(", ") };
+            let why = if equation.switching(e).is_some() { "stands twice" } else { "is no switching function" };
+            HybridError::Bad(format!("--intersection order: `{e}` {why}; give those that may meet, of {known}"))
+        })?);
+    }
+    Ok(order)
 }
 
 fn same(a: &[f64], b: &[f64]) -> bool {
@@ -480,6 +498,7 @@ impl<'a> Follower<'a> {
             sides: vec![1.0; equation.guards.len()],
             pieces: equation.tables.iter().map(|t| t.piece(t0)).collect(),
         };
+        let order = order(&equation, &options.intersection)?;
         let guards = equation.guards.len();
         let watched = equation.watched.len();
         let compiled = equation.compiled(&config);
@@ -491,6 +510,7 @@ impl<'a> Follower<'a> {
             sliding: Vec::new(),
             base: Vec::new(),
             corners: Vec::new(),
+            order,
             separate: None,
             contacts: Vec::new(),
             watch_side: vec![0.0; watched],

@@ -5,6 +5,7 @@
 //! function does what it is said to do. One possibility is the motion; several are a motion that is not decided.
 
 use twofold_num::linear::solve_any;
+use twofold_system::Expression;
 
 /// What a switching function does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,7 +33,7 @@ impl Way {
 pub const MOST_TOGETHER: usize = 6;
 
 /// Which mixture of the fields is taken on several surfaces at once where mixtures have different velocities.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum Intersection {
     /// None: the run ends with an error.
     #[default]
@@ -41,17 +42,72 @@ pub enum Intersection {
     Bilinear,
     /// The shortest velocity of Filippov's hull that stays on the surfaces (the slow solution: Aubin & Cellina 1984, ch. 2).
     HullLeastNorm,
+    /// The hierarchy of switches: these switching functions, the one that switches fastest first. The first is slid upon for each side of all others, the
+    /// second on what comes of it, and so on (Utkin 1992, ch. 3; Jeffrey 2014, SIAM J. Appl. Dyn. Syst. 13, 1082).
+    Order(Vec<Expression>),
+}
+
+/// A mixture of the 2^k fields around the meeting of k surfaces.
+pub(crate) struct Mixture {
+    /// One for each field.
+    pub weights: Vec<f64>,
+    /// For each surface the least weight of its positive and of its negative side: of all fields, or for each side of the slower ones.
+    pub margins: Vec<[f64; 2]>,
 }
 
 /// Weights of the 2^k fields around the meeting of k surfaces (bit i: the positive side of surface i), so that their mixture stays on all of them.
-/// `rates` are the derivatives of the k functions along each field.
-pub(crate) fn mixture(rule: Intersection, fields: &[Vec<f64>], rates: &[Vec<f64>]) -> Option<Vec<f64>> {
+/// `rates` are the derivatives of the k functions along each field, `order` the surfaces of [`Intersection::Order`] by their places.
+pub(crate) fn mixture(
+    rule: &Intersection,
+    order: &[usize],
+    fields: &[Vec<f64>],
+    rates: &[Vec<f64>],
+) -> Option<Mixture> {
     let k = rates.first()?.len();
-    match rule {
-        Intersection::Undecided => None,
-        Intersection::Bilinear => bilinear(rates, k),
-        Intersection::HullLeastNorm => shortest(fields, rates, k),
+    let weights = match rule {
+        Intersection::Undecided => return None,
+        Intersection::Bilinear => bilinear(rates, k)?,
+        Intersection::HullLeastNorm => shortest(fields, rates, k)?,
+        Intersection::Order(_) => return hierarchy(order, rates, k),
+    };
+    let on = |i: usize| weights.iter().enumerate().filter(move |(vertex, _)| vertex >> i & 1 == 1);
+    let share = |i: usize| on(i).map(|(_, w)| w).sum::<f64>();
+    let margins = (0..k).map(|i| [share(i), 1.0 - share(i)]).collect();
+    Some(Mixture { weights, margins })
+}
+
+/// One surface after the other: for each side of those that are left the two mixtures are mixed so that the next function stays at zero. None if the
+/// order leaves a surface out, or if one does not attract from both sides.
+fn hierarchy(order: &[usize], rates: &[Vec<f64>], k: usize) -> Option<Mixture> {
+    let count = rates.len();
+    if order.len() != k {
+        return None;
     }
+    let mut weights = vec![1.0; count];
+    let mut margins = vec![[f64::INFINITY; 2]; k];
+    let mut mixed = 0;
+    for &surface in order {
+        let bit = 1 << surface;
+        mixed |= bit;
+        // The mixtures are told apart by the sides of the surfaces that are left.
+        let speed = |weights: &[f64], left: usize, side: usize| -> f64 {
+            let of = |v: &usize| v & !mixed == left && v & bit == side;
+            (0..count).filter(of).map(|v| weights[v] * rates[v][surface]).sum()
+        };
+        for left in (0..count).filter(|left| left & mixed == 0) {
+            let (low, high) = (speed(&weights, left, 0), speed(&weights, left, bit));
+            if !(low > high) {
+                return None;
+            }
+            let share = low / (low - high);
+            let [plus, minus] = &mut margins[surface];
+            (*plus, *minus) = (plus.min(share), minus.min(1.0 - share));
+            for v in (0..count).filter(|v| v & !mixed == left) {
+                weights[v] *= if v & bit == 0 { 1.0 - share } else { share };
+            }
+        }
+    }
+    Some(Mixture { weights, margins })
 }
 
 /// Newton's method for the weights of the surfaces.

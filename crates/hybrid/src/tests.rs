@@ -590,6 +590,59 @@ fn a_rule_chooses_among_mixtures() {
     assert!(x[0].abs() < 1e-12 && x[1].abs() < 1e-12, "{x:?}");
 }
 
+/// By the hierarchy the faster relay follows the slower one: with x' = -sign(x) + sign(y)/2 and x first, sign(x) is sign(y)/2 on average on either side
+/// of y = 0, and z' = sign(x) sign(y) is 1/2; with y' = -sign(y) - sign(x)/4 and y first it is -1/4; with equal rates it is 0.
+#[test]
+fn the_order_of_switches_decides() {
+    use crate::selection::Intersection;
+    let named = |names: &[&str]| {
+        let all = ["x", "y", "w", "z"];
+        let parse = |n: &&str| twofold_system::Expression::parse_general(n, &all).unwrap();
+        Intersection::Order(names.iter().map(parse).collect())
+    };
+    let run = |text: &str, intersection: Intersection, t_end: f64| {
+        follow(&model(text), &Options { t_end, intersection, max_steps: 10_000, ..Options::default() }, &mut |_| true)
+    };
+    let text = "states = ['x', 'y', 'z']\nstart = [1, 1, 0]\n\
+        f = ['-sign(x) + 0.5*sign(y)', '-sign(y) - 0.25*sign(x)', 'sign(x)*sign(y)']";
+    // y is met at t = 0.8 with x = 0.6 and z = 0.8, x from there at the speed -1.125 with z' = -0.25: z(4/3) = 2/3.
+    for (rule, speed) in [
+        (named(&["x", "y"]), 0.5),
+        (named(&["-x", "y > 0"]), 0.5),
+        (named(&["y", "x"]), -0.25),
+        (Intersection::Bilinear, 0.0),
+    ] {
+        let x = run(text, rule, 4.0 / 3.0 + 2.0).unwrap().x;
+        near(x[2], 2.0 / 3.0 + 2.0 * speed, 1e-9);
+        assert!(x[0].abs() < 1e-12 && x[1].abs() < 1e-12);
+    }
+    // Three: sign(x) = sign(y)/2 and sign(y) = sign(w)/4 on average, or each with the average 0 of the one before it.
+    let three = "states = ['x', 'y', 'w', 'z']\nstart = [0, 0, 0, 0]\n\
+        f = ['-sign(x) + 0.5*sign(y)', '-sign(y) + 0.25*sign(w)', '-sign(w)', 'sign(x)*sign(y) + sign(y)*sign(w)']";
+    near(run(three, named(&["x", "y", "w"]), 1.0).unwrap().x[3], 0.75, 1e-12);
+    near(run(three, named(&["w", "y", "x"]), 1.0).unwrap().x[3], 0.0, 1e-12);
+    // The slower one is left at t = 2 to y > 0; x is slid upon all the time: z(2) = (1 + 2)/2, z(4) = z(2) + 2, y(4) = 1.
+    let leaves = "states = ['x', 'y', 'z']\nstart = [0, 0, 0]\n\
+        f = ['-sign(x) + 0.5*sign(y)', '-sign(y) + 0.5*t', 'sign(x) + sign(x)*sign(y)']";
+    let x = run(leaves, named(&["x", "y"]), 4.0).unwrap().x;
+    near(x[1], 1.0, 1e-9);
+    near(x[2], 3.5, 1e-9);
+    // From t = 2 on x attracts for no side of y; the other order does not ask that.
+    let ends = text.replace("0.5*sign(y)", "(0.5 + 0.25*t)*sign(y)").replace("[1, 1, 0]", "[0, 0, 0]");
+    let error = run(&ends, named(&["x", "y"]), 4.0).unwrap_err();
+    let HybridError::Undecided { t, ref ways, .. } = error else { panic!("{error}") };
+    near(t, 2.0, 1e-9);
+    assert!(ways.contains("does not attract for each side"), "{ways}");
+    near(run(&ends, named(&["y", "x"]), 4.0).unwrap().x[2], -1.0, 1e-9);
+    // Where all mixtures have one velocity the order is not asked: these turns have no surface that attracts for both sides of the other.
+    let turns = "states = ['x', 'y']\nstart = [0, 0]\nf = ['-sign(x) - 2*sign(y)', '2*sign(x) - sign(y)']";
+    assert_eq!(run(turns, named(&["x", "y"]), 1.0).unwrap().x, [0.0, 0.0]);
+    for (names, said) in [(&["x"][..], "does not name y = 0"), (&["x", "z"], "`z` is no"), (&["x", "-x"], "twice")] {
+        let error = run(text, named(names), 4.0).unwrap_err().to_string();
+        assert!(error.contains(said), "{error}");
+    }
+}
+
 /// Conditions that hold for a short while between two places where nothing shows it.
 #[test]
 fn conditions_that_hold_briefly_are_met() {

@@ -42,10 +42,13 @@ impl GeneralRun {
                 Record::Times { every } => json!({ "times": { "every": every } }),
                 Record::Section(e) => json!({ "section": e.to_string() }),
             },
-            "intersection": match o.intersection {
-                Intersection::Undecided => "undecided",
-                Intersection::Bilinear => "bilinear",
-                Intersection::HullLeastNorm => "hull-least-norm",
+            "intersection": match &o.intersection {
+                Intersection::Undecided => json!("undecided"),
+                Intersection::Bilinear => json!("bilinear"),
+                Intersection::HullLeastNorm => json!("hull-least-norm"),
+                Intersection::Order(named) => {
+                    json!({ "order": named.iter().map(ToString::to_string).collect::<Vec<String>>() })
+                }
             },
             "exit": match o.exit {
                 Exit::Undecided => "undecided",

@@ -70,6 +70,9 @@ impl Follower<'_> {
             self.trains[contact.event] = Train::default();
         }
         if !leave.is_empty() {
+            if self.ends_inside() {
+                return Err(self.no_mixture(&self.sliding));
+            }
             self.outcome.switches += 1;
             let mut config = self.config.clone();
             for (guard, plus) in &leave {
@@ -107,6 +110,17 @@ impl Follower<'_> {
         }
         fired.sort_unstable();
         self.happen(definition, &fired, &zero, observe)
+    }
+
+    /// Whether a mixture by order ends although no surface is left: a fast surface ceases to attract for one side of a slower one.
+    fn ends_inside(&mut self) -> bool {
+        if self.corners.is_empty() || self.order.is_empty() {
+            return false;
+        }
+        let (t, x) = (self.t, self.x.clone());
+        let weights = self.corner_mixture(t, &x).0.weights;
+        let share = |i: usize| -> f64 { (0..weights.len()).filter(|v| v >> i & 1 == 1).map(|v| weights[v]).sum() };
+        (0..self.sliding.len()).map(share).all(|w| !(w <= 1e-6 || w >= 1.0 - 1e-6))
     }
 
     /// Lets events happen, in the file's order.

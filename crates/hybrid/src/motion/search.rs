@@ -53,7 +53,8 @@ impl Follower<'_> {
         let mut values = std::mem::take(&mut self.scratch);
         values.resize(active + self.equation.watched.len(), 0.0);
         compiled.watched.evaluate(&self.variables, &mut values);
-        let mut weights = Vec::new();
+        // Weights of the positive sides, and of the negative ones where those are not what is left.
+        let (mut weights, mut others) = (Vec::new(), Vec::new());
         let mut determinant = f64::NAN;
         if !self.sliding.is_empty() {
             let mut field0 = vec![0.0; n];
@@ -64,9 +65,8 @@ impl Follower<'_> {
                 // Each attracts by itself: the one that is nearest to doing so no more counts.
                 determinant = jumps.iter().map(|j| -j).fold(f64::INFINITY, f64::min);
             } else if !self.corners.is_empty() {
-                let (corners, _) = self.corner_weights(t, x);
-                let on = |i: usize| corners.iter().enumerate().filter(move |(vertex, _)| vertex >> i & 1 == 1);
-                weights = (0..self.sliding.len()).map(|i| on(i).map(|(_, w)| w).sum()).collect();
+                let (found, _) = self.corner_mixture(t, x);
+                (weights, others) = found.margins.iter().map(|[plus, minus]| (*plus, *minus)).unzip();
                 determinant = 1.0;
             } else {
                 let (a, matrix) = self.sliding_equations(t, x, &field0);
@@ -90,7 +90,7 @@ impl Follower<'_> {
                 }
                 Sought::Watched(i) => values[active + i],
                 Sought::Leave { place, plus: false } => weights[place],
-                Sought::Leave { place, plus: true } => 1.0 - weights[place],
+                Sought::Leave { place, plus: true } => others.get(place).map_or(1.0 - weights[place], |w| *w),
                 Sought::Repelling => determinant,
                 // A surface pushes and does not pull.
                 Sought::Release(place) => {

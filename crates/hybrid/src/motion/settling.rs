@@ -201,28 +201,39 @@ impl Follower<'_> {
                     }
                 }
                 let b: Vec<f64> = slides.iter().map(|s| -base[*s]).collect();
-                let Some(weights) = solve_any(&matrix, &b, 0.0) else { return false };
-                let by_rule = self.options.intersection != Intersection::Undecided && m > 1;
+                let weights = solve_any(&matrix, &b, 0.0);
                 if m == 1 {
                     // On both sides towards or away from the surface, to second order.
                     let (d0, d1) = (direction[slides[0]], columns[0].2[slides[0]]);
                     if d0 * d1 >= 0.0 {
                         return false;
                     }
-                } else if by_rule {
+                } else if self.options.intersection != Intersection::Undecided {
                     let (mut fields, mut speeds) = (Vec::new(), Vec::new());
                     for vertex in 0..1_usize << m {
                         let mut on = plus.clone();
                         slides.iter().enumerate().for_each(|(i, s)| on[*s] = vertex >> i & 1 == 1);
                         let (field, rates, _) = at(self, on);
                         fields.push(field);
-                        speeds.push(slides.iter().map(|s| rates[*s]).collect::<Vec<f64>>());
+                        speeds.push(rates);
                     }
-                    let found = mixture(self.options.intersection, &fields, &speeds);
-                    if !found.is_some_and(|w| w.iter().all(|w| (0.0..=1.0).contains(w))) {
-                        return false;
+                    // Where all mixtures have one velocity there is nothing to choose.
+                    if mixtures_differ(&fields) {
+                        let guards: Vec<usize> = slides.iter().map(|s| zero[set[*s]]).collect();
+                        let own: Vec<Vec<f64>> =
+                            speeds.iter().map(|rates| slides.iter().map(|s| rates[*s]).collect()).collect();
+                        let order = self.order_of(&guards);
+                        let Some(found) = mixture(&self.options.intersection, &order, &fields, &own) else {
+                            return false;
+                        };
+                        let rate = |i: usize| found.weights.iter().zip(&speeds).map(|(w, r)| w * r[i]).sum::<f64>();
+                        return found.margins.iter().flatten().all(|w| *w >= -1e-12)
+                            && found.weights.iter().all(|w| (0.0..=1.0).contains(w))
+                            && (0..set.len()).filter(|i| !slides.contains(i)).all(|i| goes(i, rate(i)));
                     }
-                } else if weights.iter().any(|w| !(*w > 0.0 && *w < 1.0)) {
+                }
+                let Some(weights) = weights else { return false };
+                if m > 1 && weights.iter().any(|w| !(*w > 0.0 && *w < 1.0)) {
                     return false;
                 }
                 (0..set.len()).filter(|i| !slides.contains(i)).all(|i| {
@@ -234,7 +245,10 @@ impl Follower<'_> {
             let chosen = match found.as_slice() {
                 [] => {
                     let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
-                    return Err(self.undecided(&names, "no way is consistent to first and second order"));
+                    return Err(match self.options.intersection {
+                        Intersection::Order(_) if names.len() > 1 => self.no_mixture(&names),
+                        _ => self.undecided(&names, "no way is consistent to first and second order"),
+                    });
                 }
                 [one] => one.clone(),
                 several => {
@@ -306,13 +320,33 @@ impl Follower<'_> {
             }
             self.take_corners();
             let (t, x) = (self.t, self.x.clone());
-            let (weights, _) = self.corner_weights(t, &x);
-            if !weights.iter().all(|w| (-1e-9..=1.0 + 1e-9).contains(w)) {
-                let names = self.sliding.clone();
-                return Err(self.undecided(&names, "the rule of --intersection has no mixture there"));
+            let (found, _) = self.corner_mixture(t, &x);
+            let all = found.weights.iter().chain(found.margins.iter().flatten());
+            if !all.into_iter().all(|w| (-1e-9..=1.0 + 1e-9).contains(w)) {
+                return Err(self.no_mixture(&self.sliding));
             }
         }
         self.follow_jumps(&zero)
+    }
+
+    /// Surfaces by their places among `guards` in the order of the rule; those that it does not name are missing.
+    pub(super) fn order_of(&self, guards: &[usize]) -> Vec<usize> {
+        self.order.iter().filter_map(|named| guards.iter().position(|g| g == named)).collect()
+    }
+
+    /// The rule has no mixture on these surfaces.
+    pub(super) fn no_mixture(&self, guards: &[usize]) -> HybridError {
+        let unnamed: Vec<usize> = guards.iter().copied().filter(|g| !self.order.contains(g)).collect();
+        let why = match self.options.intersection {
+            Intersection::Order(_) if !unnamed.is_empty() => {
+                format!("--intersection order does not name {}", self.names(&unnamed))
+            }
+            Intersection::Order(_) => {
+                "in the order of --intersection a surface does not attract for each side of the slower ones".into()
+            }
+            _ => "the rule of --intersection has no mixture there".into(),
+        };
+        self.undecided(guards, &why)
     }
 
     /// A switch may make other switching functions jump: they are on the side where they arrive.
@@ -411,4 +445,17 @@ impl Follower<'_> {
         }
         new
     }
+}
+
+/// Whether mixtures of 2^k fields have more than one velocity on their surfaces: the fields are not sums of what each side adds.
+fn mixtures_differ(fields: &[Vec<f64>]) -> bool {
+    let n = fields[0].len();
+    let size = fields.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let added = |vertex: usize, i: usize| -> f64 {
+        (0..fields.len().ilog2())
+            .filter(|bit| vertex >> bit & 1 == 1)
+            .map(|bit| fields[1 << bit][i] - fields[0][i])
+            .sum()
+    };
+    (0..fields.len()).any(|v| (0..n).any(|i| (fields[0][i] + added(v, i) - fields[v][i]).abs() > 1e-9 * size))
 }

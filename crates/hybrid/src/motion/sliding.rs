@@ -139,9 +139,9 @@ impl Follower<'_> {
                 }
             }
         } else if !self.corners.is_empty() {
-            let (weights, fields) = self.corner_weights(t, x);
+            let (found, fields) = self.corner_mixture(t, x);
             for i in 0..n {
-                out[i] = weights.iter().zip(&fields).map(|(w, f)| w * f[i]).sum();
+                out[i] = sum(found.weights.iter().zip(&fields).map(|(w, f)| w * f[i]));
             }
         } else if !self.sliding.is_empty() {
             let weights = self.weights(t, x, out);
@@ -173,8 +173,8 @@ impl Follower<'_> {
         self.corners = corners;
     }
 
-    /// The weights that the rule gives to the fields on all sides, not-a-number where there are none, and those fields.
-    pub(super) fn corner_weights(&mut self, t: f64, x: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
+    /// The mixture that the rule makes of the fields on all sides, not-a-number where there is none, and those fields.
+    pub(super) fn corner_mixture(&mut self, t: f64, x: &[f64]) -> (Mixture, Vec<Vec<f64>>) {
         let n = self.n;
         let (mut fields, mut rates) = (Vec::new(), Vec::new());
         for (compiled, variables) in &mut self.corners {
@@ -187,8 +187,10 @@ impl Follower<'_> {
             rates.push(self.sliding.iter().map(of).collect::<Vec<f64>>());
             fields.push(field);
         }
-        let weights = mixture(self.options.intersection, &fields, &rates);
-        (weights.unwrap_or_else(|| vec![f64::NAN; fields.len()]), fields)
+        let order = self.order_of(&self.sliding);
+        let none =
+            || Mixture { weights: vec![f64::NAN; fields.len()], margins: vec![[f64::NAN; 2]; self.sliding.len()] };
+        (mixture(&self.options.intersection, &order, &fields, &rates).unwrap_or_else(none), fields)
     }
 
     /// The field on the positive side of a surface slid upon.
@@ -328,6 +330,12 @@ impl Follower<'_> {
         }
         (compiled, Rates { field, first: slopes, second, terms })
     }
+}
+
+/// A sum, zero where only rounding is left: a speed of a state that stays at zero would be resolved as a motion.
+fn sum(terms: impl Iterator<Item = f64>) -> f64 {
+    let (sum, size) = terms.fold((0.0, 0.0), |(sum, size), v| (sum + v, size + v.abs()));
+    if sum.abs() <= 4.0 * f64::EPSILON * size { 0.0 } else { sum }
 }
 
 /// The determinant of -a, of k rows, by elimination with pivots.
