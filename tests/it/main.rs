@@ -20,6 +20,7 @@ mod convergence;
 mod crossings;
 mod delay;
 mod distribution;
+mod domain;
 mod dopri5;
 mod ensemble;
 mod examples;

@@ -333,6 +333,16 @@ struct Lane<O, const N: usize> {
     stages: Stages,
 }
 
+impl<O, const N: usize> Lane<O, N> {
+    /// Whether the step has missed something: then what comes next goes through that.
+    #[inline(never)]
+    fn missed(&mut self, step: &Step<'_, N>, tolerance: Tolerance) -> Result<bool, Failure> {
+        let Some(gates) = &mut self.gates else { return Ok(false) };
+        let missed = gates.missed(step, tolerance)?;
+        missed.map(|times| self.stages.go_through((step.t0, &step.x0), times)).transpose().map(|done| done.is_some())
+    }
+}
+
 /// All lanes: the fields of [`Dopri5`] side by side, as bare registers.
 struct State<S: Simd, O, const N: usize, const K: usize> {
     set: S,
@@ -730,10 +740,11 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             let tolerance = Tolerance { rtol: get(&self.rtol, l), atol: get(&self.atol, l) };
             let lane = self.lanes[l].as_mut()?;
             let step = Step { t0, t1, x0, x1, interpolant: &dense };
-            if let Some(times) = lane.gates.as_mut().and_then(|gates| gates.missed(&step, tolerance)) {
-                if let Err(failure) = lane.stages.go_through((t0, &x0), times) {
-                    return Some(Err(failure));
-                }
+            let missed = match lane.missed(&step, tolerance) {
+                Ok(missed) => missed,
+                Err(failure) => return Some(Err(failure)),
+            };
+            if missed {
                 put(&mut self.t, l, t0);
                 for i in 0..N {
                     put(&mut self.x[i], l, x0[i]);

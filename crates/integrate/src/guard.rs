@@ -20,6 +20,7 @@ use twofold_num::series::HIGH_POWER;
 use twofold_num::tape::{Node, Operation};
 use twofold_num::{Elementary, Tape};
 use twofold_system::VectorField;
+use twofold_system::singular::Ends;
 
 /// The numbers between two bounds, up to a few roundings.
 #[derive(Clone, Copy, Debug)]
@@ -259,6 +260,7 @@ pub(super) struct Gates {
     fixed: Vec<f64>,
     along: Vec<Along>,
     values: Vec<f64>,
+    ends: Option<Ends>,
 }
 
 impl Gates {
@@ -296,7 +298,8 @@ impl Gates {
             [(gate, argument)] => Plain::new(&tape, gate, argument),
             _ => None,
         };
-        Some(Self { needed, values: fixed.clone(), fixed, along, gates, plain, tape })
+        let ends = Ends::new(tape.clone());
+        Some(Self { needed, values: fixed.clone(), fixed, along, gates, plain, tape, ends })
     }
 
     pub(super) fn plain(&self) -> Option<&Plain> {
@@ -427,16 +430,24 @@ struct Piece {
 }
 
 impl Gates {
-    /// From when to when the step has missed something, if it has.
-    pub(super) fn missed<const N: usize>(&mut self, step: &Step<'_, N>, tolerance: Tolerance) -> Option<[f64; 2]> {
+    /// From when to when the step has missed something, if it has. A step that the domain of the equation does not hold is an error.
+    pub(super) fn missed<const N: usize>(
+        &mut self,
+        step: &Step<'_, N>,
+        tolerance: Tolerance,
+    ) -> Result<Option<[f64; 2]>, Failure> {
         if self.plain.as_ref().is_some_and(|plain| plain.hides_nothing(step)) {
-            return None;
+            return Ok(None);
         }
         let state = |i: usize| Along::new([step.x0[i], step.x1[i]], step.interpolant.bend(i));
         if self.hide_nothing(state) {
-            return None;
+            return Ok(None);
         }
-        self.searched(step, tolerance).map(|missed| [missed.from, missed.to].map(|theta| step.time(theta)))
+        let missed = self.searched(step, tolerance);
+        if missed.is_none() {
+            step.stays_in_domain(self.ends.as_ref())?;
+        }
+        Ok(missed.map(|missed| [missed.from, missed.to].map(|theta| step.time(theta))))
     }
 
     #[cold]
@@ -660,7 +671,7 @@ impl<M: Redoable<N>, const N: usize> Stepper<N> for Guarded<M, N> {
             }
             let step = self.method.step(field)?;
             let Step { t0, t1, x0, x1, .. } = step;
-            match self.gates.as_mut().and_then(|gates| gates.missed(&step, self.tolerance)) {
+            match self.gates.as_mut().map_or(Ok(None), |gates| gates.missed(&step, self.tolerance))? {
                 Some(times) => {
                     self.reached = (t0, x0);
                     self.stages.go_through((t0, &x0), times)?;

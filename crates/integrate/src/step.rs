@@ -1,10 +1,12 @@
 //! The nouns every method shares: an accepted step with its interpolant, tolerances, statistics, failures.
 
+use std::sync::Arc;
+
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 use twofold_num::Tape;
-use twofold_system::singular::{leaves_domain, undefined};
+use twofold_system::singular::{Ends, undefined};
 use twofold_system::{VectorField, jacobian};
 
 /// Continuous extension of a method over one step (dense output).
@@ -52,6 +54,21 @@ pub struct Step<'a, const N: usize> {
 }
 
 impl<const N: usize> Step<'_, N> {
+    /// Where in the step the domain of an equation ends, and which of its operations has no value there.
+    pub(crate) fn domain_end(&self, ends: &Ends) -> Option<(f64, String)> {
+        ends.first(&|theta| self.at(theta).as_slice().to_vec(), &[0.0, 0.25, 0.5, 0.75, 1.0])
+    }
+
+    /// That as a failure.
+    pub(crate) fn stays_in_domain(&self, ends: Option<&Ends>) -> Result<(), Failure> {
+        match ends.and_then(|ends| self.domain_end(ends)) {
+            None => Ok(()),
+            Some((theta, what)) => {
+                Err(Failure::Undefined { t: self.time(theta), state: Failure::state(&self.at(theta)), what })
+            }
+        }
+    }
+
     /// The state at the fraction `theta` of the step; exactly `x0` at 0 and `x1` at 1.
     pub fn at(&self, theta: f64) -> SVector<f64, N> {
         if theta <= 0.0 {
@@ -350,23 +367,29 @@ pub enum Failure {
 impl Failure {
     /// The failure with its cause, as far as the equation on `tape` shows it: a place where it has no value, or a solution that grows without bound.
     pub fn diagnosed(self, tape: &Tape) -> Self {
+        self.diagnosed_along(tape, None)
+    }
+
+    /// The same where the motion has another velocity than the equation's own, as sliding has.
+    pub(crate) fn diagnosed_along(self, tape: &Tape, velocity: Option<&[f64]>) -> Self {
         let (t, state, far) = match &self {
             Self::NotFinite { t, state } => (*t, state.clone(), 1.0),
             // Steps were found too long for another reason, perhaps: only what is near is to blame.
             Self::StepUnderflow { t, state, .. } | Self::NotConverged { t, state, .. } => (*t, state.clone(), 1e-3),
+            Self::NotSmooth { t, state, .. } => (*t, state.clone(), 1e-6),
             _ => return self,
         };
         if state.len() != tape.variables() || state.iter().any(|x| !x.is_finite()) {
             return self;
         }
-        if let Some(what) = undefined(tape, &state) {
+        if let (Some(what), false) = (undefined(tape, &state), matches!(self, Self::NotSmooth { .. })) {
             return Self::Undefined { t, state, what };
         }
         let field = |x: &[f64]| -> Vec<f64> {
             let values = tape.values(x);
             tape.outputs().iter().map(|node| values[*node]).collect()
         };
-        let derivative = field(&state);
+        let derivative = velocity.map_or_else(|| field(&state), <[f64]>::to_vec);
         let ahead = |time: f64| -> Vec<f64> { state.iter().zip(&derivative).map(|(x, f)| x + time * f).collect() };
         // The component that grows fastest, in its own size.
         let growth = |x: &[f64], f: &[f64]| {
@@ -378,17 +401,24 @@ impl Failure {
         let soon = ahead(0.5 / rate);
         let faster = growth(&soon, &field(&soon));
         let accelerates = faster.is_nan() || faster > 1.2 * rate;
-        if size > 1e100 || size > 1e3 && rate * scale > 1e3 && accelerates {
-            return Self::Unbounded { t: t + 1.0 / rate, state };
-        }
-        let mut time = 1e-16 * scale;
-        while time < far * scale {
-            if let Some(what) = leaves_domain(tape, &ahead(time)) {
-                return Self::Undefined { t, state, what };
+        let unbounded = size > 1e100 || size > 1e3 && rate * scale > 1e3 && accelerates;
+        // Powers of 2 times the spacing of numbers. What grows without bound comes to the end of some domain, too, but later.
+        let last = if unbounded { (GROWTHS / rate).min(far * scale) } else { far * scale };
+        let next = |time: &f64| Some(2.0 * time).filter(|time| *time < 2.0 * last);
+        let places: Vec<f64> = std::iter::successors(Some(1e-16 * scale), next).collect();
+        let ends = Ends::new(Arc::new(tape.clone()));
+        let end = ends.and_then(|ends| {
+            let first = ends.first(&ahead, &[&[0.0], &places[..]].concat());
+            // One just behind was stepped over.
+            first.or_else(|| ends.first(&|time| ahead(-time), &[0.0, BEHIND * scale]))
+        });
+        match end {
+            Some((_, what)) => Self::Undefined { t, state, what },
+            None if unbounded && !matches!(self, Self::NotSmooth { .. }) => {
+                Self::Unbounded { t: t + 1.0 / rate, state }
             }
-            time *= 2.0;
+            None => self,
         }
-        self
     }
 
     /// The state as the errors carry it.
@@ -396,6 +426,11 @@ impl Failure {
         x.iter().copied().collect()
     }
 }
+
+/// In so many times of its growth a solution that grows without bound beside the end of a domain comes there.
+const GROWTHS: f64 = 20.0;
+/// Part of 1 + t in which a method may have stepped over the end of a domain.
+const BEHIND: f64 = 1e-12;
 
 /// Whether every component is finite.
 pub(crate) fn finite<const N: usize>(x: &SVector<f64, N>) -> bool {

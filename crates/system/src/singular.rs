@@ -1,5 +1,7 @@
 //! Where an equation has no value, or is not smooth: which of its operations is to blame, in the words of its file.
 
+use std::sync::Arc;
+
 use super::expression::{Expression, Function};
 use twofold_num::Decimal;
 use twofold_num::tape::{Node, Operation, Tape};
@@ -83,26 +85,118 @@ pub fn undefined(tape: &Tape, x: &[f64]) -> Option<String> {
     let culprit = (0..values.len()).find(|node| {
         needed[*node] && !sound(node) && tape.operations()[*node].arguments().all(|argument| sound(&argument))
     })?;
-    let text = |node| written(tape, node);
-    Some(match tape.operations()[culprit] {
-        Operation::Sqrt(a) => format!("{} has no value where {} is negative", text(culprit), text(a)),
-        Operation::Ln(a) => format!("{} has no value where {} is not positive", text(culprit), text(a)),
-        Operation::Div(_, b) if values[b] == 0.0 => {
-            format!("{} has no value: division by zero, {} being 0", text(culprit), text(b))
-        }
-        Operation::Variable(_) => return None,
-        _ => return Some(format!("{} is beyond the range of numbers", text(culprit))),
-    })
+    match tape.operations()[culprit] {
+        Operation::Variable(_) => None,
+        Operation::Div(_, b) if values[b] != 0.0 => Some(too_large(tape, culprit)),
+        _ => Some(without_value(tape, culprit)),
+    }
 }
 
-/// Whether an operation is undefined beyond a value of its argument, and not only too large.
-pub fn leaves_domain(tape: &Tape, x: &[f64]) -> Option<String> {
-    let values = tape.values(x);
-    let ends = tape.operations().iter().any(|operation| match *operation {
-        Operation::Sqrt(a) => values[a] < 0.0,
-        Operation::Ln(a) => values[a] <= 0.0,
-        Operation::Div(a, b) => values[b] == 0.0 && values[a].is_finite(),
-        _ => false,
-    });
-    if ends { undefined(tape, x) } else { None }
+fn too_large(tape: &Tape, node: Node) -> String {
+    format!("{} is beyond the range of numbers", written(tape, node))
+}
+
+/// Where an operation has no value, in words.
+fn without_value(tape: &Tape, node: Node) -> String {
+    let text = |node| written(tape, node);
+    match tape.operations()[node] {
+        Operation::Sqrt(a) => format!("{} has no value where {} is negative", text(node), text(a)),
+        Operation::Ln(a) => format!("{} has no value where {} is not positive", text(node), text(a)),
+        Operation::Div(_, b) => format!("{} has no value: division by zero, {} being 0", text(node), text(b)),
+        _ => too_large(tape, node),
+    }
+}
+
+/// The operations that have no value beyond a zero of some number: a root's or a logarithm's argument, and of a quotient the divisor or what it is a
+/// power of.
+#[derive(Clone, Debug)]
+pub struct Ends {
+    tape: Arc<Tape>,
+    /// Each with that number.
+    ends: Vec<(Node, Node)>,
+}
+
+/// Halvings that find the end of a domain between two places.
+const HALVINGS: usize = 60;
+/// Places before a zero: one is so many times nearer than the other ...
+const NEARER: f64 = 64.0;
+/// ... and where the equation is by so much larger there, it is not bounded at the zero.
+const LARGER: f64 = 4.0;
+
+impl Ends {
+    /// Of the equation on a tape. None, if its domain has no such ends.
+    pub fn new(tape: Arc<Tape>) -> Option<Self> {
+        let (needed, powers) = (tape.needed(), tape.powers());
+        let number = |node: Node| match tape.operations()[node] {
+            Operation::Sqrt(a) | Operation::Ln(a) => Some((node, a)),
+            Operation::Div(_, b) => Some((node, powers[b].0)),
+            _ => None,
+        };
+        let fixed = |node: Node| matches!(tape.operations()[node], Operation::Constant(_) | Operation::Parameter(_));
+        let nodes = (0..tape.operations().len()).filter(|node| needed[*node]);
+        let ends: Vec<_> = nodes.filter_map(number).filter(|(_, a)| !fixed(*a)).collect();
+        (!ends.is_empty()).then_some(Self { tape, ends })
+    }
+
+    /// Where the domain ends first on a path of states, between neighbouring `places`, and which operation has no value there, in words. A
+    /// zero of a divisor is no end where the equation is bounded about it.
+    pub fn first(&self, path: &dyn Fn(f64) -> Vec<f64>, places: &[f64]) -> Option<(f64, String)> {
+        let at = |place: f64| self.tape.values(&path(place));
+        let mut before = at(*places.first()?);
+        for pair in places.windows(2) {
+            let after = at(pair[1]);
+            let changes = |(node, a): &&(Node, Node)| {
+                let sides = [before[*a], after[*a]];
+                !sides.iter().any(|v| v.is_nan()) && self.inside(*node, sides[0]) != self.inside(*node, sides[1])
+            };
+            let ends = self.ends.iter().filter(changes);
+            let ends = ends.filter_map(|(node, a)| Some((self.end((*node, *a), &at, pair[0], pair[1])?, *node)));
+            if let Some((place, node)) = ends.min_by(|(a, _), (b, _)| a.total_cmp(b)) {
+                return Some((place, without_value(&self.tape, node)));
+            }
+            before = after;
+        }
+        None
+    }
+
+    /// Whether an operation has a value where the number is `v`; of a quotient, on which side of the pole it is.
+    fn inside(&self, node: Node, v: f64) -> bool {
+        v > 0.0 || v == 0.0 && matches!(self.tape.operations()[node], Operation::Sqrt(_))
+    }
+
+    /// The last place before the number `a` leaves its side, if the operation's domain ends there.
+    fn end(&self, (node, a): (Node, Node), at: &dyn Fn(f64) -> Vec<f64>, from: f64, to: f64) -> Option<f64> {
+        let side = self.inside(node, at(from)[a]);
+        let (mut low, mut high) = (from, to);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if self.inside(node, at(middle)[a]) == side {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let sizes = |values: &[f64]| -> Vec<f64> { self.tape.outputs().iter().map(|o| values[*o].abs()).collect() };
+        let beyond = at(high);
+        if !matches!(self.tape.operations()[node], Operation::Div(..)) {
+            return sizes(&at(to)).iter().chain(&sizes(&beyond)).any(|size| size.is_nan()).then_some(low);
+        }
+        let is_pole = |values: &[f64]| values[node].is_infinite() && sizes(values).iter().any(|size| !size.is_finite());
+        if is_pole(&at(low)) || is_pole(&beyond) {
+            return Some(low);
+        }
+        // Two places before the zero, one well nearer than the other, as far as numbers tell them apart.
+        let mut back = high - low;
+        let mut near = at(low);
+        loop {
+            let place = (high - back).max(from);
+            let far = at(place);
+            if near[a] == 0.0 && place > from {
+                near = far;
+            } else if far[a].abs() >= NEARER * near[a].abs() || place <= from {
+                return sizes(&near).iter().zip(&sizes(&far)).any(|(near, far)| *near > LARGER * far).then_some(low);
+            }
+            back *= 2.0;
+        }
+    }
 }

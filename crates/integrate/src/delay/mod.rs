@@ -30,6 +30,7 @@ use super::{Dopri5, Guarded, Radau5, Taylor};
 use past::Cut;
 use twofold_num::tape::{Operation, Replay};
 use twofold_num::{Elementary, Tape};
+use twofold_system::singular::Ends;
 use twofold_system::{Field, PiecewiseSmooth, System, Transition, VectorField};
 
 use sharp::Sharp;
@@ -132,6 +133,7 @@ struct OneSide<'a, P> {
     system: &'a P,
     plus: bool,
     tape: Arc<Tape>,
+    ends: Option<Ends>,
 }
 
 impl<P: PiecewiseSmooth<N>, const N: usize> VectorField<N> for OneSide<'_, P> {
@@ -176,7 +178,8 @@ impl<'a, P> Sides<'a, P> {
     pub fn new(system: &'a P, data: &System) -> Self {
         let side = |plus: bool| {
             let field = if plus { Field::plus(data) } else { Field::minus(data) };
-            OneSide { system, plus, tape: field.tape().clone() }
+            let (tape, ends) = (field.tape().clone(), Ends::new(field.tape().clone()));
+            OneSide { system, plus, tape, ends }
         };
         let h = data.tape().select([0]);
         let plane = match h.operations()[h.outputs()[0]] {
@@ -191,9 +194,10 @@ impl<'a, P> Sides<'a, P> {
         &self.fields[usize::from(plus)]
     }
 
-    /// A failure with what the equations show of its cause.
-    fn diagnosed(&self, failure: Failure) -> Failure {
-        self.fields.iter().fold(failure, |failure, side| failure.diagnosed(&side.tape))
+    /// A failure with what the equations at work, f- or f+, show of its cause.
+    fn diagnosed(&self, failure: Failure, at_work: [bool; 2]) -> Failure {
+        let sides = self.fields.iter().zip(at_work).filter(|(_, at_work)| *at_work);
+        sides.fold(failure, |failure, (side, _)| failure.diagnosed(&side.tape))
     }
 
     fn h<const N: usize>(&self, x: &SVector<f64, N>) -> f64

@@ -296,7 +296,9 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Stepper<N> for Sharp
     }
 
     fn step<F: VectorField<N>>(&mut self, _: &F) -> Result<Step<'_, N>, Failure> {
-        self.advance().map_err(|failure| self.sides.diagnosed(failure))?;
+        if let Err(failure) = self.advance() {
+            return Err(self.sides.diagnosed(failure, [!self.plus, self.plus]));
+        }
         let method = &self.methods[usize::from(self.plus)];
         self.reached = method.reached();
         self.steps += 1;

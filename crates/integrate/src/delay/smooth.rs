@@ -187,6 +187,7 @@ impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N>, const N: usize> Smooth<'_, P, M
             self.end = Some(end);
         }
         let step = method.step_driven(&field)?;
+        sides.fields.iter().try_for_each(|side| step.stays_in_domain(side.ends.as_ref()))?;
         let times = in_layer(sides, *eps, &mut self.passages, &step);
         self.reached = (step.t1, step.x1);
         self.past.put(&step, step.t1 - 1.5 * self.delay);
@@ -218,7 +219,7 @@ impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N> + Redoable<N>, const N: usize> S
 
     fn step<F: VectorField<N>>(&mut self, _: &F) -> Result<Step<'_, N>, Failure> {
         let (t0, x0) = self.reached;
-        self.advance().map_err(|failure| self.sides.diagnosed(failure))?;
+        self.advance().map_err(|failure| self.sides.diagnosed(failure, [true; 2]))?;
         let (t1, x1) = self.reached;
         Ok(Step { t0, t1, x0, x1, interpolant: self.method.last() })
     }

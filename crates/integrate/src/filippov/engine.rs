@@ -1,10 +1,12 @@
 //! The state machine: one mode after the other, decided at events.
 
+use std::sync::Arc;
+
 use nalgebra::SVector;
 
 use super::automatic::Automatic;
 use super::exit::{Chooser, Plan};
-use super::flow::{FreeFlow, InPhysicalTime, Sided, SlidingFlow, Straight, Truncated, project};
+use super::flow::{FreeFlow, InPhysicalTime, Sided, SlidingFlow, Straight, Truncated, desingularised, project};
 use super::two_fold::{AlongCurve, FusedFolds, SlidingAtTwoFold};
 use super::{
     CHOOSE, Choice, EventKind, ExitRule, FilippovError, FilippovObserver, FilippovOptions, FilippovSummary, Mode,
@@ -15,6 +17,7 @@ use crate::roots::{Enclosed, Start, Zero, brent, first_zero, first_zero_along};
 use crate::step::{Failure, Flow, Interpolant, Statistics, Step, StopReason, Tolerance, finite};
 use twofold_num::{Arithmetic, Dual, Interval, Tape};
 use twofold_system::filippov::{TwoFold, gradient, lie_derivatives, two_fold};
+use twofold_system::singular::Ends;
 use twofold_system::{PiecewiseSmooth, VectorField, variables};
 
 /// Runs the Filippov motion of `system` from (0, x0) to `t_end`. `M` is `N + 1` and is inferred.
@@ -124,6 +127,11 @@ where
         stop: None,
         steps_until_watch: STEPS_BETWEEN_WATCHES,
         depth: None,
+        fields: SIDES.map(|side| {
+            let flow = FreeFlow { system: Sided { system, depth: None }, side };
+            let tape = Arc::new(Tape::clone(&flow.tape()).with_names(system.names()));
+            (tape.clone(), Ends::new(tape))
+        }),
     };
     let mut state = match departure {
         Departure::Anywhere if !near_surface(system, &x0) => {
@@ -371,6 +379,10 @@ impl<const N: usize> Interpolant<N> for Standing<N> {
     }
 }
 
+const SIDES: [Side; 2] = [Side::Plus, Side::Minus];
+/// Parts of a step between which the end of a domain is looked for.
+const QUARTERS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+
 /// A long stretch without events must not keep a watch waiting.
 const STEPS_BETWEEN_WATCHES: u32 = 4096;
 
@@ -406,6 +418,8 @@ struct Limits {
     idle_steps: u32,
     /// A field without values beyond the surface is asked no nearer to it, where the surface goes through zero.
     depth: f64,
+    /// Parts of a step that are no farther apart are one moment.
+    same_moment: f64,
     /// The first step of sliding out of two folds in one place changes the Lie derivatives by this share of the same.
     departure: f64,
     /// The rate at which sliding passes two folds in one place changes there by less than this share of it.
@@ -439,6 +453,7 @@ const LIMITS: Limits = Limits {
     idle: 4.0 * f64::EPSILON,
     idle_steps: 32,
     depth: 1e-24,
+    same_moment: 1e-9,
     departure: 1e-7,
     kink: 1e-3,
     blur: 300.0,
@@ -502,6 +517,8 @@ struct Engine<'a, P, const N: usize> {
     steps_until_watch: u32,
     /// Set where a field has no value beyond the surface: how near to it fields are asked (see [`Sided`]).
     depth: Option<f64>,
+    /// f+ and f-, with the ends of their domains.
+    fields: [(Arc<Tape>, Option<Ends>); 2],
 }
 
 impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
@@ -525,8 +542,13 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         }
     }
 
+    /// A contact that is not decided, unless the fields have no value there.
     fn non_transversal(&self, what: &'static str) -> FilippovError {
-        FilippovError::NonTransversal { t: self.t, state: Failure::state(&self.x), what }
+        let (t, state) = (self.t, Failure::state(&self.x));
+        match self.cause_on_surface() {
+            None => FilippovError::NonTransversal { t, state, what },
+            Some(cause) => cause.into(),
+        }
     }
 
     fn undecided(&self, what: &'static str, continuations: impl IntoIterator<Item = String>) -> FilippovError {
@@ -773,9 +795,41 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
 
     /// A failure in flight with what the field of `side` shows of its cause.
     fn diagnosed(&self, failure: Failure, side: Side) -> FilippovError {
-        let system = Sided { system: self.system, depth: None };
-        let tape = Tape::clone(&FreeFlow { system, side }.tape());
-        failure.diagnosed(&tape.with_names(self.system.names())).into()
+        failure.diagnosed(&self.field(side).0).into()
+    }
+
+    fn field(&self, side: Side) -> &(Arc<Tape>, Option<Ends>) {
+        &self.fields[usize::from(side == Side::Minus)]
+    }
+
+    /// Why the motion does not go on from the present state on the surface, as far as a field shows it: its domain ends, or it grows without bound.
+    fn cause_on_surface(&self) -> Option<Failure> {
+        let sided = self.sided();
+        let (field, rate) = desingularised(&sided, &self.x);
+        let velocity = field / rate;
+        let velocity = finite(&velocity).then_some(velocity.as_slice());
+        let cause = |side: Side| {
+            let state = Failure::state(&sided.inside(&self.x, side));
+            let stopped = Failure::StepUnderflow { t: self.t, h: 0.0, state };
+            match stopped.diagnosed_along(&self.field(side).0, velocity) {
+                Failure::Undefined { t, what, .. } => {
+                    Some(Failure::Undefined { t, state: Failure::state(&self.x), what })
+                }
+                Failure::Unbounded { t, .. } => Some(Failure::Unbounded { t, state: Failure::state(&self.x) }),
+                _ => None,
+            }
+        };
+        SIDES.into_iter().find_map(cause)
+    }
+
+    /// Where the domain of a field on one of `sides` ends in a step, of which `state` is the part that it depends on.
+    fn domain_end(&self, sides: &[Side], state: &dyn Fn(f64) -> SVector<f64, N>) -> Option<(f64, String)> {
+        let sided = self.sided();
+        let ends = sides.iter().filter_map(|side| {
+            let path = |theta: f64| Failure::state(&sided.inside(&state(theta), *side));
+            self.field(*side).1.as_ref()?.first(&path, &QUARTERS)
+        });
+        ends.min_by(|(a, _), (b, _)| a.total_cmp(b))
     }
 
     /// Free flight until the surface or the end.
@@ -808,7 +862,17 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             let at_start = start.over(length);
             start = FlightStart::Away;
             let enclosed = |x: &SVector<Enclosed, N>| self.system.switching(x).scale(side.sign());
-            match first_zero_along(&step, &height, &enclosed, at_start) {
+            let zero = first_zero_along(&step, &height, &enclosed, at_start);
+            // A field whose domain ends on the surface ends the flight there.
+            let landing = zero.map_or(f64::INFINITY, |zero| zero.theta() - LIMITS.same_moment);
+            if let Some((end, what)) = self.domain_end(&[side], &|theta| step.at(theta))
+                && end < landing
+            {
+                let (t, x) = (step.time(end), step.at(end));
+                self.take(side.into(), t, x, &Truncated { inner: step.interpolant, end });
+                return Err(Failure::Undefined { t, state: Failure::state(&x), what }.into());
+            }
+            match zero {
                 None => {
                     let (t1, x1) = (step.t1, step.x1);
                     self.take(side.into(), t1, x1, step.interpolant);
@@ -926,7 +990,11 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let mut idle = 0;
         let mut ahead = TwoFoldAhead::new();
         if let Err(failure) = method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY) {
-            return if self.stay_inside() { Ok(State::Sliding(sliding)) } else { Err(failure.into()) };
+            return if self.stay_inside() {
+                Ok(State::Sliding(sliding))
+            } else {
+                Err(self.cause_on_surface().unwrap_or(failure).into())
+            };
         }
         let next = loop {
             let before = method.statistics().clone();
@@ -936,10 +1004,21 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                     self.count(&before);
                     return Ok(State::Sliding(sliding));
                 }
-                Err(failure) => return Err(failure.into()),
+                Err(failure) => return Err(self.cause_on_surface().unwrap_or(failure).into()),
             };
             let end = self.sliding_end(&step, &sliding, t_base, fresh);
             fresh = false;
+            let until = end.map_or(f64::INFINITY, |(theta, _)| theta);
+            if let Some((theta, what)) = self.domain_end(&SIDES, &|theta| without_clock(&step.at(theta)))
+                && theta < until
+            {
+                let z = step.at(theta);
+                let (t, x) = ((t_base + z[N]).min(self.t_end), project(system, &without_clock(&z)));
+                let interpolant =
+                    InPhysicalTime { system, inner: step.interpolant, end: theta, clock: (step.x0[N], z[N]) };
+                self.take(mode, t, x, &interpolant);
+                return Err(Failure::Undefined { t, state: Failure::state(&x), what }.into());
+            }
             let theta = end.map_or(1.0, |(theta, _)| theta);
             let z1 = step.at(theta);
             let x1 = project(system, &without_clock(&z1));

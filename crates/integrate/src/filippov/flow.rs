@@ -18,7 +18,7 @@ pub(super) struct Sided<'a, P> {
 }
 
 impl<P> Sided<'_, P> {
-    fn inside<S: Elementary, const N: usize>(&self, x: &SVector<S, N>, side: Side) -> SVector<S, N>
+    pub fn inside<S: Elementary, const N: usize>(&self, x: &SVector<S, N>, side: Side) -> SVector<S, N>
     where
         P: PiecewiseSmooth<N>,
     {
