@@ -118,9 +118,9 @@ pub struct Ends {
 
 /// Halvings that find the end of a domain between two places.
 const HALVINGS: usize = 60;
-/// Places before a zero: one is so many times nearer than the other ...
+/// Of two places before a zero one is so many times nearer than the other.
 const NEARER: f64 = 64.0;
-/// ... and where the equation is by so much larger there, it is not bounded at the zero.
+/// An equation that is by so much larger at the nearer one is not bounded at the zero.
 const LARGER: f64 = 4.0;
 
 impl Ends {
