@@ -188,6 +188,9 @@ pub enum HybridError {
     /// A wrong number of the run.
     #[error("{0}")]
     Bad(String),
+    /// No closed orbit was found.
+    #[error("{0}")]
+    NoOrbit(String),
     /// Several continuations.
     #[error(
         "the motion is not decided at t = {t}, state {x:?}: on {surfaces} it can go on in more than one way ({ways}). Nothing is chosen here: end the run before that time (--t-end), start elsewhere (--start), change a parameter (--set), choose a side (--exit at-once:plus or at-once:minus), or of mixtures one (--intersection)"

@@ -715,3 +715,18 @@ fn what_an_event_makes_true_happens_at_once() {
     .unwrap();
     assert_eq!(times, [0.0, 0.4, 0.8, 1.2]);
 }
+
+/// A relay's orbit through the origin: there the state itself says nothing of how large the orbit is.
+#[test]
+fn an_orbit_closes_on_a_section_through_the_origin() {
+    let relay = model(
+        "states = ['x']\nstart = [0]\n[modes.up]\nf = ['1 - x']\n[modes.down]\nf = ['-1 - x']\n\
+         [[event]]\nfrom = 'up'\nwhen = 'x - 0.1'\ndirection = 'up'\nmode = 'down'\n\
+         [[event]]\nfrom = 'down'\nwhen = 'x + 0.1'\ndirection = 'down'\nmode = 'up'",
+    );
+    let section = crate::motion::Record::Section(twofold_system::Expression::parse_general("x", &["x"]).unwrap());
+    let options = Options { record: section, t_end: 50.0, ..Options::default() };
+    let found = crate::motion::tangent::closed_orbit(&relay, &options, &crate::motion::tangent::Return::Crossings(1));
+    let period = 2.0 * (1.1_f64 / 0.9).ln();
+    assert!((found.unwrap().period - period).abs() < 1e-9);
+}

@@ -477,11 +477,11 @@ pub fn closed_orbit(model: &Model, options: &Options, after: &Return) -> Result<
     };
     if let Return::Crossings(_) = after {
         // The search begins on the section.
-        x = turn(model, options, &Return::Crossings(1), &x, false)?.1;
+        x = turn(model, options, &Return::Crossings(1), &x, false)?.end;
     }
     let mut best = f64::INFINITY;
     for _ in 0..30 {
-        let (time, end, mut matrix, section) = turn(model, options, after, &x, true)?;
+        let Turn { time, end, mut matrix, section, size } = turn(model, options, after, &x, true)?;
         // On a section neighbours come back at other times: what is along the field goes.
         if let Some((gradient, field)) = &section {
             let speed: f64 = gradient.iter().zip(field).map(|(g, f)| g * f).sum();
@@ -490,7 +490,6 @@ pub fn closed_orbit(model: &Model, options: &Options, after: &Return) -> Result<
                 (0..n).for_each(|i| matrix[i * n + j] -= field[i] * late);
             }
         }
-        let size = x.iter().chain(&end).fold(0.0_f64, |a, v| a.max(v.abs()));
         let gap: Vec<f64> = end.iter().zip(&x).map(|(e, x)| e - x).collect();
         let off = gap.iter().fold(0.0_f64, |a, v| a.max(v.abs())) / size.max(f64::MIN_POSITIVE);
         if off <= 1e-11 || (off >= best && best <= 1e-8) {
@@ -512,13 +511,22 @@ pub fn closed_orbit(model: &Model, options: &Options, after: &Return) -> Result<
         let Some(change) = solve_any(&system, &gap, 0.0) else { break };
         x.iter_mut().zip(&change).for_each(|(x, c)| *x += c);
     }
-    Err(HybridError::Bad(format!(
+    Err(HybridError::NoOrbit(format!(
         "Newton's method found no closed orbit (the best return was {best:e} off): start nearer (--start), or let the motion settle longer"
     )))
 }
 
-/// Once around: time, end, derivative row by row, and of a section its gradient and the field there.
-type Turn = (f64, Vec<f64>, Vec<f64>, Option<(Vec<f64>, Vec<f64>)>);
+/// Once around.
+struct Turn {
+    time: f64,
+    end: Vec<f64>,
+    /// Derivative of the end by the start, row by row.
+    matrix: Vec<f64>,
+    /// Of a section its gradient and the field there.
+    section: Option<(Vec<f64>, Vec<f64>)>,
+    /// The largest size of a state on the way.
+    size: f64,
+}
 
 /// `on_section`: the start is on the section, whatever rounding says.
 fn turn(model: &Model, options: &Options, after: &Return, x: &[f64], on_section: bool) -> Result<Turn, HybridError> {
@@ -556,7 +564,7 @@ fn turn(model: &Model, options: &Options, after: &Return, x: &[f64], on_section:
             "the orbit does not come back to the section by t = {} ({:?}): give a later end (--t-end), another section or start",
             outcome.t, outcome.ending
         );
-        return Err(HybridError::Bad(why));
+        return Err(HybridError::NoOrbit(why));
     }
     let vectors = follower.tangents.take().map(|t| t.vectors).unwrap_or_default();
     let mut matrix = vec![0.0; n * n];
@@ -574,5 +582,6 @@ fn turn(model: &Model, options: &Options, after: &Return, x: &[f64], on_section:
             before.map(|b| (b.gradient, b.field))
         }
     };
-    Ok((outcome.t - settings.t_start, outcome.x, matrix, section))
+    let size = follower.size.iter().fold(0.0_f64, |most, s| most.max(*s));
+    Ok(Turn { time: outcome.t - settings.t_start, end: outcome.x, matrix, section, size })
 }
