@@ -26,12 +26,12 @@ pub fn figure() -> Figure {
         Panel::new(label, format!("*ε* = {eps}"), run)
     };
     Figure {
-        id: "own",
-        title: "Two stiffnesses",
+        id: "own".into(),
+        title: "Two stiffnesses".into(),
         pictures: vec![Picture {
             name: "own".into(),
             reading: Some(Reading::Reconstructed),
-            title: "Two stiffnesses",
+            title: "Two stiffnesses".into(),
             caption: "Poincaré sections y = 0 of the smoothed system for two values of ε.".into(),
             view: View::Section { horizontal: 0, vertical: 2 },
             panels: vec![panel("a", 1e-2), panel("b", 1e-3)],

@@ -227,12 +227,12 @@ fn draw(tables: &[Table]) -> Sheet {
 /// The figure's specification.
 pub fn figure() -> Figure {
     Figure {
-        id: "audit",
-        title: "At which parameters the paper's outcomes are likely",
+        id: "audit".into(),
+        title: "At which parameters the paper's outcomes are likely".into(),
         pictures: vec![Picture {
             name: "audit".into(),
             reading: None,
-            title: "At which parameters the paper's outcomes are likely",
+            title: "At which parameters the paper's outcomes are likely".into(),
             caption: "(a) How likely the seven outcomes that the paper reports in figs 7, 8 and 9(i) are at each α and β, with the printed, the reconstructed and \
                       the most likely pair. (b) How probable it is that one digit of an exponent was misprinted, under two priors."
                 .into(),

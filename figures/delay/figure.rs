@@ -496,7 +496,7 @@ pub fn figure() -> Figure {
     let picture = Picture {
         name: "delay".into(),
         reading: None,
-        title: "A switch that acts late",
+        title: "A switch that acts late".into(),
         caption: "(a) One passage of the two-fold under smoothing, hysteresis, sharp and smooth delay, and x during it. (b) Late sections y = 0 under the \
                   hysteresis of fig. 9(i) and under a sharp delay of the same eps, in both readings. (c) Where the two-fold is left under the sharp delay by the phase \
                   of the chatter, in delays, and the distribution over phases as the delay falls. (d) Growth of a disturbance in a passage under sharp delay and sharp \
@@ -506,5 +506,5 @@ pub fn figure() -> Figure {
         panels: Vec::new(),
         alterations: Vec::new(),
     };
-    Figure { id: "delay", title: "A switch that acts late", pictures: vec![picture] }
+    Figure { id: "delay".into(), title: "A switch that acts late".into(), pictures: vec![picture] }
 }

@@ -14,12 +14,12 @@ const R: f64 = 0.69267;
 /// The figure's specification.
 pub fn figure() -> Figure {
     Figure {
-        id: "fig1",
-        title: "The wheel assembly",
+        id: "fig1".into(),
+        title: "The wheel assembly".into(),
         pictures: vec![Picture {
             name: "fig1".into(),
             reading: None,
-            title: "The wheel assembly",
+            title: "The wheel assembly".into(),
             caption: "The wheel assembly (a) obliquely, (b) from above, to scale: a disc that turns at ω₀; a housing on it that turns at ω; in the housing \
                       a line at distance d from the axle, on which a wheel rolls at an angle γ, held by a spring and a damper. The \
                       slip h along the wheel's axle is the switching function. Our own reconstruction."

@@ -8,12 +8,12 @@ use twofold::system::Wheel;
 /// The figure's specification.
 pub fn figure() -> Figure {
     Figure {
-        id: "fig2",
-        title: "The wheel assembly returns to its singularity",
+        id: "fig2".into(),
+        title: "The wheel assembly returns to its singularity".into(),
         pictures: vec![Picture {
             name: "fig2".into(),
             reading: None,
-            title: "The wheel assembly returns to its singularity",
+            title: "The wheel assembly returns to its singularity".into(),
             caption:
                 "Trajectory of the wheel assembly with sign(h) replaced by tanh(h/ε), t = 0 … 60. The surface h = 0, \
                       where wheel and disc stick, is shaded by region; the dot is the two-fold singularity. Our own \

@@ -15,12 +15,12 @@ const W: f64 = -1.4;
 /// The figure's specification.
 pub fn figure() -> Figure {
     Figure {
-        id: "fig3",
-        title: "The two-fold singularity",
+        id: "fig3".into(),
+        title: "The two-fold singularity".into(),
         pictures: vec![Picture {
             name: "fig3".into(),
             reading: None,
-            title: "The two-fold singularity",
+            title: "The two-fold singularity".into(),
             caption: "The surface x = 0 of the normal form (4) about its two-fold. Orbits cross where both fields point to the same \
                       side; where they oppose, orbits slide: into the singularity where sliding attracts, out of it where \
                       sliding repels."

@@ -656,12 +656,12 @@ pub fn figure() -> Figure {
         alterations: Vec::new(),
     };
     Figure {
-        id: "law",
-        title: "The law of the breakdown",
+        id: "law".into(),
+        title: "The law of the breakdown".into(),
         pictures: vec![
             picture(
                 "law",
-                "The law of the breakdown",
+                "The law of the breakdown".into(),
                 "How the smoothed system passes the two-fold as the switch steepens, with predictions that are formulas of v+ and v- alone. (a) Growth of a \
                  disturbance made at the singularity across and along the layer, and of one carried in, against ε. (b) Its local exponents. (c) Square of the \
                  distance at which the surface is left, over ε. (d) The far exit: smooth branches and jumps, periodic in ln ε. (e) Exponents for \
@@ -670,7 +670,7 @@ pub fn figure() -> Figure {
             ),
             picture(
                 "law-selection",
-                "What selects the member of the funnel",
+                "What selects the member of the funnel".into(),
                 "The law under four transition functions, as computed and with the phase removed: (a, b) growth of a disturbance across the layer, divided by its \
                  predicted power; (c, d) the far exit. (e, f) Where and to which side the surface is left under smoothing, hysteresis and noise.",
                 Study { questions: selection_questions, draw: draw_selection },

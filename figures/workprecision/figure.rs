@@ -163,12 +163,12 @@ fn questions() -> Vec<AnyQuestion> {
 /// The figure's specification.
 pub fn figure() -> Figure {
     Figure {
-        id: "workprecision",
-        title: "Error against work, beside ODEPACK",
+        id: "workprecision".into(),
+        title: "Error against work, beside ODEPACK".into(),
         pictures: vec![Picture {
             name: "workprecision".into(),
             reading: None,
-            title: "Error against work, beside ODEPACK",
+            title: "Error against work, beside ODEPACK".into(),
             caption: "Error at the end of the run against the number of evaluations of the right-hand side, for nine initial value \
                       problems: ODEPACK’s LSODA (rings, from a file made once with the original Fortran), our LSODA (dots), Radau IIA \
                       of order 5 (triangles) and Dormand-Prince 5(4) (squares). Logarithmic axes, one marker per tolerance. The four \

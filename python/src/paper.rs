@@ -9,9 +9,9 @@ use crate::errors::InternalError;
 
 /// The references that were published with this version.
 fn manifests() -> PyResult<Vec<Manifest>> {
-    let texts = figures::all().into_iter().filter_map(|f| Some((f.id, figures::reference(f.id)?)));
+    let texts = figures::all().into_iter().filter_map(|f| figures::reference(&f.id).map(|text| (f.id, text)));
     texts
-        .map(|(id, text)| Manifest::parse(text, id))
+        .map(|(id, text)| Manifest::parse(text, &id))
         .collect::<Result<_, _>>()
         .map_err(|e| InternalError::new_err((e.to_string(),)))
 }

@@ -60,7 +60,7 @@ pub enum CliError {
         /// What was asked for.
         panel: String,
         /// The figure.
-        figure: &'static str,
+        figure: String,
         /// What there is.
         known: String,
     },

@@ -1,5 +1,6 @@
 //! The command line that every figure's binary shares.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -93,7 +94,8 @@ impl StoreFlags {
 
 /// The definition of a figure's flags, with its own name, description and examples.
 fn command(figure: &Figure) -> clap::Command {
-    let id = figure.id;
+    // A binary's figure has a name of its own; clap takes no other.
+    let Cow::Borrowed(id) = figure.id else { return Arguments::command() };
     let caption = figure.pictures.first().map_or("", |p| p.caption.as_str());
     let about = format!("{id}: {}. Written as PNG, SVG and PDF, with its numbers as CSV.", figure.title);
     let mut examples = format!("Examples:\n  {id} --out pictures\n  {id} --json --quiet");
@@ -144,12 +146,12 @@ pub fn run(figures: Vec<Figure>, arguments: &FigureFlags) -> Result<(), CliError
         return print_specs(&figures);
     }
     for figure in &figures {
-        try_folder(&arguments.out.join(figure.id))?;
+        try_folder(&arguments.out.join(&*figure.id))?;
     }
     let progress = Progress::new(arguments.quiet);
     if arguments.recompute {
         for figure in &figures {
-            recompute(figures::data(figure.id), &arguments.out.join(figure.id), arguments.threads, &progress)?;
+            recompute(figures::data(&figure.id), &arguments.out.join(&*figure.id), arguments.threads, &progress)?;
         }
     }
     let executor = Executor::new(arguments.store.store(), &progress);
@@ -183,7 +185,7 @@ struct Made {
 
 fn make_what_is_missing(figures: &[Figure], out: &Path, executor: &Executor<'_>) -> Result<Vec<Made>, CliError> {
     let pictures: Vec<(PathBuf, &Picture)> =
-        figures.iter().flat_map(|f| f.pictures.iter().map(|p| (out.join(f.id), p))).collect();
+        figures.iter().flat_map(|f| f.pictures.iter().map(|p| (out.join(&*f.id), p))).collect();
     let standing = executor.store().and_then(Standing::of);
     let found = |(folder, picture): &(PathBuf, &Picture)| standing.as_ref().and_then(|s| s.find(picture, folder));
     let standing_there: Vec<Option<Stands>> = pictures.par_iter().with_max_len(1).map(found).collect();
@@ -229,7 +231,7 @@ fn make_what_is_missing(figures: &[Figure], out: &Path, executor: &Executor<'_>)
 fn say_how(figures: &[Figure], made: &[Made], arguments: &FigureFlags, progress: &Progress) -> Result<(), CliError> {
     let anew = |name: &str| made.iter().any(|m| m.anew && m.record.hashes.name == name);
     let figures: Vec<String> =
-        figures.iter().filter(|f| f.pictures.iter().any(|p| anew(&p.name))).map(|f| f.id.to_owned()).collect();
+        figures.iter().filter(|f| f.pictures.iter().any(|p| anew(&p.name))).map(|f| f.id.to_string()).collect();
     if figures.is_empty() {
         return Ok(());
     }
@@ -284,7 +286,7 @@ fn write_picture(folder: &Path, computed: &Computed, written: &mut Vec<Written>)
 
 /// Refuses a flag that changes none of these figures.
 fn refuse_idle(figures: &[Figure], arguments: &FigureFlags) -> Result<(), CliError> {
-    let names: Vec<&str> = figures.iter().map(|f| f.id).collect();
+    let names: Vec<&str> = figures.iter().map(|f| &*f.id).collect();
     let names = names.join(", ");
     let pictures = || figures.iter().flat_map(|f| &f.pictures);
     let of_runs = [
@@ -303,7 +305,7 @@ fn refuse_idle(figures: &[Figure], arguments: &FigureFlags) -> Result<(), CliErr
     {
         return Err(CliError::no_effect("--only", format!("{names}: there is no other panel; leave it out")));
     }
-    if arguments.recompute && figures.iter().all(|f| figures::data(f.id).is_empty()) {
+    if arguments.recompute && figures.iter().all(|f| figures::data(&f.id).is_empty()) {
         let why = format!(
             "{names}: no rows are committed beside it, everything is computed anyway (--fresh takes nothing from the store)"
         );
@@ -340,7 +342,7 @@ fn select(mut figure: Figure, arguments: &FigureFlags) -> Result<Figure, CliErro
             known.sort_by_key(|k| (k.len(), k.clone()));
             known.dedup();
             let known = if known.is_empty() { "none: it is not made of panels".into() } else { known.join(", ") };
-            return Err(CliError::NoSuchPanel { panel: only.clone(), figure: figure.id, known });
+            return Err(CliError::NoSuchPanel { panel: only.clone(), figure: figure.id.to_string(), known });
         }
         figure.pictures.retain(|p| p.panels.iter().any(|q| q.label == label));
         figure.pictures.iter_mut().for_each(|p| p.keep_only(label));

@@ -12,14 +12,14 @@ use twofold::paper::{Alterations, Figure};
 use twofold::record::{Hash, Manifest};
 
 fn manifest(figure: &Figure) -> Manifest {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("figures").join(figure.id).join("expected.json");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("figures").join(&*figure.id).join("expected.json");
     let text = fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}; make one with bless", path.display()));
-    Manifest::parse(&text, figure.id).unwrap()
+    Manifest::parse(&text, &figure.id).unwrap()
 }
 
 /// The figures that are cheap enough for every test run.
 fn quick() -> impl Iterator<Item = Figure> {
-    figures::all().into_iter().filter(|f| QUICK.contains(&f.id))
+    figures::all().into_iter().filter(|f| QUICK.contains(&&*f.id))
 }
 
 const QUICK: [&str; 7] = ["fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "workprecision"];
@@ -53,7 +53,7 @@ const SHORTENED: [(&str, &str); 6] = [
 fn golden_shortened_figures_have_the_committed_hashes() {
     let executor = Executor::quiet();
     let mut found = Vec::new();
-    for figure in figures::all().iter().filter(|f| ["fig7", "fig8", "fig9"].contains(&f.id)) {
+    for figure in figures::all().iter().filter(|f| ["fig7", "fig8", "fig9"].contains(&&*f.id)) {
         for picture in &figure.pictures {
             let mut picture = picture.clone();
             picture.alter(&Alterations { t_end: Some(300.0), ..Alterations::default() });
@@ -78,7 +78,7 @@ fn golden_every_figure_has_a_reference_and_its_picture() {
             let entry = expected.picture(&picture.name).unwrap_or_else(|| panic!("{} is not blessed", picture.name));
             let file = Path::new(env!("CARGO_MANIFEST_DIR"))
                 .join("figures")
-                .join(figure.id)
+                .join(&*figure.id)
                 .join(format!("{}.png", picture.name));
             assert_eq!(
                 Hash::of(&fs::read(file).unwrap()),

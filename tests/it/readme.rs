@@ -14,7 +14,7 @@ fn text(path: &str) -> String {
 #[test]
 fn golden_table_of_verdicts_is_that_of_the_references() {
     let manifests: Vec<Manifest> =
-        figures::all().iter().map(|f| Manifest::parse(figures::reference(f.id).unwrap(), f.id).unwrap()).collect();
+        figures::all().iter().map(|f| Manifest::parse(figures::reference(&f.id).unwrap(), &f.id).unwrap()).collect();
     let written = text("docs/findings.md");
     let table = verdict_table::table(&manifests);
     assert_eq!(table.lines().filter(|l| l.contains("| agrees |") || l.contains("| differs |")).count(), 11, "{table}");
@@ -29,7 +29,7 @@ fn golden_table_of_verdicts_is_that_of_the_references() {
 #[test]
 fn golden_embedded_references_are_the_files() {
     for figure in figures::all() {
-        assert_eq!(figures::reference(figure.id), Some(text(&format!("figures/{}/expected.json", figure.id)).as_str()));
+        assert_eq!(figures::reference(&figure.id), Some(text(&format!("figures/{}/expected.json", figure.id)).as_str()));
     }
 }
 

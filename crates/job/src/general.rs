@@ -35,7 +35,7 @@ impl GeneralRun {
             "system": self.model.json(),
             "t_start": o.t_start,
             "t_end": o.t_end,
-            "start": o.start,
+            "start": o.start.clone().or_else(|| self.model.start().ok().flatten()),
             "method": { "name": o.method.name(), "rtol": o.rtol, "atol": o.atol, "max_step": o.max_step.is_finite().then_some(o.max_step), "max_steps": o.max_steps },
             "observe": match &o.record {
                 Record::Path { chord } => json!({ "path": { "chord": chord } }),

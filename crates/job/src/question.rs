@@ -106,7 +106,7 @@ pub enum JobError {
     },
     /// A general system could not be followed.
     #[error(transparent)]
-    General(#[from] HybridError),
+    General(Box<HybridError>),
     /// The rests of a general system could not be sought.
     #[error(transparent)]
     Rests(#[from] RestError),
@@ -124,12 +124,18 @@ pub enum JobError {
     Other(String),
 }
 
+impl From<HybridError> for JobError {
+    fn from(error: HybridError) -> Self {
+        JobError::General(Box::new(error))
+    }
+}
+
 impl JobError {
     /// Whether the question itself is at fault, not the computation.
     pub fn is_bad_question(&self) -> bool {
         match self {
             JobError::Spec(_) | JobError::Dimension(_) => true,
-            JobError::General(e) => matches!(e, HybridError::Equation(_) | HybridError::Start(_) | HybridError::Bad(_)),
+            JobError::General(e) => matches!(**e, HybridError::Equation(_) | HybridError::Start(_) | HybridError::Bad(_)),
             JobError::Rests(e) => !matches!(e, RestError::Driven),
             _ => false,
         }

@@ -41,15 +41,15 @@ pub fn sheet(
         let found = markup::literal(&verdict.found);
         sheet = sheet.footer(if picture.panels.len() > 1 { format!("({}) {found}", verdict.panel) } else { found });
     }
-    Ok(match picture.view {
+    Ok(match &picture.view {
         View::Section { horizontal, vertical } => {
-            section_panels(sheet, picture, recordings, &notes, [horizontal, vertical], &[Half::Late, Half::Early])
+            section_panels(sheet, picture, recordings, &notes, [*horizontal, *vertical], &[Half::Late, Half::Early])
         }
         View::LateSection { horizontal, vertical } => {
-            section_panels(sheet, picture, recordings, &notes, [horizontal, vertical], &[Half::Late])
+            section_panels(sheet, picture, recordings, &notes, [*horizontal, *vertical], &[Half::Late])
         }
-        View::Space { camera } => space_panels(sheet, picture, recordings, &notes, &camera),
-        View::Study(_) => sheet,
+        View::Space { camera } => space_panels(sheet, picture, recordings, &notes, camera),
+        View::Study(_) | View::Plots(_) => sheet,
     })
 }
 
@@ -62,7 +62,7 @@ pub fn study_sheet(picture: &Picture, sheet: Sheet, spec: &Hash, data: &Hash) ->
 fn dress(mut sheet: Sheet, picture: &Picture, spec: &Hash, data: &Hash) -> Sheet {
     sheet.description = wording::plain(&picture.caption);
     sheet = sheet
-        .title(picture.title)
+        .title(picture.title.as_ref())
         .provenance("Software", concat!("twofold ", env!("CARGO_PKG_VERSION")))
         .provenance("Picture", &picture.name)
         .provenance("Reading", picture.reading.map_or("none", |r| r.word()))

@@ -32,6 +32,7 @@ pub mod draw;
 pub mod drawing;
 pub mod effects;
 pub mod pipeline;
+pub mod plots;
 pub mod report;
 pub mod similarity;
 pub mod standing;
@@ -40,8 +41,12 @@ pub mod verdict;
 pub mod verdict_table;
 pub mod wording;
 
+use std::borrow::Cow;
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
+pub use plots::Plots;
 pub use study::Study;
 use twofold_integrate::filippov::ExitRule;
 use twofold_job::JobError;
@@ -53,9 +58,9 @@ use verdict::Claim;
 #[derive(Clone, Debug)]
 pub struct Figure {
     /// "fig7".
-    pub id: &'static str,
+    pub id: Cow<'static, str>,
     /// What it shows, in our own words.
-    pub title: &'static str,
+    pub title: Cow<'static, str>,
     /// Its pictures: one per parameter reading, or one.
     pub pictures: Vec<Picture>,
 }
@@ -68,7 +73,7 @@ pub struct Picture {
     /// The parameter reading, if the figure has readings.
     pub reading: Option<Reading>,
     /// The heading.
-    pub title: &'static str,
+    pub title: Cow<'static, str>,
     /// The caption, in our own words.
     pub caption: String,
     /// How panels are drawn.
@@ -115,7 +120,7 @@ pub struct Support {
 }
 
 /// How the panels of a picture are drawn.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum View {
     /// A Poincare section in the plane of two coordinates: the later half, and the early half below it.
     Section {
@@ -139,6 +144,8 @@ pub enum View {
     /// Something other than runs: a sketch computed from the model, a comparison of methods. The picture has no panels of
     /// runs; the study makes its own.
     Study(Study),
+    /// Panels that are drawn from answers of any kind, of systems of any dimension: the figures of a paper's folder.
+    Plots(Arc<Plots>),
 }
 
 /// An orthographic view of the state space.
@@ -186,13 +193,14 @@ impl Reading {
 impl Figure {
     /// A figure with one study per reading, printed first.
     pub fn studied_in_both_readings(id: &'static str, title: &'static str, caption: &str, studies: [Study; 2]) -> Self {
+        let (id, title) = (Cow::from(id), Cow::from(title));
         let pictures = Reading::ALL
             .into_iter()
             .zip(studies)
             .map(|(reading, study)| Picture {
                 name: format!("{id}-{}", reading.word()),
                 reading: Some(reading),
-                title,
+                title: title.clone(),
                 caption: caption.to_owned(),
                 view: View::Study(study),
                 panels: Vec::new(),
@@ -210,13 +218,14 @@ impl Figure {
         caption: impl Fn(Reading) -> String,
         panels: impl Fn(Reading) -> Vec<Panel>,
     ) -> Self {
+        let (id, title) = (Cow::from(id), Cow::from(title));
         let pictures = Reading::ALL
             .map(|reading| Picture {
                 name: format!("{id}-{}", reading.word()),
                 reading: Some(reading),
-                title,
+                title: title.clone(),
                 caption: caption(reading),
-                view,
+                view: view.clone(),
                 panels: panels(reading),
                 alterations: Vec::new(),
             })
@@ -295,8 +304,8 @@ impl Picture {
             suffix += &format!("-{word}");
             self.alterations.push(format!("{word}: t = {t_end} instead of {original}"));
         }
-        if let (true, View::Section { horizontal, vertical }) = (alterations.late, self.view) {
-            self.view = View::LateSection { horizontal, vertical };
+        if let (true, View::Section { horizontal, vertical }) = (alterations.late, &self.view) {
+            self.view = View::LateSection { horizontal: *horizontal, vertical: *vertical };
             suffix += "-late";
             self.alterations.push("the later half alone".to_owned());
         }

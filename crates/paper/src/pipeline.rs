@@ -135,6 +135,7 @@ pub fn pixel_hash(pixels: &Pixels) -> Hash {
 pub(super) fn parts(picture: &Picture) -> Vec<(String, AnyQuestion)> {
     match &picture.view {
         View::Study(study) => (study.questions)().into_iter().map(|q| (q.kind().to_owned(), q)).collect(),
+        View::Plots(plots) => plots.plots.iter().map(|p| (p.label.clone(), p.question.clone())).collect(),
         _ => picture.panels.iter().map(|p| (p.label.clone(), Arc::new(Run(p.run.clone())) as AnyQuestion)).collect(),
     }
 }
@@ -209,6 +210,10 @@ pub fn compute_with_tables(
     let mut panels = Vec::new();
     let drawn = match &picture.view {
         View::Study(study) => drawing::study_sheet(picture, (study.draw)(&answers), &spec, &data),
+        View::Plots(plots) => {
+            let sheet = plots.sheet(&answers).map_err(|(part, why)| failed(&part)(JobError::Other(why)))?;
+            drawing::study_sheet(picture, sheet, &spec, &data)
+        }
         _ => {
             let mut recordings = Vec::new();
             for (panel, answer) in picture.panels.iter().zip(&answers) {
@@ -233,7 +238,8 @@ pub fn compute_with_tables(
     let rendered = render(&drawn).map_err(|source| PipelineError::Render { picture: picture.name.clone(), source })?;
 
     let runs = !panels.is_empty();
-    let table_records = write_tables(picture, runs, &parts, &answers, keep)?;
+    let labelled = !matches!(picture.view, View::Study(_));
+    let table_records = write_tables(picture, labelled, &parts, &answers, keep)?;
     let hashes = PictureEntry {
         name: picture.name.clone(),
         spec,
@@ -247,7 +253,7 @@ pub fn compute_with_tables(
     };
     let record = PictureRecord {
         hashes,
-        title: picture.title.to_owned(),
+        title: picture.title.clone().into_owned(),
         reading: picture.reading,
         caption: picture.caption.clone(),
         alterations: picture.alterations.clone(),
@@ -262,7 +268,7 @@ pub fn compute_with_tables(
 /// Hands over a CSV file per table, and says what is recorded of them. Tables of one name are one file: a study may ask the same of several parameters.
 fn write_tables(
     picture: &Picture,
-    runs: bool,
+    labelled: bool,
     parts: &[(String, AnyQuestion)],
     answers: &[Arc<Answer>],
     keep: &mut Keep<'_>,
@@ -279,7 +285,7 @@ fn write_tables(
             json!({ "kind": question.kind(), "question_sha256": question_hash(&**question), "stop": answer.stop });
         for table in &answer.tables {
             // A run's main table is called after its panel.
-            let ending = match (runs, table.name.as_str()) {
+            let ending = match (labelled, table.name.as_str()) {
                 (true, "path" | "section" | "motion") => label.clone(),
                 (true, other) => format!("{label}-{other}"),
                 (false, other) => other.to_owned(),
@@ -291,7 +297,7 @@ fn write_tables(
                 }
                 None => files.push(File {
                     ending,
-                    panel: runs.then(|| label.clone()),
+                    panel: labelled.then(|| label.clone()),
                     tables: vec![table],
                     about: vec![about.clone()],
                 }),

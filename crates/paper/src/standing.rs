@@ -59,6 +59,7 @@ impl Question for Drawn<'_> {
                 let here = Standing::of as *const () as usize;
                 json!({ "study": (study.draw as *const () as usize).wrapping_sub(here) })
             }
+            View::Plots(plots) => json!(plots.looks()),
             other => json!(format!("{other:?}")),
         };
         json!({
@@ -226,7 +227,7 @@ mod tests {
         let View::Study(study) = picture.view else { panic!("figure 1 is a study") };
         let changes: [&dyn Fn(&mut Picture); 8] = [
             &|p| p.alterations.push("seed 2".into()),
-            &|p| p.title = "something else",
+            &|p| p.title = "something else".into(),
             &|p| p.caption.push('.'),
             &|p| p.name.push_str("-printed"),
             &|p| p.reading = Some(Reading::Printed),

@@ -102,9 +102,9 @@ fn read(what: &str) -> Result<Sweeps, CliError> {
         return Ok(vec![(what.to_owned(), rows_of(what, &bytes)?)]);
     }
     let figure = chosen(&[what.to_owned()])?.remove(0);
-    let sweeps = figures::data(figure.id);
+    let sweeps = figures::data(&figure.id);
     if sweeps.is_empty() {
-        let id = figure.id;
+        let id = figure.id.to_string();
         return Err(CliError::Usage(format!("{id} is not made of sweeps; `twofold check {id}` recomputes all of it")));
     }
     sweeps.iter().map(|(file, bytes)| Ok(((*file).to_owned(), rows_of(file, bytes)?))).collect()

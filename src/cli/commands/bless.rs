@@ -73,14 +73,14 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     in_pool(arguments.threads, || executor.gather(&questions(figures.iter().flat_map(|f| &f.pictures))))?;
     let mut changed: Vec<(String, String)> = Vec::new();
     for figure in &figures {
-        let folder = arguments.expected.join(figure.id);
+        let folder = arguments.expected.join(&*figure.id);
         let path = folder.join("expected.json");
         let before = record::files::read_text(&path)
             .ok()
             .and_then(|text| Manifest::parse(&text, &path.display().to_string()).ok());
         let mut manifest = Manifest {
             version: VERSION,
-            figure: figure.id.to_owned(),
+            figure: figure.id.to_string(),
             made_by: env!("CARGO_PKG_VERSION").to_owned(),
             pictures: Vec::new(),
         };
@@ -124,7 +124,7 @@ fn write_table(expected: &Path) -> Result<(), CliError> {
     let manifests: Vec<Manifest> = figures::all()
         .iter()
         .filter_map(|f| {
-            let path = expected.join(f.id).join("expected.json");
+            let path = expected.join(&*f.id).join("expected.json");
             Manifest::parse(&record::files::read_text(&path).ok()?, &path.display().to_string()).ok()
         })
         .collect();

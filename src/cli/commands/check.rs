@@ -91,7 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
                     manifest.figure
                 )));
             }
-            figures.retain(|f| f.id == manifest.figure);
+            figures.retain(|f| *f.id == manifest.figure);
             if figures.is_empty() {
                 return Err(CliError::Usage(format!(
                     "{} is about \"{}\", which is not among the figures to check; name another manifest or figure",
@@ -108,8 +108,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         .map(|figure| match &given {
             Some(manifest) => Ok(manifest.clone()),
             None => match &arguments.expected {
-                Some(folder) => manifest_of(figure.id, &folder.join(figure.id).join("expected.json")),
-                None => embedded(figure.id),
+                Some(folder) => manifest_of(&figure.id, &folder.join(&*figure.id).join("expected.json")),
+                None => embedded(&figure.id),
             },
         })
         .collect();
@@ -128,7 +128,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         let manifest = match manifest {
             Ok(manifest) => manifest,
             Err(problem) => {
-                found(figure.id, State::MissingReference { why: problem.to_string() })?;
+                found(&figure.id, State::MissingReference { why: problem.to_string() })?;
                 continue;
             }
         };

@@ -1,5 +1,7 @@
 //! `twofold lyapunov`: the largest Lyapunov exponent of any system.
 
+use std::sync::Arc;
+
 use serde_json::json;
 
 use crate::analyse::lyapunov::{Exponent, LyapunovOptions, Sign};
@@ -11,7 +13,7 @@ use crate::cli::speak::{Delivery, deliver, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::integrate::StepCap;
 use crate::job::general::{GeneralExponents, GeneralRun, MeanRate};
-use crate::job::{Executor, JobError, LargestExponent, Question, Stop, encode};
+use crate::job::{AnyQuestion, Executor, JobError, LargestExponent, Question, Stop, encode};
 use crate::num::elementary::log10;
 
 /// The largest Lyapunov exponent of the orbit from the start, with its 95 % interval: the mean rate at which a tangent vector grows.
@@ -45,25 +47,64 @@ enum Format {
     Json,
 }
 
+impl Arguments {
+    /// What is asked.
+    ///
+    /// # Errors
+    /// If a flag has no effect, or a value is wrong.
+    pub fn question(&self) -> Result<AnyQuestion, CliError> {
+        Ok(match general::run_of(&self.flags)? {
+            Some(run) => Arc::new(self.of_general(run)?),
+            None => Arc::new(self.of_surfaces()?),
+        })
+    }
+
+    /// What is asked of a system with h, plus and minus.
+    fn of_surfaces(&self) -> Result<LargestExponent, CliError> {
+        let spec = self.flags.spec(Use::Exponent)?;
+        let transient = self.transient.unwrap_or(0.1 * spec.t_end);
+        if !(transient >= 0.0 && transient < spec.t_end) {
+            let text = format!("--transient is {transient}: give a time from 0 to below --t-end, {}", spec.t_end);
+            return Err(CliError::Usage(text));
+        }
+        let settings = LyapunovOptions {
+            tolerance: spec.method.tolerance,
+            max_step: if let StepCap::Absolute(h) = spec.method.step_cap { h } else { f64::INFINITY },
+            transient,
+            duration: spec.t_end - transient,
+            max_steps: spec.method.max_steps,
+            kick: spec.schedule.kick,
+        };
+        Ok(LargestExponent { system: spec.system, switch: spec.switch, start: spec.start, settings })
+    }
+
+    /// What is asked of a general system.
+    fn of_general(&self, mut run: GeneralRun) -> Result<GeneralExponents, CliError> {
+        for flag in ["--section", "--chord", "--every"] {
+            if self.flags.given().contains(&flag) {
+                return Err(CliError::no_effect(flag, "an exponent is an average along the whole orbit; leave it out"));
+            }
+        }
+        if self.flags.t_end.is_none() {
+            run.options.t_end = run.options.t_start + 10_000.0;
+        }
+        let length = run.options.t_end - run.options.t_start;
+        let transient = self.transient.unwrap_or(0.1 * length);
+        if !(transient >= 0.0 && transient < length) {
+            let text = format!("--transient is {transient}: give a time from 0 to below the run's length, {length}");
+            return Err(CliError::Usage(text));
+        }
+        let count = run.model.coordinates().len().min(MOST_EXPONENTS);
+        Ok(GeneralExponents { run, transient, count })
+    }
+}
+
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     if let Some(run) = general::run_of(&arguments.flags)? {
-        return of_general(arguments, run);
+        return of_general(arguments, &arguments.of_general(run)?);
     }
-    let spec = arguments.flags.spec(Use::Exponent)?;
-    let transient = arguments.transient.unwrap_or(0.1 * spec.t_end);
-    if !(transient >= 0.0 && transient < spec.t_end) {
-        let text = format!("--transient is {transient}: give a time from 0 to below --t-end, {}", spec.t_end);
-        return Err(CliError::Usage(text));
-    }
-    let settings = LyapunovOptions {
-        tolerance: spec.method.tolerance,
-        max_step: if let StepCap::Absolute(h) = spec.method.step_cap { h } else { f64::INFINITY },
-        transient,
-        duration: spec.t_end - transient,
-        max_steps: spec.method.max_steps,
-        kick: spec.schedule.kick,
-    };
-    let question = LargestExponent { system: spec.system, switch: spec.switch, start: spec.start, settings };
+    let question = arguments.of_surfaces()?;
+    let transient = question.settings.transient;
     let out = arguments.delivery.out.as_deref();
     let format = ending::format(out, arguments.format, Format::Text)?;
     try_delivery(out)?;
@@ -112,28 +153,12 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 const MOST_EXPONENTS: usize = 12;
 
 /// The exponents of a general system, by saltation matrices through its switches and resets.
-fn of_general(arguments: &Arguments, mut run: GeneralRun) -> Result<Exit, CliError> {
-    for flag in ["--section", "--chord", "--every"] {
-        if arguments.flags.given().contains(&flag) {
-            return Err(CliError::no_effect(flag, "an exponent is an average along the whole orbit; leave it out"));
-        }
-    }
-    if arguments.flags.t_end.is_none() {
-        run.options.t_end = run.options.t_start + 10_000.0;
-    }
-    let length = run.options.t_end - run.options.t_start;
-    let transient = arguments.transient.unwrap_or(0.1 * length);
-    if !(transient >= 0.0 && transient < length) {
-        let text = format!("--transient is {transient}: give a time from 0 to below the run's length, {length}");
-        return Err(CliError::Usage(text));
-    }
+fn of_general(arguments: &Arguments, question: &GeneralExponents) -> Result<Exit, CliError> {
     let out = arguments.delivery.out.as_deref();
     let format = ending::format(out, arguments.format, Format::Text)?;
     try_delivery(out)?;
-    let count = run.model.coordinates().len().min(MOST_EXPONENTS);
     let progress = Progress::with_grace(arguments.delivery.quiet);
-    let question = GeneralExponents { run, transient, count };
-    let answer = Executor::new(None, &progress).ask(&question)?;
+    let answer = Executor::new(None, &progress).ask(question)?;
     let fact = |e| CliError::Job(JobError::Fact(e));
     let found: Vec<MeanRate> = answer.fact("exponents").map_err(fact)?;
     let (from, until): (f64, f64) = (answer.fact("from").map_err(fact)?, answer.fact("to").map_err(fact)?);

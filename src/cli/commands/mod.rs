@@ -5,14 +5,15 @@ mod bless;
 mod check;
 mod figure;
 mod inspect;
-mod lyapunov;
+pub(crate) mod lyapunov;
 mod manual;
 mod new;
-mod orbit;
+pub(crate) mod orbit;
+mod paper;
 mod plot;
 mod published;
 mod report;
-mod rests;
+pub(crate) mod rests;
 mod run;
 mod scan;
 mod store;
@@ -53,6 +54,7 @@ enum Command {
     Inspect(inspect::Arguments),
     Verify(verify::Arguments),
     Store(store::Arguments),
+    Paper(paper::Arguments),
     Completions(manual::Completions),
     Man(manual::Man),
 }
@@ -86,6 +88,7 @@ pub fn main() -> ExitCode {
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Store(arguments) => store::run(&arguments),
+        Command::Paper(arguments) => paper::run(&arguments),
         Command::Completions(arguments) => manual::completions(&arguments, Arguments::command()),
         Command::Man(arguments) => manual::man(&arguments, Arguments::command()),
     };
@@ -115,11 +118,11 @@ pub(super) fn usage(error: &clap::Error) -> Exit {
 /// The figures of these names, or all.
 fn chosen(names: &[String]) -> Result<Vec<Figure>, CliError> {
     let all = figures::all();
-    if let Some(unknown) = names.iter().find(|n| !all.iter().any(|f| f.id == *n)) {
-        let known: Vec<&str> = all.iter().map(|f| f.id).collect();
+    if let Some(unknown) = names.iter().find(|n| !all.iter().any(|f| f.id == **n)) {
+        let known: Vec<&str> = all.iter().map(|f| &*f.id).collect();
         return Err(CliError::Usage(format!("there is no figure \"{unknown}\"; choose among {}", known.join(", "))));
     }
-    Ok(all.into_iter().filter(|f| names.is_empty() || names.iter().any(|n| n == f.id)).collect())
+    Ok(all.into_iter().filter(|f| names.is_empty() || names.iter().any(|n| *n == *f.id)).collect())
 }
 
 #[cfg(test)]

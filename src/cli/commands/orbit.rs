@@ -1,6 +1,7 @@
 //! `twofold orbit`: closed orbits and their stability.
 
 use std::fmt::Write as _;
+use std::sync::Arc;
 
 use serde_json::json;
 
@@ -19,7 +20,7 @@ use crate::job::general::{GeneralOrbit, GeneralRun};
 use crate::job::orbit::Along;
 use crate::job::rest::{Rest, Stability as RestStability};
 use crate::job::spec::Observation;
-use crate::job::{Answer, ClosedOrbit, Executor, JobError, Question, Stop, encode};
+use crate::job::{Answer, AnyQuestion, ClosedOrbit, Executor, JobError, Question, Stop, encode};
 
 /// Find a closed orbit through a plane by Newton's method, with its period and Floquet multipliers; with --along, follow it as a parameter
 /// changes, through folds, and say where it loses its stability.
@@ -73,40 +74,105 @@ enum Format {
 /// Most orbits of a branch.
 const MOST_ORBITS: usize = 10_000;
 
+impl Arguments {
+    /// What is asked.
+    ///
+    /// # Errors
+    /// If a flag has no effect, or a value is wrong.
+    pub fn question(&self) -> Result<AnyQuestion, CliError> {
+        Ok(match general::run_of(&self.flags)? {
+            Some(run) => Arc::new(self.of_general(run)?),
+            None => Arc::new(self.of_surfaces()?),
+        })
+    }
+
+    /// What is asked of a system with h, plus and minus.
+    fn of_surfaces(&self) -> Result<ClosedOrbit, CliError> {
+        if self.period.is_some() {
+            let why = "equations with h, plus and minus do not see the time; leave it out, and give --section";
+            return Err(CliError::no_effect("--period", why));
+        }
+        let spec = self.flags.spec(Use::Orbit)?;
+        let Observation::Section { coordinate, value } = spec.observe else {
+            return Err(CliError::Usage(
+                "a spec of an orbit has a section: make one with --section and --print-spec".into(),
+            ));
+        };
+        let settle = self.settle.unwrap_or(200.0);
+        for (flag, number, least) in
+            [("--settle", settle, "0 or more"), ("--longest-return", self.longest_return, "above 0")]
+        {
+            let good = number.is_finite() && (number > 0.0 || flag == "--settle" && number == 0.0);
+            if !good {
+                return Err(CliError::Usage(format!("{flag} is {number}: give a time {least}")));
+            }
+        }
+        Ok(ClosedOrbit {
+            system: spec.system,
+            switch: spec.switch,
+            start: spec.start,
+            settle,
+            plane: ReturnPlane { axis: coordinate, value, upward: !self.downward },
+            returns: self.returns,
+            tolerance: spec.method.tolerance,
+            longest_return: self.longest_return,
+            along: self.along.as_deref().map(along).transpose()?,
+        })
+    }
+
+    /// What is asked of a general system.
+    fn of_general(&self, mut run: GeneralRun) -> Result<GeneralOrbit, CliError> {
+        let given = self.flags.given();
+        let refused = [
+            ("--along", self.along.is_some()),
+            ("--downward", self.downward),
+            ("--chord", given.contains(&"--chord")),
+            ("--every", given.contains(&"--every")),
+            ("--t-end", given.contains(&"--t-end")),
+        ];
+        if let Some((flag, _)) = refused.iter().find(|(_, given)| *given) {
+            return Err(CliError::no_effect(
+                *flag,
+                "it has none on orbits of general systems; leave it out (a section's other side is -(...)=0)",
+            ));
+        }
+        let driven = run.model.depends_on_time();
+        let after = match (self.period, &run.options.record) {
+            (Some(_), Record::Section(_)) => {
+                return Err(CliError::no_effect(
+                    "--period",
+                    "--section says where an orbit closes; leave one of the two out",
+                ));
+            }
+            (Some(period), _) if period.is_finite() && period > 0.0 => Return::Period(period),
+            (Some(period), _) => return Err(CliError::Usage(format!("--period is {period}: give a time above 0"))),
+            (None, Record::Section(_)) if driven => {
+                return Err(CliError::Usage(
+                    "the equations depend on the time: give their period (--period) instead of --section".into(),
+                ));
+            }
+            (None, Record::Section(_)) => Return::Crossings(self.returns.unwrap_or(1)),
+            (None, _) => {
+                return Err(CliError::Usage(format!(
+                    "an orbit needs a place or time to close: give --section, such as {}=0, or --period of equations that depend on the time",
+                    run.model.coordinates()[0]
+                )));
+            }
+        };
+        let settle = self.settle.unwrap_or(200.0);
+        if !(settle.is_finite() && settle >= 0.0) {
+            return Err(CliError::Usage(format!("--settle is {settle}: give a time 0 or more")));
+        }
+        run.options.t_end = run.options.t_start + self.longest_return;
+        Ok(GeneralOrbit { run, settle, after })
+    }
+}
+
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     if let Some(run) = general::run_of(&arguments.flags)? {
-        return of_general(arguments, run);
+        return of_general(arguments, &arguments.of_general(run)?);
     }
-    if arguments.period.is_some() {
-        let why = "equations with h, plus and minus do not see the time; leave it out, and give --section";
-        return Err(CliError::no_effect("--period", why));
-    }
-    let spec = arguments.flags.spec(Use::Orbit)?;
-    let Observation::Section { coordinate, value } = spec.observe else {
-        return Err(CliError::Usage(
-            "a spec of an orbit has a section: make one with --section and --print-spec".into(),
-        ));
-    };
-    let settle = arguments.settle.unwrap_or(200.0);
-    for (flag, number, least) in
-        [("--settle", settle, "0 or more"), ("--longest-return", arguments.longest_return, "above 0")]
-    {
-        let good = number.is_finite() && (number > 0.0 || flag == "--settle" && number == 0.0);
-        if !good {
-            return Err(CliError::Usage(format!("{flag} is {number}: give a time {least}")));
-        }
-    }
-    let question = ClosedOrbit {
-        system: spec.system,
-        switch: spec.switch,
-        start: spec.start,
-        settle,
-        plane: ReturnPlane { axis: coordinate, value, upward: !arguments.downward },
-        returns: arguments.returns,
-        tolerance: spec.method.tolerance,
-        longest_return: arguments.longest_return,
-        along: arguments.along.as_deref().map(along).transpose()?,
-    };
+    let question = arguments.of_surfaces()?;
     let out = arguments.delivery.out.as_deref();
     let format = ending::format(out, arguments.format, Format::Text)?;
     try_delivery(out)?;
@@ -143,58 +209,15 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 }
 
 /// A closed orbit of a general system, through a section or over its period.
-fn of_general(arguments: &Arguments, mut run: GeneralRun) -> Result<Exit, CliError> {
-    let given = arguments.flags.given();
-    let refused = [
-        ("--along", arguments.along.is_some()),
-        ("--downward", arguments.downward),
-        ("--chord", given.contains(&"--chord")),
-        ("--every", given.contains(&"--every")),
-        ("--t-end", given.contains(&"--t-end")),
-    ];
-    if let Some((flag, _)) = refused.iter().find(|(_, given)| *given) {
-        return Err(CliError::no_effect(
-            *flag,
-            "it has none on orbits of general systems; leave it out (a section's other side is -(...)=0)",
-        ));
-    }
-    let driven = run.model.depends_on_time();
-    let after = match (arguments.period, &run.options.record) {
-        (Some(_), Record::Section(_)) => {
-            return Err(CliError::no_effect(
-                "--period",
-                "--section says where an orbit closes; leave one of the two out",
-            ));
-        }
-        (Some(period), _) if period.is_finite() && period > 0.0 => Return::Period(period),
-        (Some(period), _) => return Err(CliError::Usage(format!("--period is {period}: give a time above 0"))),
-        (None, Record::Section(_)) if driven => {
-            return Err(CliError::Usage(
-                "the equations depend on the time: give their period (--period) instead of --section".into(),
-            ));
-        }
-        (None, Record::Section(_)) => Return::Crossings(arguments.returns.unwrap_or(1)),
-        (None, _) => {
-            return Err(CliError::Usage(format!(
-                "an orbit needs a place or time to close: give --section, such as {}=0, or --period of equations that depend on the time",
-                run.model.coordinates()[0]
-            )));
-        }
-    };
-    let settle = arguments.settle.unwrap_or(200.0);
-    if !(settle.is_finite() && settle >= 0.0) {
-        return Err(CliError::Usage(format!("--settle is {settle}: give a time 0 or more")));
-    }
+fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, CliError> {
     let out = arguments.delivery.out.as_deref();
     let format = ending::format(out, arguments.format, Format::Text)?;
     if let Format::Csv = format {
         return Err(CliError::Usage("--format csv: of a general system's orbit give text or json".into()));
     }
     try_delivery(out)?;
-    run.options.t_end = run.options.t_start + arguments.longest_return;
-    let question = GeneralOrbit { run, settle, after };
     let progress = Progress::with_grace(arguments.delivery.quiet);
-    let answer = match Executor::new(None, &progress).ask(&question) {
+    let answer = match Executor::new(None, &progress).ask(question) {
         Err(JobError::Interrupted) if progress.asked_to_stop().is_some() => {
             let exit = progress.asked_to_stop().unwrap_or(Exit::Interrupted);
             return Err(CliError::Stopped { said: "interrupted before an orbit was found".into(), exit });

@@ -15,6 +15,7 @@ use crate::job::general::GeneralRun;
 use crate::job::question::question_hash;
 use crate::job::spec::RunSpec;
 use crate::job::{Answer, Executor, JobError, Run, Stop, encode};
+use crate::paper::plots::Recorded;
 use crate::paper::wording;
 use crate::record;
 use crate::render::number::number;
@@ -215,16 +216,8 @@ fn draw_general(arguments: &Arguments, mut run: GeneralRun, format: Format) -> R
     {
         *chord = 1e-4;
     }
-    let definition = run.model.definition().clone();
-    let crossed = arguments.flags.section.as_deref().map(|text| crossed(text, &run.model.coordinates()));
-    let frame = plot::Frame {
-        title: definition.title(),
-        states: definition.states(),
-        axes: definition.axes(),
-        system: None,
-        section: crossed,
-        times: (run.options.t_start, run.options.t_end),
-    };
+    let recorded = Recorded::General(run.clone(), arguments.flags.section.clone());
+    let frame = recorded.frame();
     let look = look(arguments, &frame)?;
     let unsuitable = |e: plot::PlotError| CliError::Usage(format!("--kind {}: {e}", look.kind.word()));
     plot::axes(&frame, look.kind, &look.axes).map_err(unsuitable)?;
@@ -252,15 +245,6 @@ fn draw_general(arguments: &Arguments, mut run: GeneralRun, format: Format) -> R
     sheet.searchable_svg = arguments.searchable;
     write(&sheet, &arguments.out, format)?;
     Ok(Exit::Fine)
-}
-
-/// What a section's equation crosses: the plane of a state, if it says no more than that.
-fn crossed<'a>(equation: &'a str, states: &[&str]) -> plot::Crossed<'a> {
-    let plane = equation.split_once('=').and_then(|(state, value)| {
-        let coordinate = states.iter().position(|s| *s == state.trim())?;
-        Some(plot::Crossed::Plane(coordinate, value.trim().parse().ok()?))
-    });
-    plane.unwrap_or(plot::Crossed::Surface(equation))
 }
 
 /// The run in words. The system's title, which stands above the picture, is not said again.

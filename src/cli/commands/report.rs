@@ -96,8 +96,8 @@ pub fn references(given: Option<&Path>) -> Result<Vec<FileBytes>, CliError> {
     // Away from a checkout, those that this program was built with: hashes only, no pictures.
     if given.is_none() && !folder.exists() {
         let embedded = |f: &Figure| {
-            let text = figures::reference(f.id)?;
-            Some(FileBytes { path: format!("{}/expected.json", f.id), bytes: text.as_bytes().to_vec() })
+            let text = figures::reference(&f.id)?;
+            Some(FileBytes { path: format!("{}/expected.json", &*f.id), bytes: text.as_bytes().to_vec() })
         };
         return Ok(figures::all().iter().filter_map(embedded).collect());
     }

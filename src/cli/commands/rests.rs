@@ -41,23 +41,33 @@ enum Format {
     Json,
 }
 
-pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
-    let model = general::any_model(&arguments.system, &arguments.set)?;
-    let names = model.coordinates();
-    let mut within = vec![(-10.0, 10.0); names.len()];
-    for text in &arguments.within {
-        let wrong =
-            |why: &str| CliError::Usage(format!("--within \"{text}\": {why}; give one such as {}=-2..2", names[0]));
-        let (name, range) = text.split_once('=').ok_or_else(|| wrong("there is no \"=\""))?;
-        let (low, high) = range.split_once("..").ok_or_else(|| wrong("there is no \"..\""))?;
-        let state = names.iter().position(|n| *n == name.trim()).ok_or_else(|| wrong("there is no such state"))?;
-        let number = |text: &str| text.trim().parse::<f64>().map_err(|_| wrong("a bound is no number"));
-        within[state] = (number(low)?, number(high)?);
+impl Arguments {
+    /// What is asked.
+    ///
+    /// # Errors
+    /// If the system cannot be read, or a bound is wrong.
+    pub fn question(&self) -> Result<GeneralRests, CliError> {
+        let model = general::any_model(&self.system, &self.set)?;
+        let names = model.coordinates();
+        let mut within = vec![(-10.0, 10.0); names.len()];
+        for text in &self.within {
+            let wrong =
+                |why: &str| CliError::Usage(format!("--within \"{text}\": {why}; give one such as {}=-2..2", names[0]));
+            let (name, range) = text.split_once('=').ok_or_else(|| wrong("there is no \"=\""))?;
+            let (low, high) = range.split_once("..").ok_or_else(|| wrong("there is no \"..\""))?;
+            let state = names.iter().position(|n| *n == name.trim()).ok_or_else(|| wrong("there is no such state"))?;
+            let number = |text: &str| text.trim().parse::<f64>().map_err(|_| wrong("a bound is no number"));
+            within[state] = (number(low)?, number(high)?);
+        }
+        Ok(GeneralRests { model, within })
     }
+}
+
+pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
+    let question = arguments.question()?;
     let out = arguments.delivery.out.as_deref();
     let format = ending::format(out, arguments.format, Format::Text)?;
     try_delivery(out)?;
-    let question = GeneralRests { model, within };
     let answer = Executor::quiet().ask(&question)?;
     let names = question.model.coordinates();
     let several = question.model.definition().modes().len() > 1;

@@ -44,6 +44,17 @@ pub enum Crossed<'a> {
     Surface(&'a str),
 }
 
+impl<'a> Crossed<'a> {
+    /// What a section's equation crosses: the plane of a state, if it says no more than that.
+    pub fn of(equation: &'a str, states: &[&str]) -> Self {
+        let plane = equation.split_once('=').and_then(|(state, value)| {
+            let coordinate = states.iter().position(|s| *s == state.trim())?;
+            Some(Crossed::Plane(coordinate, value.trim().parse().ok()?))
+        });
+        plane.unwrap_or(Crossed::Surface(equation))
+    }
+}
+
 impl<'a> From<&'a RunSpec> for Frame<'a> {
     fn from(run: &'a RunSpec) -> Self {
         let definition = run.system.definition();

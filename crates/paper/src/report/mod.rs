@@ -22,6 +22,7 @@ mod prose;
 mod rules;
 mod space;
 
+pub use html::escape;
 pub use archive::{RELEASE_DATE, archive};
 pub use assemble::{MadeFile, Program, assemble};
 pub use model::*;

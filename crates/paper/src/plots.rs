@@ -1,0 +1,317 @@
+//! Pictures whose panels are drawn from answers of any kind, of systems of any dimension: the figures of a paper's folder.
+
+use std::sync::Arc;
+
+use twofold_hybrid::motion::Record;
+use twofold_job::general::GeneralRun;
+use twofold_job::spec::RunSpec;
+use twofold_job::{Answer, AnyQuestion, Run, Table};
+use twofold_render::markup;
+use twofold_render::sheet::{
+    Axis, ColumnWidth, Content, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle, PlanePanel,
+    Sheet,
+};
+use twofold_render::style;
+
+use super::draw::plot::{self, Crossed, Frame, Look};
+
+/// The panels of a picture.
+#[derive(Clone, Debug)]
+pub struct Plots {
+    /// How many stand side by side.
+    pub columns: usize,
+    /// The panels, row by row.
+    pub plots: Vec<Plot>,
+}
+
+/// A panel: a question, and how its answer is drawn.
+#[derive(Clone, Debug)]
+pub struct Plot {
+    /// "a", "i" ...
+    pub label: String,
+    /// A few words above the panel, as plain text.
+    pub title: String,
+    /// What is asked.
+    pub question: AnyQuestion,
+    /// How the answer is drawn.
+    pub drawing: Drawing,
+    /// Numbers of the paper that are drawn over it.
+    pub points: Option<Points>,
+}
+
+/// How an answer is drawn.
+#[derive(Clone, Debug)]
+pub enum Drawing {
+    /// A run, as `twofold plot` draws it.
+    Run(Box<Recorded>, Look),
+    /// Columns of a table against another one.
+    Columns(Columns),
+}
+
+/// A run of a system of either kind.
+#[derive(Clone, Debug)]
+pub enum Recorded {
+    /// Of a system with h, plus and minus.
+    Surfaces(RunSpec),
+    /// Of a general system, with the equation of its section as text.
+    General(GeneralRun, Option<String>),
+}
+
+/// Columns of a table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Columns {
+    /// The table; the first one if none is named.
+    pub table: Option<String>,
+    /// The horizontal column.
+    pub x: String,
+    /// The vertical columns.
+    pub y: Vec<String>,
+    /// Dots instead of a line.
+    pub dots: bool,
+}
+
+/// Numbers read off a paper.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Points {
+    /// What they are, as plain text.
+    pub name: String,
+    /// Horizontal and vertical values.
+    pub points: Vec<[f64; 2]>,
+}
+
+impl Recorded {
+    /// The run as a question.
+    pub fn question(&self) -> AnyQuestion {
+        match self {
+            Recorded::Surfaces(spec) => Arc::new(Run(spec.clone())),
+            Recorded::General(run, _) => Arc::new(run.clone()),
+        }
+    }
+
+    /// What a picture needs to know of it.
+    pub fn frame(&self) -> Frame<'_> {
+        match self {
+            Recorded::Surfaces(spec) => Frame::from(spec),
+            Recorded::General(run, section) => {
+                let definition = run.model.definition();
+                let crossed = |text| Crossed::of(text, &run.model.coordinates());
+                Frame {
+                    title: definition.title(),
+                    states: definition.states(),
+                    axes: definition.axes(),
+                    system: None,
+                    section: match &run.options.record {
+                        Record::Section(_) => section.as_deref().map(crossed),
+                        _ => None,
+                    },
+                    times: (run.options.t_start, run.options.t_end),
+                }
+            }
+        }
+    }
+}
+
+impl Plots {
+    /// Everything that is drawn and not asked, as text: a change of it is another picture.
+    pub(super) fn looks(&self) -> String {
+        let looks: Vec<_> = self
+            .plots
+            .iter()
+            .map(|p| {
+                let drawing = match &p.drawing {
+                    Drawing::Run(_, look) => format!("{look:?}"),
+                    Drawing::Columns(columns) => format!("{columns:?}"),
+                };
+                format!("{} {} {drawing} {:?}", p.label, p.title, p.points)
+            })
+            .collect();
+        format!("{} {looks:?}", self.columns)
+    }
+
+    /// The drawing of the answers, in the panels' order.
+    ///
+    /// # Errors
+    /// The panel, and why it cannot be drawn.
+    pub fn sheet(&self, answers: &[Arc<Answer>]) -> Result<Sheet, (String, String)> {
+        let width = if self.columns == 1 && self.plots.len() == 1 { ColumnWidth::Single } else { ColumnWidth::Wide };
+        let mut whole = Sheet::new(width, self.columns, "");
+        for (plot, answer) in self.plots.iter().zip(answers) {
+            let part = plot.sheet(answer).map_err(|why| (plot.label.clone(), why))?;
+            let label =
+                if self.plots.len() > 1 { format!("({})", markup::literal(&plot.label)) } else { String::new() };
+            for (k, mut panel) in part.panels.into_iter().enumerate() {
+                if k == 0 {
+                    (panel.label, panel.title) = (label.clone(), markup::literal(&plot.title));
+                }
+                if let Content::Plane(plane) = &mut panel.content {
+                    plane.aspect = plane.aspect.or(Some(part.panel_aspect));
+                }
+                whole.panels.push(panel);
+            }
+            for entry in part.legend {
+                if !whole.legend.iter().any(|e| e.text == entry.text) {
+                    whole.legend.push(entry);
+                }
+            }
+        }
+        Ok(whole)
+    }
+}
+
+impl Plot {
+    fn sheet(&self, answer: &Answer) -> Result<Sheet, String> {
+        let mut sheet = match &self.drawing {
+            Drawing::Run(recorded, look) => {
+                let frame = recorded.frame();
+                plot::sheet(&frame, answer, look, Vec::new()).map_err(|e| e.to_string())?
+            }
+            Drawing::Columns(columns) => columns.sheet(answer)?,
+        };
+        if let (Some(points), Some(Content::Plane(plane))) =
+            (&self.points, sheet.panels.first_mut().map(|p| &mut p.content))
+        {
+            *plane = std::mem::replace(plane, PlanePanel::new(Axis::linear("", 0.0, 1.0), Axis::linear("", 0.0, 1.0)))
+                .markers(points.points.clone(), READ_OFF);
+            sheet = sheet.legend(LegendEntry::new(LegendKey::Marker(READ_OFF), markup::literal(&points.name)));
+        }
+        Ok(sheet)
+    }
+}
+
+impl Columns {
+    fn sheet(&self, answer: &Answer) -> Result<Sheet, String> {
+        let table = match &self.table {
+            Some(name) => answer.table(name).ok_or_else(|| {
+                let known: Vec<&str> = answer.tables.iter().map(|t| t.name.as_str()).collect();
+                format!("the answer has no table \"{name}\"; it has {}", listed(&known))
+            })?,
+            None => answer.tables.first().ok_or("the answer has no table")?,
+        };
+        let x = column(table, &self.x)?;
+        let ys = self.y.iter().map(|name| column(table, name)).collect::<Result<Vec<_>, _>>()?;
+        let named = |name: &str| markup::name(name);
+        let title = if self.y.len() == 1 { named(&self.y[0]) } else { String::new() };
+        let mut panel = PlanePanel::new(
+            Axis::covering(named(&self.x), x.iter().copied()),
+            Axis::covering(title, ys.iter().flat_map(|y| y.iter().copied())),
+        );
+        let mut legend = Vec::new();
+        for (k, y) in ys.iter().enumerate() {
+            let colour = COLOURS[k % COLOURS.len()];
+            let points = x.iter().zip(y.iter()).map(|(x, y)| [*x, *y]).collect();
+            let key = if self.dots {
+                let dots = DotStyle { colour, ..DotStyle::late() };
+                panel = panel.dots(points, dots);
+                LegendKey::Dots(dots)
+            } else {
+                let line = LineStyle::new(colour, style::CURVE_PT);
+                panel = panel.line(points, line);
+                LegendKey::Line(line)
+            };
+            if ys.len() > 1 {
+                legend.push(LegendEntry::new(key, named(&self.y[k])));
+            }
+        }
+        let mut sheet = Sheet::new(ColumnWidth::Single, 1, "").panel_aspect(0.75).panel("", "", panel);
+        sheet.legend = legend;
+        Ok(sheet)
+    }
+}
+
+/// A column of numbers.
+///
+/// # Errors
+/// If the table has no such column: its name, and those that there are.
+pub fn column<'a>(table: &'a Table, name: &str) -> Result<std::borrow::Cow<'a, [f64]>, String> {
+    let numbers = table.numbers(name);
+    if !numbers.is_empty() || table.is_empty() && table.columns.iter().any(|c| c.name == name) {
+        return Ok(numbers.into());
+    }
+    let integers = table.integers(name);
+    if !integers.is_empty() {
+        // Counts: far below 2^53.
+        return Ok(integers.iter().map(|i| *i as f64).collect::<Vec<_>>().into());
+    }
+    let known: Vec<&str> = table.columns.iter().map(|c| c.name.as_str()).collect();
+    Err(format!("table \"{}\" has no column of numbers \"{name}\"; it has {}", table.name, listed(&known)))
+}
+
+fn listed(names: &[&str]) -> String {
+    if names.is_empty() { "none".into() } else { names.join(", ") }
+}
+
+const COLOURS: [twofold_render::colour::Colour; 4] = [style::INK, style::BLUE, style::VERMILLION, style::GREEN];
+/// Numbers read off a paper.
+const READ_OFF: MarkerStyle = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::VERMILLION, size: 3.6 };
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use twofold_hybrid::{Definition, Model, Options};
+    use twofold_job::{Column, Entry, Executor};
+
+    fn ball() -> Recorded {
+        let text = "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-2']\n[[event]]\nwhen = 'x'\ndirection = 'down'\nset = { v = '-0.5*v' }";
+        let model = Model::new(Definition::from_toml(text, "ball").unwrap());
+        Recorded::General(GeneralRun { model, options: Options { t_end: 2.5, ..Options::default() } }, None)
+    }
+
+    fn plane(recorded: &Recorded) -> Plot {
+        let look = Look { kind: plot::Kind::Plane, axes: vec![0, 1], camera: None, title: None };
+        Plot {
+            label: "a".into(),
+            title: "<b> & *c*".into(),
+            question: recorded.question(),
+            drawing: Drawing::Run(recorded.clone().into(), look),
+            points: Some(Points { name: "of the paper".into(), points: vec![[0.5, 0.5]] }),
+        }
+    }
+
+    #[test]
+    fn runs_of_general_systems_and_columns_stand_side_by_side() {
+        let run = plane(&ball());
+        let table = Plot {
+            label: "b".into(),
+            drawing: Drawing::Columns(Columns {
+                table: None,
+                x: "t".into(),
+                y: vec!["x".into(), "v".into()],
+                dots: true,
+            }),
+            points: None,
+            ..run.clone()
+        };
+        let plots = Plots { columns: 2, plots: vec![run.clone(), table] };
+        let answer = Executor::quiet().ask(&*run.question).unwrap();
+        let sheet = plots.sheet(&[answer.clone(), answer]).unwrap();
+        assert_eq!(sheet.panels.len(), 2);
+        assert_eq!(sheet.panels[0].label, "(a)");
+        assert!(sheet.legend.iter().any(|e| e.text == "of the paper") && sheet.legend.len() >= 3);
+        twofold_render::render(&sheet).unwrap();
+    }
+
+    #[test]
+    fn a_column_that_is_not_there_is_named_with_those_that_are() {
+        let mut table = Table::new("branch", vec![Column::numbers("period")]);
+        table.push(vec![Entry::Number(1.0)]);
+        assert_eq!(&*column(&table, "period").unwrap(), [1.0]);
+        let said = column(&table, "perod").unwrap_err();
+        assert!(said.contains("branch") && said.contains("\"perod\"") && said.contains("it has period"), "{said}");
+    }
+
+    #[test]
+    fn whatever_is_drawn_is_part_of_the_looks() {
+        let plots = Plots { columns: 1, plots: vec![plane(&ball())] };
+        let changes: [&dyn Fn(&mut Plots); 4] =
+            [&|p| p.columns = 2, &|p| p.plots[0].title.push('.'), &|p| p.plots[0].points = None, &|p| {
+                if let Drawing::Run(_, look) = &mut p.plots[0].drawing {
+                    look.axes = vec![1, 0];
+                }
+            }];
+        for change in changes {
+            let mut other = plots.clone();
+            change(&mut other);
+            assert_ne!(other.looks(), plots.looks());
+        }
+    }
+}
