@@ -90,3 +90,5 @@ pub mod paper {
 
 #[cfg(feature = "cli")]
 pub mod cli;
+#[cfg(feature = "cli")]
+pub mod folder;

@@ -1,0 +1,729 @@
+//! What a paper says, and how it is scored: the kinds of checks.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use toml::Spanned;
+use toml::value::Datetime;
+
+use super::words::Ask;
+use super::{Folder, FolderError, Source};
+use crate::analyse::counts::wilson;
+use crate::job::general::MeanRate;
+use crate::job::{Answer, AnyQuestion, Executor, JobError, Table};
+use crate::num::random::RandomStream;
+use crate::record::Hash;
+use crate::system::diagnostic::nearest;
+
+/// A claim as it is written.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct ClaimFile {
+    /// A name of its own.
+    pub id: Spanned<String>,
+    /// Where the paper says it: "sec. 4.2, fig. 7(ii)".
+    place: String,
+    /// What it says, in our words, so that it can be measured.
+    says: String,
+    /// Its own words, a few of them.
+    #[serde(default)]
+    quote: String,
+    /// The day on which the rule was fixed.
+    decided: Datetime,
+    /// What was found beside the outcome: what was tried, what the paper leaves open.
+    #[serde(default)]
+    note: String,
+    /// The kind of check.
+    check: Spanned<String>,
+    /// The panel or measure that is read.
+    of: Spanned<String>,
+    /// A second one.
+    and: Option<Spanned<String>>,
+    /// A fact of the answer: "period", "multipliers/0/1".
+    read: Option<Spanned<String>>,
+    /// The same of the second one.
+    and_read: Option<Spanned<String>>,
+    /// Or a column of a table.
+    column: Option<Spanned<String>>,
+    /// The table [default: the first].
+    table: Option<Spanned<String>>,
+    /// What of the column, or of a complex fact: last, first, max, min, mean, span, count, modulus.
+    take: Option<Spanned<String>>,
+    /// The paper's value.
+    equals: Option<Spanned<f64>>,
+    /// Largest difference that still agrees.
+    within: Option<Spanned<f64>>,
+    /// Less or greater.
+    relation: Option<Spanned<String>>,
+    /// What the value is compared with.
+    than: Option<Spanned<f64>>,
+    /// A period of a section, in crossings.
+    is: Option<Spanned<u64>>,
+    /// Whether two attractors are the same.
+    same: Option<Spanned<bool>>,
+    /// The kind of a bifurcation.
+    kind: Option<Spanned<String>>,
+    /// The parameter's value at it.
+    at: Option<Spanned<f64>>,
+    /// Repeated from other starts.
+    odds: Option<Spanned<OddsFile>>,
+}
+
+/// How often a check is repeated.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+struct OddsFile {
+    /// Number of starts.
+    starts: u64,
+    /// Each state of the start moves by at most so much, uniformly.
+    spread: f64,
+    /// Of the random numbers [default: 2013].
+    #[serde(default = "seed")]
+    seed: u64,
+    /// The share of runs in which the check has to hold, at the lower end of its 95 % interval; without it the run of the file alone decides.
+    at_least: Option<f64>,
+}
+
+fn seed() -> u64 {
+    2013
+}
+
+/// A claim with its check.
+#[derive(Clone, Debug)]
+pub struct Claim {
+    /// A name of its own.
+    pub id: String,
+    /// Where the paper says it.
+    pub place: String,
+    /// What it says, in our words.
+    pub says: String,
+    /// Its own words.
+    pub quote: String,
+    /// The day on which the rule was fixed.
+    pub decided: String,
+    /// What was found beside the outcome.
+    pub note: String,
+    /// Digest of the rule: the check and all its numbers.
+    pub rule: Hash,
+    check: Check,
+    odds: Option<OddsFile>,
+    of: String,
+    and: Option<String>,
+}
+
+/// A number of an answer.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+enum Read {
+    Fact { path: String, modulus: bool },
+    Column { table: Option<String>, column: String, take: Take },
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+enum Take {
+    Last,
+    First,
+    Max,
+    Min,
+    Mean,
+    Span,
+    Count,
+}
+
+/// What is checked.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "check", rename_all = "kebab-case")]
+enum Check {
+    /// A number is the paper's.
+    Value { read: Read, equals: f64, within: f64 },
+    /// A number is less or greater than another one, or than another answer's.
+    Order { read: Read, less: bool, than: Option<f64>, other: Option<Read> },
+    /// The later half of a section repeats itself after so many crossings, and after no fewer.
+    Period { is: u64, within: f64 },
+    /// The largest exponent's 95 % interval lies above zero.
+    Chaos,
+    /// The later halves of two sections fill the same places.
+    Attractors { same: bool, within: f64 },
+    /// A branch changes its stability at a value of its parameter.
+    Bifurcation { kind: String, at: f64, within: f64 },
+}
+
+/// Kinds of checks, and the keys that each takes beside `of`.
+const KINDS: [(&str, &[&str]); 6] = [
+    ("value", &["read", "column", "table", "take", "equals", "within"]),
+    ("order", &["read", "column", "table", "take", "relation", "than", "and", "and-read"]),
+    ("period", &["is", "within"]),
+    ("chaos", &[]),
+    ("attractors", &["and", "same", "within"]),
+    ("bifurcation", &["kind", "at", "within"]),
+];
+
+/// Distances in a section are compared with its extent.
+const REPEATS: f64 = 1e-6;
+/// Sections that come nearer than this share of their extent are the same.
+const ALIKE: f64 = 0.05;
+/// The longest period that is looked for.
+const LONGEST: usize = 64;
+
+/// What a check came to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Verdict {
+    /// The claim.
+    pub claim: String,
+    /// Digest of its rule.
+    pub rule: Hash,
+    /// The day on which the rule was fixed.
+    pub decided: String,
+    /// Digest of the answers that were read.
+    pub data: Hash,
+    /// Whether the claim holds.
+    pub agrees: bool,
+    /// What was found.
+    pub found: String,
+    /// Repeated runs in which it holds, and all of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub odds: Option<[u64; 2]>,
+    /// Whether the rule was changed when these data were already known.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub rule_after_data: bool,
+}
+
+type Origin = Arc<(String, String)>;
+
+impl Claim {
+    /// Checks a claim as it is written; `known` says whether there is a panel or measure of a name.
+    pub(super) fn read(
+        origin: &Origin,
+        claim: Spanned<ClaimFile>,
+        known: &dyn Fn(&Spanned<String>) -> Result<(), FolderError>,
+    ) -> Result<Self, FolderError> {
+        let place = claim.span();
+        let c = claim.into_inner();
+        let wrong = |at: Range<usize>, why: String, help: String| {
+            FolderError::at(origin, at, why, (!help.is_empty()).then_some(help))
+        };
+        let Some((kind, takes)) = KINDS.iter().find(|(kind, _)| kind == c.check.get_ref()) else {
+            let kinds = KINDS.map(|(kind, _)| kind);
+            let help = nearest(c.check.get_ref(), &kinds)
+                .map_or(format!("there are {}", kinds.join(", ")), |near| format!("did you mean `{near}`?"));
+            return Err(wrong(c.check.span(), format!("there is no check `{}`", c.check.get_ref()), help));
+        };
+        let given = [
+            ("read", c.read.as_ref().map(Spanned::span)),
+            ("and-read", c.and_read.as_ref().map(Spanned::span)),
+            ("column", c.column.as_ref().map(Spanned::span)),
+            ("table", c.table.as_ref().map(Spanned::span)),
+            ("take", c.take.as_ref().map(Spanned::span)),
+            ("equals", c.equals.as_ref().map(Spanned::span)),
+            ("within", c.within.as_ref().map(Spanned::span)),
+            ("relation", c.relation.as_ref().map(Spanned::span)),
+            ("than", c.than.as_ref().map(Spanned::span)),
+            ("is", c.is.as_ref().map(Spanned::span)),
+            ("same", c.same.as_ref().map(Spanned::span)),
+            ("kind", c.kind.as_ref().map(Spanned::span)),
+            ("at", c.at.as_ref().map(Spanned::span)),
+            ("and", c.and.as_ref().map(Spanned::span)),
+        ];
+        if let Some((key, Some(at))) = given.iter().find(|(key, at)| at.is_some() && !takes.contains(key)) {
+            return Err(wrong(
+                at.clone(),
+                format!("`{key}` has no effect on a check of {kind}"),
+                "leave it out".into(),
+            ));
+        }
+        known(&c.of)?;
+        c.and.as_ref().map_or(Ok(()), known)?;
+        let missing = |what: &str| wrong(place.clone(), format!("a check of {kind} needs {what}"), String::new());
+        let number = |value: &Option<Spanned<f64>>, what: &str| match value {
+            Some(v) if v.get_ref().is_finite() => Ok(*v.get_ref()),
+            Some(v) => Err(wrong(v.span(), format!("{what} is not a finite number"), String::new())),
+            None => Err(missing(what)),
+        };
+        let tolerance = |default: Option<f64>| match (&c.within, default) {
+            (Some(v), _) if v.get_ref().is_finite() && *v.get_ref() >= 0.0 => Ok(*v.get_ref()),
+            (Some(v), _) => Err(wrong(v.span(), "`within` is a finite number, 0 or more".into(), String::new())),
+            (None, Some(default)) => Ok(default),
+            (None, None) => Err(missing("`within`, the largest difference that still agrees")),
+        };
+        let check = match *kind {
+            "value" => Check::Value {
+                read: reading(origin, &place, &c)?,
+                equals: number(&c.equals, "`equals`")?,
+                within: tolerance(None)?,
+            },
+            "order" => {
+                let less = match c.relation.as_ref().map(|r| (r.get_ref().as_str(), r.span())) {
+                    Some(("less" | "<", _)) => true,
+                    Some(("greater" | ">", _)) => false,
+                    Some((other, at)) => {
+                        let why = format!("there is no relation `{other}`");
+                        return Err(wrong(at, why, "give less or greater".into()));
+                    }
+                    None => return Err(missing("`relation`, less or greater")),
+                };
+                let read = reading(origin, &place, &c)?;
+                let other = match (&c.and, &c.and_read, &c.than) {
+                    (Some(_), Some(path), None) => Some(Read::Fact { path: path.get_ref().clone(), modulus: false }),
+                    (Some(_), None, None) => Some(read.clone()),
+                    (None, None, Some(_)) => None,
+                    _ => return Err(missing("`than`, a number, or `and`, another panel or measure")),
+                };
+                let than = if other.is_none() { Some(number(&c.than, "`than`")?) } else { None };
+                Check::Order { read, less, than, other }
+            }
+            "period" => Check::Period {
+                is: match &c.is {
+                    Some(n) if (1..=LONGEST as u64).contains(n.get_ref()) => *n.get_ref(),
+                    Some(n) => {
+                        return Err(wrong(n.span(), format!("a period is 1 to {LONGEST} crossings"), String::new()));
+                    }
+                    None => return Err(missing("`is`, the number of crossings")),
+                },
+                within: tolerance(Some(REPEATS))?,
+            },
+            "chaos" => Check::Chaos,
+            "attractors" => {
+                if c.and.is_none() {
+                    return Err(missing("`and`, the other panel or measure"));
+                }
+                let same = c.same.as_ref().ok_or_else(|| missing("`same`, true or false"))?;
+                Check::Attractors { same: *same.get_ref(), within: tolerance(Some(ALIKE))? }
+            }
+            _ => Check::Bifurcation {
+                kind: c.kind.as_ref().ok_or_else(|| missing("`kind`, such as period-doubling"))?.get_ref().clone(),
+                at: number(&c.at, "`at`")?,
+                within: tolerance(None)?,
+            },
+        };
+        if let Some(odds) = &c.odds {
+            let OddsFile { starts, spread, at_least, .. } = odds.get_ref();
+            let share = at_least.is_none_or(|s| s > 0.0 && s < 1.0);
+            if !(1..=1_000_000).contains(starts) || !(spread.is_finite() && *spread > 0.0) || !share {
+                let why = "odds have 1 to 1000000 starts, a spread above 0, and at-least between 0 and 1".to_owned();
+                return Err(wrong(odds.span(), why, String::new()));
+            }
+        }
+        let odds = c.odds.map(Spanned::into_inner);
+        let rule = Hash::of_json(&json!({
+            "check": check, "odds": odds, "of": c.of.get_ref(), "and": c.and.as_ref().map(Spanned::get_ref),
+        }));
+        Ok(Self {
+            id: c.id.into_inner(),
+            place: c.place,
+            says: c.says,
+            quote: c.quote,
+            decided: c.decided.to_string(),
+            note: c.note,
+            rule,
+            check,
+            odds,
+            of: c.of.into_inner(),
+            and: c.and.map(Spanned::into_inner),
+        })
+    }
+
+    /// The panels and measures that it reads.
+    pub fn reads(&self) -> impl Iterator<Item = &str> {
+        std::iter::once(self.of.as_str()).chain(self.and.as_deref())
+    }
+
+    /// The odds in words, if it has any.
+    pub fn kind(&self) -> &'static str {
+        match &self.check {
+            Check::Value { .. } => "value",
+            Check::Order { .. } => "order",
+            Check::Period { .. } => "period",
+            Check::Chaos => "chaos",
+            Check::Attractors { .. } => "attractors",
+            Check::Bifurcation { .. } => "bifurcation",
+        }
+    }
+
+    /// Everything that scoring it asks.
+    ///
+    /// # Errors
+    /// If a repeated run cannot be asked for.
+    pub fn questions(&self, folder: &Folder) -> Result<Vec<AnyQuestion>, FolderError> {
+        let mut all: Vec<AnyQuestion> = self.reads().map(|name| folder.sources[name].question.clone()).collect();
+        for repeated in self.repeated(folder)? {
+            all.extend(repeated);
+        }
+        Ok(all)
+    }
+
+    /// The questions of each repetition: those of the sources from starts that are moved by the same numbers.
+    fn repeated(&self, folder: &Folder) -> Result<Vec<Vec<AnyQuestion>>, FolderError> {
+        let Some(odds) = &self.odds else { return Ok(Vec::new()) };
+        let sources: Vec<&Source> = self.reads().map(|name| &folder.sources[name]).collect();
+        let starts = sources.iter().map(|source| start(source)).collect::<Result<Vec<_>, _>>()?;
+        let mut all = Vec::new();
+        for stream in 0..odds.starts {
+            let mut random = RandomStream::new(odds.seed, stream);
+            let longest = starts.iter().map(Vec::len).max().unwrap_or(0);
+            let moves: Vec<f64> = (0..longest).map(|_| random.uniform_in(-odds.spread, odds.spread)).collect();
+            let asked = sources.iter().zip(&starts).map(|(source, start)| {
+                let moved: Vec<f64> = start.iter().zip(&moves).map(|(x, d)| x + d).collect();
+                source.said.from_start(&moved).question(source.ask, &folder.root)
+            });
+            all.push(asked.collect::<Result<Vec<_>, _>>()?);
+        }
+        Ok(all)
+    }
+
+    /// Scores it.
+    ///
+    /// # Errors
+    /// If an answer could not be computed, or has nothing of what is read.
+    pub fn judge(&self, folder: &Folder, executor: &Executor<'_>) -> Result<Verdict, JobError> {
+        let ask = |questions: &[AnyQuestion]| {
+            questions.iter().map(|q| executor.ask(&**q)).collect::<Result<Vec<Arc<Answer>>, JobError>>()
+        };
+        let own: Vec<AnyQuestion> = self.reads().map(|name| folder.sources[name].question.clone()).collect();
+        let answers = ask(&own)?;
+        let (mut agrees, mut found) = self.check.of(&answers).map_err(JobError::Other)?;
+        let mut hashes: Vec<String> = answers.iter().map(|a| a.hash().as_str().to_owned()).collect();
+        let mut odds = None;
+        if let Some(rule) = &self.odds {
+            let mut hits = 0;
+            for questions in self.repeated(folder).map_err(|e| JobError::Other(e.to_string()))? {
+                let answers = ask(&questions)?;
+                hits += u64::from(self.check.of(&answers).map_err(JobError::Other)?.0);
+                hashes.extend(answers.iter().map(|a| a.hash().as_str().to_owned()));
+                executor.forget();
+            }
+            let [low, high] = wilson(hits, rule.starts, 0.95);
+            found += &format!("; so in {hits} of {} runs ({:.0} to {:.0} %)", rule.starts, 100.0 * low, 100.0 * high);
+            if let Some(least) = rule.at_least {
+                agrees = low >= least;
+            }
+            odds = Some([hits, rule.starts]);
+        }
+        Ok(Verdict {
+            claim: self.id.clone(),
+            rule: self.rule.clone(),
+            decided: self.decided.clone(),
+            data: Hash::of(hashes.join("\n").as_bytes()),
+            agrees,
+            found,
+            odds,
+            rule_after_data: false,
+        })
+    }
+}
+
+/// Where a source's run begins.
+fn start(source: &Source) -> Result<Vec<f64>, FolderError> {
+    let json = source.question.json();
+    let numbers = json["start"].as_array().map(|list| list.iter().filter_map(Value::as_f64).collect::<Vec<_>>());
+    match numbers {
+        Some(start) if !start.is_empty() && source.ask != Ask::Rests => Ok(start),
+        _ => Err(source.said.complain("odds move the start of a run, and this has none; give start")),
+    }
+}
+
+/// What a claim reads of its first source.
+fn reading(origin: &Origin, place: &Range<usize>, c: &ClaimFile) -> Result<Read, FolderError> {
+    let wrong = |at: Range<usize>, why: String, help: &str| FolderError::at(origin, at, why, Some(help.to_owned()));
+    match (&c.read, &c.column) {
+        (Some(path), None) => {
+            let modulus = match c.take.as_ref().map(|t| (t.get_ref().as_str(), t.span())) {
+                None => false,
+                Some(("modulus", _)) => true,
+                Some((other, at)) => {
+                    return Err(wrong(at, format!("`{other}` is taken of a column"), "give modulus, or leave it out"));
+                }
+            };
+            if let Some(table) = &c.table {
+                return Err(wrong(
+                    table.span(),
+                    "`table` has no effect on a fact".into(),
+                    "leave it out, or give column",
+                ));
+            }
+            Ok(Read::Fact { path: path.get_ref().clone(), modulus })
+        }
+        (None, Some(column)) => {
+            let take = match c.take.as_ref().map(|t| (t.get_ref().as_str(), t.span())) {
+                Some(("last", _)) => Take::Last,
+                Some(("first", _)) => Take::First,
+                Some(("max", _)) => Take::Max,
+                Some(("min", _)) => Take::Min,
+                Some(("mean", _)) => Take::Mean,
+                Some(("span", _)) => Take::Span,
+                Some(("count", _)) => Take::Count,
+                Some((other, at)) => {
+                    let help = "give last, first, max, min, mean, span or count";
+                    return Err(wrong(at, format!("`{other}` cannot be taken of a column"), help));
+                }
+                None => {
+                    return Err(wrong(
+                        column.span(),
+                        "what of the column?".into(),
+                        "give take, such as take = \"last\"",
+                    ));
+                }
+            };
+            let table = c.table.as_ref().map(|t| t.get_ref().clone());
+            Ok(Read::Column { table, column: column.get_ref().clone(), take })
+        }
+        _ => {
+            let help = "give read = \"FACT\", such as period, or column = \"NAME\" with take";
+            Err(wrong(place.clone(), "the claim reads nothing".into(), help))
+        }
+    }
+}
+
+impl Read {
+    fn of(&self, answer: &Answer) -> Result<f64, String> {
+        match self {
+            Read::Fact { path, modulus } => {
+                let mut parts = path.split('/');
+                let name = parts.next().unwrap_or_default();
+                let known = || answer.facts.keys().cloned().collect::<Vec<_>>().join(", ");
+                let mut at = answer
+                    .facts
+                    .get(name)
+                    .ok_or_else(|| format!("the answer has no fact \"{name}\"; it has {}", known()))?;
+                for part in parts {
+                    let inner = match at {
+                        Value::Array(list) => part.parse::<usize>().ok().and_then(|i| list.get(i)),
+                        Value::Object(map) => map.get(part),
+                        _ => None,
+                    };
+                    at = inner.ok_or_else(|| format!("\"{path}\": there is no \"{part}\" in {at}"))?;
+                }
+                let number = |v: &Value| v.as_f64();
+                match (at, modulus) {
+                    (Value::Array(pair), true) if pair.len() == 2 => match (number(&pair[0]), number(&pair[1])) {
+                        (Some(re), Some(im)) => Ok((re * re + im * im).sqrt()),
+                        _ => Err(format!("\"{path}\" is {at}, which is no complex number")),
+                    },
+                    (value, false) if number(value).is_some() => Ok(number(value).unwrap_or(f64::NAN)),
+                    _ => Err(format!("\"{path}\" is {at}, which is no number")),
+                }
+            }
+            Read::Column { table, column, take } => {
+                let table = match table {
+                    Some(name) => answer.table(name).ok_or_else(|| format!("the answer has no table \"{name}\""))?,
+                    None => answer.tables.first().ok_or("the answer has no table")?,
+                };
+                let values = crate::paper::plots::column(table, column)?;
+                let sum = || values.iter().sum::<f64>() / values.len() as f64;
+                let (low, high) =
+                    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+                if values.is_empty() && *take != Take::Count {
+                    return Err(format!("column \"{column}\" has no rows"));
+                }
+                Ok(match take {
+                    Take::Last => values[values.len() - 1],
+                    Take::First => values[0],
+                    Take::Max => high,
+                    Take::Min => low,
+                    Take::Mean => sum(),
+                    Take::Span => high - low,
+                    Take::Count => values.len() as f64,
+                })
+            }
+        }
+    }
+}
+
+impl Check {
+    /// Whether it holds of these answers, and what was found.
+    fn of(&self, answers: &[Arc<Answer>]) -> Result<(bool, String), String> {
+        let first = &answers[0];
+        match self {
+            Check::Value { read, equals, within } => {
+                let found = read.of(first)?;
+                let off = (found - equals).abs();
+                Ok((off <= *within, format!("{} ({equals} in the paper, {} off)", short(found), short(off))))
+            }
+            Check::Order { read, less, than, other } => {
+                let value = read.of(first)?;
+                let than = match (than, other) {
+                    (Some(than), _) => *than,
+                    (None, Some(other)) => other.of(answers.last().unwrap_or(first))?,
+                    (None, None) => return Err("nothing to compare with".into()),
+                };
+                let (holds, word) = match value {
+                    v if v < than => (*less, "less than"),
+                    v if v > than => (!*less, "greater than"),
+                    _ => (false, "not different from"),
+                };
+                Ok((holds, format!("{}, {word} {}", short(value), short(than))))
+            }
+            Check::Period { is, within } => {
+                let found = period(&section(first)?, *within);
+                let said = found.map_or("no period up to 64".to_owned(), |n| format!("period {n}"));
+                Ok((found == Some(*is as usize), said))
+            }
+            Check::Chaos => {
+                let (value, half) = largest_exponent(first)?;
+                Ok((value - half > 0.0, format!("largest exponent {} ± {}", short(value), short(half))))
+            }
+            Check::Attractors { same, within } => {
+                let (a, b) = (section(first)?, section(answers.last().unwrap_or(first))?);
+                let distance = apart(&a, &b)?;
+                let alike = distance <= *within;
+                let word = if alike { "the same attractor" } else { "different attractors" };
+                Ok((alike == *same, format!("{word}: {} of their extent apart", short(distance))))
+            }
+            Check::Bifurcation { kind, at, within } => {
+                let table = first.table("bifurcations").ok_or("the measure follows no branch; give along")?;
+                let parameter = &table.columns[1].name;
+                let values = table.numbers(parameter);
+                let mut near: Option<f64> = None;
+                for (word, value) in table.words("change").zip(values) {
+                    if word == kind && near.is_none_or(|old| (value - at).abs() < (old - at).abs()) {
+                        near = Some(*value);
+                    }
+                }
+                Ok(match near {
+                    Some(value) => {
+                        let off = (value - at).abs();
+                        let said =
+                            format!("{kind} at {parameter} = {} ({at} in the paper, {} off)", short(value), short(off));
+                        (off <= *within, said)
+                    }
+                    None => (false, format!("no {kind} on the branch")),
+                })
+            }
+        }
+    }
+}
+
+/// So many digits as a reader wants.
+fn short(value: f64) -> String {
+    let text = format!("{value:.6e}");
+    match text.parse::<f64>() {
+        Ok(rounded) if rounded == 0.0 || (1e-4..1e6).contains(&rounded.abs()) => format!("{rounded}"),
+        Ok(rounded) => format!("{rounded:e}"),
+        Err(_) => text,
+    }
+}
+
+fn largest_exponent(answer: &Answer) -> Result<(f64, f64), String> {
+    let no = |e: &dyn std::fmt::Display| format!("there is no exponent with an interval: {e}");
+    if answer.facts.contains_key("exponents") {
+        let all: Vec<MeanRate> = answer.fact("exponents").map_err(|e| no(&e))?;
+        let first = all.first().ok_or("there is no exponent")?;
+        return Ok((first.value.unwrap_or(f64::NEG_INFINITY), first.half_width));
+    }
+    let value: f64 = answer.fact("exponent").map_err(|e| no(&e))?;
+    let half: f64 = answer.fact("half_width").map_err(|e| no(&e))?;
+    Ok((value, half))
+}
+
+/// The later half of a section's crossings, by rows, one direction of crossing alone if the section knows it.
+fn section(answer: &Answer) -> Result<Vec<Vec<f64>>, String> {
+    let table = answer.table("section").ok_or("the run has no section; give section, such as section = \"y=0\"")?;
+    let t = table.numbers("t");
+    let (Some(first), Some(last)) = (t.first(), t.last()) else { return Err("the section was never crossed".into()) };
+    let half = 0.5 * (first + last);
+    let columns: Vec<&[f64]> = states(table);
+    let directions: Vec<&str> = table.words("direction").collect();
+    let wanted = directions.first().copied();
+    let rows = (0..t.len()).filter(|i| t[*i] > half && directions.get(*i).copied() == wanted);
+    let found: Vec<Vec<f64>> = rows.map(|i| columns.iter().map(|c| c[i]).collect()).collect();
+    if found.is_empty() { Err("the section was never crossed in the later half".into()) } else { Ok(found) }
+}
+
+fn states(table: &Table) -> Vec<&[f64]> {
+    let names = table.columns.iter().map(|c| c.name.as_str()).filter(|n| *n != "t");
+    names.map(|n| table.numbers(n)).filter(|v| v.len() == table.len()).collect()
+}
+
+/// The largest extent of points along a state.
+fn extent(points: &[Vec<f64>]) -> f64 {
+    let along = |i: usize| {
+        let (low, high) =
+            points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p[i]), b.max(p[i])));
+        (high - low, high.abs().max(low.abs()))
+    };
+    let (span, size) =
+        (0..points[0].len()).map(along).fold((0.0, 0.0), |(a, b), (c, d)| (f64::max(a, c), f64::max(b, d)));
+    // One point: its own size.
+    if span > 1e-9 * size { span } else { size.max(f64::MIN_POSITIVE) }
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).fold(0.0, |most, (a, b)| most.max((a - b).abs()))
+}
+
+/// After how many points a section repeats itself, if it does.
+fn period(points: &[Vec<f64>], within: f64) -> Option<usize> {
+    let near = within * extent(points);
+    // At least three times around.
+    (1..=LONGEST.min(points.len() / 3)).find(|n| points.iter().zip(&points[*n..]).all(|(a, b)| distance(a, b) <= near))
+}
+
+/// How far two sets of points lie apart (Hausdorff's distance), relative to their extent.
+fn apart(a: &[Vec<f64>], b: &[Vec<f64>]) -> Result<f64, String> {
+    if a[0].len() != b[0].len() {
+        return Err("the two sections have other states".into());
+    }
+    let thin = |points: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        let step = points.len().div_ceil(MOST_COMPARED);
+        points.iter().step_by(step).cloned().collect()
+    };
+    let (a, b) = (thin(a), thin(b));
+    let one_way = |from: &[Vec<f64>], to: &[Vec<f64>]| {
+        from.iter().map(|p| to.iter().map(|q| distance(p, q)).fold(f64::INFINITY, f64::min)).fold(0.0, f64::max)
+    };
+    let both: Vec<Vec<f64>> = a.iter().chain(&b).cloned().collect();
+    Ok(one_way(&a, &b).max(one_way(&b, &a)) / extent(&both))
+}
+
+/// Points of a section that are compared with another one's.
+const MOST_COMPARED: usize = 2000;
+
+/// Verdicts by claim.
+pub type Verdicts = BTreeMap<String, Verdict>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn circle(count: usize, turn: f64) -> Vec<Vec<f64>> {
+        (0..count).map(|i| vec![(turn * i as f64).cos(), (turn * i as f64).sin()]).collect()
+    }
+
+    #[test]
+    fn a_period_is_the_shortest_one_and_needs_three_turns() {
+        let third = std::f64::consts::TAU / 3.0;
+        assert_eq!(period(&circle(300, third), 1e-6), Some(3));
+        assert_eq!(period(&circle(8, third), 1e-6), None);
+        assert_eq!(period(&circle(300, 1.0), 1e-6), None);
+        assert_eq!(period(&vec![vec![2.0, 3.0]; 9], 1e-6), Some(1));
+    }
+
+    #[test]
+    fn sets_are_as_far_apart_as_their_farthest_points() {
+        let (a, b) = (circle(2000, 1.0), circle(1500, 0.7));
+        assert!(apart(&a, &b).unwrap() < 0.02);
+        let moved: Vec<Vec<f64>> = b.iter().map(|p| vec![p[0] + 1.0, p[1]]).collect();
+        assert!((apart(&a, &moved).unwrap() - 1.0 / 3.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn numbers_are_read_by_path_and_by_column() {
+        let mut table = Table::new("branch", vec![crate::job::Column::numbers("p")]);
+        for v in [3.0, 1.0, 2.0] {
+            table.push(vec![crate::job::Entry::Number(v)]);
+        }
+        let answer = Answer::of_tables(vec![table]).with_fact("multipliers", &[[3.0, 4.0], [0.5, 0.0]]);
+        let fact = |path: &str, modulus| Read::Fact { path: path.into(), modulus }.of(&answer);
+        assert_eq!(fact("multipliers/1/0", false), Ok(0.5));
+        assert_eq!(fact("multipliers/0", true), Ok(5.0));
+        assert!(fact("multiplier", false).unwrap_err().contains("it has multipliers"));
+        assert!(fact("multipliers/7/0", false).unwrap_err().contains("no \"7\""));
+        let column = |take| Read::Column { table: None, column: "p".into(), take }.of(&answer).unwrap();
+        let found = [Take::Last, Take::First, Take::Max, Take::Min, Take::Mean, Take::Span, Take::Count].map(column);
+        assert_eq!(found, [2.0, 3.0, 3.0, 1.0, 2.0, 2.0, 3.0]);
+    }
+}

@@ -1,0 +1,328 @@
+//! Making, checking and blessing a paper.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::check::{Claim, Verdict};
+use super::{Folder, FolderError, page};
+use crate::cli::{CliError, make};
+use crate::job::{AnyQuestion, Executor, JobError};
+use crate::paper::pipeline::{PictureRecord, questions};
+use crate::record::files::{read_text, try_folder};
+use crate::record::manifest::VERSION;
+use crate::record::{self, Manifest};
+
+/// What a claim came to: a verdict, or why there is none.
+#[derive(Debug)]
+pub struct Scored<'a> {
+    /// The claim.
+    pub claim: &'a Claim,
+    /// Its verdict.
+    pub verdict: Result<Verdict, JobError>,
+}
+
+/// Everything that was made.
+#[derive(Debug)]
+pub struct Made<'a> {
+    /// The pictures' records, in the figures' order.
+    pub pictures: Vec<PictureRecord>,
+    /// The claims with their verdicts.
+    pub claims: Vec<Scored<'a>>,
+}
+
+/// The outcomes of claims, as they are kept in `expected/claims.json`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Outcomes {
+    /// Version of this file: 1.
+    pub version: u32,
+    /// A verdict for each claim.
+    pub verdicts: Vec<Verdict>,
+}
+
+/// How something stands against what is expected.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "state", rename_all = "kebab-case")]
+pub enum State {
+    /// The same.
+    Same,
+    /// Another outcome, data or rule.
+    Differs {
+        /// What differs.
+        what: String,
+    },
+    /// Nothing is expected yet.
+    New,
+    /// It could not be computed.
+    Failed {
+        /// Why.
+        why: String,
+    },
+    /// Expected, and no longer there.
+    Gone,
+}
+
+/// A picture or claim against what is expected.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// The picture's or claim's name.
+    pub name: String,
+    /// How it stands.
+    #[serde(flatten)]
+    pub state: State,
+}
+
+impl Finding {
+    /// For people.
+    pub fn line(&self) -> String {
+        let name = &self.name;
+        match &self.state {
+            State::Same => format!("{name}: same"),
+            State::Differs { what } => format!("{name}: DIFFERS in its {what}"),
+            State::New => format!("{name}: NEW: nothing is expected of it yet"),
+            State::Failed { why } => format!("{name}: FAILED: {why}"),
+            State::Gone => format!("{name}: GONE: it is expected, and the folder has no such picture or claim"),
+        }
+    }
+}
+
+impl Folder {
+    /// Where outputs go.
+    pub fn out(&self) -> PathBuf {
+        self.root.join("out")
+    }
+
+    fn expected(&self) -> PathBuf {
+        self.root.join("expected")
+    }
+
+    /// Makes every figure and scores every claim: all questions side by side, each once. Answers that the executor's store keeps are not
+    /// computed again.
+    ///
+    /// # Errors
+    /// If a figure could not be computed, drawn or written, or a repeated run cannot be asked for. A claim that cannot be scored says so in the result.
+    pub fn make(&self, executor: &Executor<'_>) -> Result<Made<'_>, CliError> {
+        try_folder(&self.out())?;
+        let mut asked: Vec<AnyQuestion> = questions(self.figures.iter().flat_map(|f| &f.pictures));
+        for claim in &self.claims {
+            asked.extend(claim.questions(self)?);
+        }
+        executor.gather(&asked);
+        let pictures = make(&self.figures, &self.out(), executor)?;
+        let before = self.outcomes()?;
+        let claims = self
+            .claims
+            .iter()
+            .map(|claim| {
+                let verdict = claim.judge(self, executor).map(|mut found| {
+                    let known = before.verdicts.iter().find(|v| v.claim == claim.id);
+                    // The data were known: was it by this rule that they were first judged?
+                    found.rule_after_data =
+                        known.is_some_and(|v| v.data == found.data && (v.rule != found.rule || v.rule_after_data));
+                    executor.progress().line(&format!("{}: {}: {}", claim.id, outcome(&found), found.found));
+                    found
+                });
+                if let Err(why) = &verdict {
+                    executor.progress().line(&format!("{}: cannot be scored: {why}", claim.id));
+                }
+                Scored { claim, verdict }
+            })
+            .collect();
+        let made = Made { pictures, claims };
+        let mut json = serde_json::to_vec_pretty(&made.outcomes()).expect("verdicts are plain data");
+        json.push(b'\n');
+        record::write(&self.out().join("claims.json"), &json)?;
+        Ok(made)
+    }
+
+    /// Writes the page about what was made, and what archives and CODECHECK take.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn report(&self, made: &Made<'_>) -> Result<PathBuf, CliError> {
+        let path = self.out().join("report.html");
+        record::write(&path, page::page(self, made).as_bytes())?;
+        record::write(&self.out().join("codecheck.yml"), page::codecheck(self, made).as_bytes())?;
+        record::write(&self.out().join("ro-crate-metadata.json"), &page::crate_metadata(self, made))?;
+        Ok(path)
+    }
+
+    /// What was made against what is expected, pictures first.
+    ///
+    /// # Errors
+    /// If a file of `expected/` cannot be read.
+    pub fn compare(&self, made: &Made<'_>) -> Result<Vec<Finding>, CliError> {
+        let mut findings = Vec::new();
+        let mut pictures = made.pictures.iter();
+        for figure in &self.figures {
+            let manifest = self.manifest(&figure.id)?;
+            for picture in pictures.by_ref().take(figure.pictures.len()) {
+                let name = picture.hashes.name.clone();
+                let state = match manifest.as_ref().and_then(|m| m.picture(&name)) {
+                    None => State::New,
+                    Some(old) => match old.first_difference(&picture.hashes) {
+                        None => State::Same,
+                        Some(d) if d.panels.is_empty() => State::Differs { what: d.layer.name().to_owned() },
+                        Some(d) => {
+                            State::Differs { what: format!("{} (panel {})", d.layer.name(), record::listed(&d.panels)) }
+                        }
+                    },
+                };
+                findings.push(Finding { name, state });
+            }
+            for old in manifest.iter().flat_map(|m| &m.pictures) {
+                if !figure.pictures.iter().any(|p| p.name == old.name) {
+                    findings.push(Finding { name: old.name.clone(), state: State::Gone });
+                }
+            }
+        }
+        let before = self.outcomes()?;
+        for Scored { claim, verdict } in &made.claims {
+            let old = before.verdicts.iter().find(|v| v.claim == claim.id);
+            let state = match (verdict, old) {
+                (Err(why), _) => State::Failed { why: why.to_string() },
+                (Ok(_), None) => State::New,
+                (Ok(now), Some(old)) if now.rule != old.rule => {
+                    let known = if now.rule_after_data { ", changed when the data were known" } else { "" };
+                    State::Differs { what: format!("rule{known}") }
+                }
+                (Ok(now), Some(old)) if now.agrees != old.agrees => {
+                    State::Differs { what: format!("outcome: {}", now.found) }
+                }
+                (Ok(now), Some(old)) if now.data != old.data => State::Differs { what: "data".into() },
+                _ => State::Same,
+            };
+            findings.push(Finding { name: claim.id.clone(), state });
+        }
+        for old in &before.verdicts {
+            if !self.claims.iter().any(|c| c.id == old.claim) {
+                findings.push(Finding { name: old.claim.clone(), state: State::Gone });
+            }
+        }
+        Ok(findings)
+    }
+
+    /// Makes what was made the expectation, with a line that says why. Gives what changed; nothing is written if nothing did.
+    ///
+    /// # Errors
+    /// If a claim could not be scored, or a file cannot be written.
+    pub fn bless(&self, made: &Made<'_>, reason: &str) -> Result<Vec<String>, CliError> {
+        let findings = self.compare(made)?;
+        if let Some(Finding { name, state: State::Failed { why } }) =
+            findings.iter().find(|f| matches!(f.state, State::Failed { .. }))
+        {
+            return Err(CliError::Job(JobError::Other(format!("{name}: {why}; what fails is not blessed"))));
+        }
+        let changed: Vec<String> = findings
+            .iter()
+            .filter_map(|f| match &f.state {
+                State::Same | State::Failed { .. } => None,
+                State::Differs { what } => Some(format!("{} ({what})", f.name)),
+                State::New => Some(format!("{} (new)", f.name)),
+                State::Gone => Some(format!("{} (gone)", f.name)),
+            })
+            .collect();
+        if changed.is_empty() {
+            return Ok(changed);
+        }
+        let mut pictures = made.pictures.iter();
+        for figure in &self.figures {
+            let manifest = Manifest {
+                version: VERSION,
+                figure: figure.id.to_string(),
+                made_by: env!("CARGO_PKG_VERSION").to_owned(),
+                pictures: pictures.by_ref().take(figure.pictures.len()).map(|p| p.hashes.clone()).collect(),
+            };
+            record::write(&self.expected().join(format!("{}.json", figure.id)), &manifest.to_json())?;
+        }
+        let mut json = serde_json::to_vec_pretty(&made.outcomes()).expect("verdicts are plain data");
+        json.push(b'\n');
+        record::write(&self.expected().join("claims.json"), &json)?;
+        let log = self.expected().join("CHANGES.md");
+        let mut text = if log.exists() { read_text(&log)? } else { "# Why expectations changed\n\n".to_owned() };
+        text += &format!("- {reason}: {}\n", changed.join(", "));
+        record::write(&log, text.as_bytes())?;
+        Ok(changed)
+    }
+
+    fn manifest(&self, figure: &str) -> Result<Option<Manifest>, CliError> {
+        let path = self.expected().join(format!("{figure}.json"));
+        if !path.exists() {
+            return Ok(None);
+        }
+        Ok(Some(Manifest::parse(&read_text(&path)?, &path.display().to_string())?))
+    }
+
+    /// The outcomes that are expected.
+    fn outcomes(&self) -> Result<Outcomes, CliError> {
+        let path = self.expected().join("claims.json");
+        if !path.exists() {
+            return Ok(Outcomes::default());
+        }
+        let wrong = |why: String| CliError::Usage(format!("{}: {why}; bless the paper anew", path.display()));
+        let outcomes: Outcomes = serde_json::from_str(&read_text(&path)?).map_err(|e| wrong(e.to_string()))?;
+        if outcomes.version == 1 {
+            Ok(outcomes)
+        } else {
+            Err(wrong(format!("version {} is not known", outcomes.version)))
+        }
+    }
+}
+
+impl Made<'_> {
+    fn outcomes(&self) -> Outcomes {
+        Outcomes { version: 1, verdicts: self.claims.iter().filter_map(|s| s.verdict.as_ref().ok().cloned()).collect() }
+    }
+
+    /// Claims that hold, and all of them.
+    pub fn score(&self) -> (usize, usize) {
+        let holds = |s: &&Scored<'_>| s.verdict.as_ref().is_ok_and(|v| v.agrees);
+        (self.claims.iter().filter(holds).count(), self.claims.len())
+    }
+
+    /// The first claim that could not be scored.
+    pub fn failure(&self) -> Option<(&str, &JobError)> {
+        self.claims.iter().find_map(|s| Some((s.claim.id.as_str(), s.verdict.as_ref().err()?)))
+    }
+}
+
+/// The word for an outcome.
+pub fn outcome(verdict: &Verdict) -> &'static str {
+    if verdict.agrees { "agrees" } else { "differs" }
+}
+
+impl From<FolderError> for CliError {
+    fn from(error: FolderError) -> Self {
+        match error {
+            FolderError::File(file) => file.into(),
+            other => CliError::Usage(other.to_string()),
+        }
+    }
+}
+
+/// The files of a small paper that runs.
+const TEMPLATE: [(&str, &str); 6] = [
+    ("paper.toml", include_str!("template/paper.toml")),
+    ("systems/relay.toml", include_str!("template/systems/relay.toml")),
+    ("figures/fig1.toml", include_str!("template/figures/fig1.toml")),
+    ("measures.toml", include_str!("template/measures.toml")),
+    ("claims.toml", include_str!("template/claims.toml")),
+    ("README.md", include_str!("template/README.md")),
+];
+
+/// Writes a small paper that runs into a folder that does not exist or is empty.
+///
+/// # Errors
+/// If there is something in the folder, or a file cannot be written.
+pub fn begin(root: &Path) -> Result<(), CliError> {
+    let empty = !root.exists() || root.read_dir().is_ok_and(|mut entries| entries.next().is_none());
+    if !empty {
+        let why = format!("{} is not empty; name a folder that does not exist yet", root.display());
+        return Err(CliError::Usage(why));
+    }
+    for (file, text) in TEMPLATE {
+        record::write(&root.join(file), text.as_bytes())?;
+    }
+    Ok(())
+}

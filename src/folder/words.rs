@@ -1,0 +1,271 @@
+//! Questions in the words of the command line: `run = { system = "systems/relay.toml", t-end = 10 }` asks what `twofold run
+//! --system systems/relay.toml --t-end 10` asks.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::{Component, Path};
+use std::sync::Arc;
+
+use serde::Deserialize;
+use toml::{Spanned, Value};
+
+use super::FolderError;
+use crate::cli::CliError;
+use crate::cli::commands::{lyapunov, orbit, rests};
+use crate::cli::flags::{RunFlags, Use};
+use crate::cli::general;
+use crate::job::AnyQuestion;
+use crate::paper::plots::Recorded;
+use crate::system::diagnostic::nearest;
+use crate::system::{Diagnostic, library};
+
+/// The flags of a question by their names without dashes.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(transparent)]
+pub struct Words(BTreeMap<Spanned<String>, Spanned<Value>>);
+
+/// A question's words with the file that says them.
+#[derive(Clone, Debug)]
+pub struct Said {
+    /// Path of the file in the folder, and its text.
+    pub origin: Origin,
+    /// Where the question stands in it.
+    pub place: Range<usize>,
+    flags: Vec<Flag>,
+}
+
+/// A flag that is given.
+#[derive(Clone, Debug)]
+struct Flag {
+    name: String,
+    values: Vec<String>,
+    /// Where, if a file says it.
+    place: Option<(Origin, Range<usize>)>,
+}
+
+/// A file of the folder: its path there and its text.
+type Origin = Arc<(String, String)>;
+
+/// What a question asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ask {
+    /// `twofold run`.
+    Run,
+    /// `twofold orbit`.
+    Orbit,
+    /// `twofold lyapunov`.
+    Lyapunov,
+    /// `twofold rests`.
+    Rests,
+}
+
+/// Flags that say where an answer goes, and one that reads a whole run from elsewhere: not a question's.
+const NOT_ASKED: [&str; 5] = ["spec", "out", "format", "quiet", "help"];
+
+/// Flags that are given several times rather than as a list.
+const REPEATED: [&str; 2] = ["set", "within"];
+
+impl Words {
+    fn flags(&self, origin: &Origin) -> Result<Vec<Flag>, FolderError> {
+        let flag = |(key, value): (&Spanned<String>, &Spanned<Value>)| {
+            let name = key.get_ref().clone();
+            let values =
+                texts(&name, value.get_ref()).map_err(|why| FolderError::at(origin, value.span(), why, None))?;
+            Ok(Flag { name, values, place: Some((origin.clone(), key.span())) })
+        };
+        self.0.iter().map(flag).collect()
+    }
+}
+
+/// A value as the command line writes it.
+fn texts(key: &str, value: &Value) -> Result<Vec<String>, String> {
+    let one = |value: &Value| match value {
+        Value::String(text) => Ok(text.clone()),
+        Value::Integer(number) => Ok(number.to_string()),
+        // The shortest decimal that is this number.
+        Value::Float(number) => Ok(format!("{number:?}")),
+        Value::Boolean(_) | Value::Datetime(_) | Value::Array(_) | Value::Table(_) => {
+            Err(format!("`{key}` is a {}; give a number, a text, or a list of those", value.type_str()))
+        }
+    };
+    match value {
+        Value::Boolean(true) => Ok(Vec::new()),
+        Value::Boolean(false) => Err(format!("`{key} = false` has no effect; leave it out")),
+        Value::Array(list) if REPEATED.contains(&key) => list.iter().map(one).collect(),
+        Value::Array(list) => Ok(vec![list.iter().map(one).collect::<Result<Vec<_>, _>>()?.join(",")]),
+        Value::Table(table) if key == "set" => {
+            table.iter().map(|(name, value)| Ok(format!("{name}={}", one(value)?))).collect()
+        }
+        other => Ok(vec![one(other)?]),
+    }
+}
+
+impl Said {
+    /// The words of a question over those that hold for all (`defaults`, of the file `common`): a later word replaces an earlier one, and
+    /// parameters (`set`) add up.
+    ///
+    /// # Errors
+    /// If a value is of a kind that no flag takes.
+    pub fn new(
+        origin: &Origin,
+        words: &Spanned<Words>,
+        common: &Origin,
+        defaults: &[&Words],
+    ) -> Result<Self, FolderError> {
+        let mut flags: Vec<Flag> = Vec::new();
+        let layers = defaults.iter().map(|w| (*w, common)).chain(std::iter::once((words.get_ref(), origin)));
+        for (layer, origin) in layers {
+            for flag in layer.flags(origin)? {
+                match flags.iter_mut().find(|f| f.name == flag.name) {
+                    Some(old) if REPEATED.contains(&flag.name.as_str()) => {
+                        old.values.extend(flag.values);
+                        old.place = flag.place;
+                    }
+                    Some(old) => *old = flag,
+                    None => flags.push(flag),
+                }
+            }
+        }
+        Ok(Self { origin: origin.clone(), place: words.span(), flags })
+    }
+
+    /// The same question from another start.
+    pub fn from_start(&self, start: &[f64]) -> Self {
+        let mut other = self.clone();
+        other.flags.retain(|f| f.name != "start");
+        let text = start.iter().map(|v| format!("{v:?}")).collect::<Vec<_>>().join(",");
+        other.flags.push(Flag { name: "start".into(), values: vec![text], place: None });
+        other
+    }
+
+    fn wrong(&self, key: Option<&str>, why: impl Into<String>, help: Option<String>) -> FolderError {
+        let flag = key.and_then(|key| self.flags.iter().find(|f| f.name == key));
+        let place = flag.and_then(|f| f.place.clone());
+        let (origin, place) = place.unwrap_or_else(|| (self.origin.clone(), self.place.clone()));
+        FolderError::at(&origin, place, why.into(), help)
+    }
+
+    /// The flags as arguments, with the system's file found in the folder `root`.
+    fn arguments(&self, root: &Path) -> Result<Vec<String>, FolderError> {
+        let mut all = Vec::new();
+        for Flag { name: key, values, .. } in &self.flags {
+            if NOT_ASKED.contains(&key.as_str()) {
+                return Err(self.wrong(Some(key), format!("`{key}` is not part of a question; leave it out"), None));
+            }
+            for value in values {
+                let value = if key == "system" { self.system(root, value)? } else { value.clone() };
+                all.push(format!("--{key}={value}"));
+            }
+            if values.is_empty() {
+                all.push(format!("--{key}"));
+            }
+        }
+        Ok(all)
+    }
+
+    /// A built-in system's name, or the path of a file that lies in the folder.
+    fn system(&self, root: &Path, name: &str) -> Result<String, FolderError> {
+        if library::text(name).is_some() || library::general(name).is_some() {
+            return Ok(name.to_owned());
+        }
+        let wrong = |why: String| {
+            self.wrong(
+                Some("system"),
+                why,
+                Some(
+                    "name a file of this folder, such as systems/relay.toml, or a built-in system (twofold new --list)"
+                        .into(),
+                ),
+            )
+        };
+        if !Path::new(name).components().all(|c| matches!(c, Component::Normal(_))) {
+            return Err(wrong(format!("the system `{name}` does not lie in this folder")));
+        }
+        let path = root.join(name);
+        let (Ok(whole), Ok(found)) = (root.canonicalize(), path.canonicalize()) else {
+            return Err(wrong(format!("there is no system `{name}`")));
+        };
+        if !found.starts_with(whole) {
+            return Err(wrong(format!("the system `{name}` does not lie in this folder")));
+        }
+        Ok(path.display().to_string())
+    }
+
+    fn parsed<T: clap::Args>(&self, root: &Path) -> Result<T, FolderError> {
+        let command = T::augment_args(clap::Command::new("twofold").no_binary_name(true).disable_help_flag(true));
+        let known: Vec<String> = command.get_arguments().filter_map(|a| a.get_long().map(str::to_owned)).collect();
+        for Flag { name: key, .. } in &self.flags {
+            if !known.contains(key) && !NOT_ASKED.contains(&key.as_str()) {
+                let known: Vec<&str> = known.iter().map(String::as_str).filter(|k| !NOT_ASKED.contains(k)).collect();
+                let help = nearest(key, &known).map(|near| format!("did you mean `{near}`?"));
+                return Err(self.wrong(Some(key), format!("unknown key `{key}`"), help));
+            }
+        }
+        let read = command.try_get_matches_from(self.arguments(root)?).and_then(|m| T::from_arg_matches(&m));
+        read.map_err(|error| {
+            let text = error.to_string();
+            let first = text.lines().next().unwrap_or_default();
+            let said = first.trim_start_matches("error: ").to_owned();
+            self.wrong(self.named_in(&said).as_deref(), said, None)
+        })
+    }
+
+    /// The flag that a message of the command line names.
+    fn named_in(&self, message: &str) -> Option<String> {
+        let keys = self.flags.iter().map(|f| f.name.as_str());
+        keys.filter(|key| message.contains(&format!("--{key}"))).max_by_key(|key| key.len()).map(str::to_owned)
+    }
+
+    fn refused(&self, error: &CliError) -> FolderError {
+        let said = error.to_string();
+        let key = self.named_in(&said);
+        self.wrong(key.as_deref(), said, None)
+    }
+
+    /// The run that is asked for.
+    ///
+    /// # Errors
+    /// If a flag is unknown, has no effect, or a value is wrong.
+    pub fn recorded(&self, root: &Path, command: Use) -> Result<Recorded, FolderError> {
+        let flags: RunFlags = self.parsed(root)?;
+        let found = general::run_of(&flags).and_then(|run| match run {
+            Some(run) => Ok(Recorded::General(run, flags.section.clone())),
+            None => Ok(Recorded::Surfaces(flags.spec(command)?)),
+        });
+        found.map_err(|e| self.refused(&e))
+    }
+
+    /// The question that is asked.
+    ///
+    /// # Errors
+    /// As [`Said::recorded`].
+    pub fn question(&self, ask: Ask, root: &Path) -> Result<AnyQuestion, FolderError> {
+        let refused = |e: CliError| self.refused(&e);
+        match ask {
+            Ask::Run => Ok(self.recorded(root, Use::Any)?.question()),
+            Ask::Orbit => self.parsed::<orbit::Arguments>(root)?.question().map_err(refused),
+            Ask::Lyapunov => self.parsed::<lyapunov::Arguments>(root)?.question().map_err(refused),
+            Ask::Rests => {
+                let question = self.parsed::<rests::Arguments>(root)?.question().map_err(refused)?;
+                Ok(Arc::new(question))
+            }
+        }
+    }
+
+    /// An error that points at this question.
+    pub fn complain(&self, why: impl Into<String>) -> FolderError {
+        self.wrong(None, why, None)
+    }
+}
+
+impl FolderError {
+    /// An error at a place of a file.
+    pub fn at(
+        origin: &Arc<(String, String)>,
+        place: Range<usize>,
+        why: impl Into<String>,
+        help: Option<String>,
+    ) -> Self {
+        FolderError::Text(Diagnostic::new(why, &origin.0, &origin.1, place, help).into())
+    }
+}

@@ -1,0 +1,216 @@
+//! Papers as folders: `twofold paper`.
+#![cfg(feature = "cli")]
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use tempfile::TempDir;
+
+fn paper(arguments: &[&str], folder: &Path) -> (i32, String, String) {
+    let (action, rest) = arguments.split_first().expect("an action");
+    let run = Command::cargo_bin("twofold").unwrap().arg("paper").arg(action).arg(folder).args(rest).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (run.status.code().unwrap(), text(run.stdout), text(run.stderr))
+}
+
+/// The paper that `twofold paper new` writes.
+fn small() -> TempDir {
+    let place = tempfile::tempdir().unwrap();
+    let (code, _, said) = paper(&["new"], &place.path().join("p"));
+    assert_eq!(code, 0, "{said}");
+    place
+}
+
+fn change(root: &Path, file: &str, from: &str, to: &str) {
+    let path = root.join(file);
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(text.contains(from), "{file} has no {from:?}");
+    fs::write(path, text.replace(from, to)).unwrap();
+}
+
+#[test]
+fn a_new_paper_is_made_blessed_checked_and_reported() {
+    let place = small();
+    let root = place.path().join("p");
+    let (code, out, _) = paper(&["check", "--quiet"], &root);
+    assert!(code == 1 && out.contains("fig1: NEW"), "{out}");
+    let (code, out, _) = paper(&["bless", "--reason", "first", "--quiet"], &root);
+    assert!(code == 0 && out.contains("fig1 (new)"), "{out}");
+    let (code, out, _) = paper(&["check", "--quiet", "--fresh"], &root);
+    assert!(code == 0 && out.contains("2 of 2 claims agree; all the same"), "{out}");
+    let (code, _, _) = paper(&["report", "--quiet"], &root);
+    assert_eq!(code, 0);
+    let page = fs::read_to_string(root.join("out/report.html")).unwrap();
+    assert!(page.contains("2 of 2 claims agree") && page.contains("fig1/fig1.png"), "{page}");
+    let codecheck = fs::read_to_string(root.join("out/codecheck.yml")).unwrap();
+    assert!(codecheck.contains("file: \"fig1/fig1.png\""), "{codecheck}");
+    let metadata: serde_json::Value =
+        serde_json::from_slice(&fs::read(root.join("out/ro-crate-metadata.json")).unwrap()).unwrap();
+    assert!(metadata["@graph"].as_array().unwrap().iter().any(|e| e["@id"] == "fig1/fig1.svg"));
+    // Blessed again, nothing is written.
+    let before = fs::read(root.join("expected/CHANGES.md")).unwrap();
+    let (_, out, _) = paper(&["bless", "--reason", "again", "--quiet"], &root);
+    assert!(out.contains("nothing changed") && fs::read(root.join("expected/CHANGES.md")).unwrap() == before, "{out}");
+}
+
+/// Where a paper lies, how many threads make it, and whether a store helps, changes no byte.
+#[test]
+fn a_paper_is_the_same_bytes_wherever_it_lies() {
+    let (here, there) = (small(), small());
+    assert_eq!(paper(&["report", "--quiet", "--threads", "1", "--fresh"], &here.path().join("p")).0, 0);
+    assert_eq!(paper(&["report", "--quiet"], &there.path().join("p")).0, 0);
+    let mut compared = 0;
+    for file in [
+        "claims.json",
+        "report.html",
+        "fig1/fig1.png",
+        "fig1/fig1.svg",
+        "fig1/fig1.pdf",
+        "fig1/fig1.json",
+        "fig1/fig1-a.csv",
+    ] {
+        let read = |place: &TempDir| fs::read(place.path().join("p/out").join(file)).unwrap();
+        assert!(read(&here) == read(&there), "{file}");
+        compared += 1;
+    }
+    assert_eq!(compared, 7);
+}
+
+/// The rule of a check is fixed before its data: what comes later is said.
+#[test]
+fn a_rule_that_changes_after_its_data_is_said_to() {
+    let place = small();
+    let root = place.path().join("p");
+    assert_eq!(paper(&["bless", "--reason", "first", "--quiet"], &root).0, 0);
+    change(&root, "claims.toml", "within = 1e-6", "within = 1e-3");
+    let (code, out, _) = paper(&["check", "--quiet"], &root);
+    assert!(code == 1 && out.contains("period: DIFFERS in its rule, changed when the data were known"), "{out}");
+    assert_eq!(paper(&["bless", "--reason", "wider", "--quiet"], &root).0, 0);
+    assert_eq!(paper(&["report", "--quiet"], &root).0, 0);
+    let page = fs::read_to_string(root.join("out/report.html")).unwrap();
+    assert!(page.contains("changed when its data were known"), "{page}");
+}
+
+/// A wrong value is found to be wrong, and exit codes tell a difference from a failure.
+#[test]
+fn a_claim_that_does_not_hold_differs() {
+    let place = small();
+    let root = place.path().join("p");
+    change(&root, "claims.toml", "equals = 2.1972245773362196", "equals = 2.3");
+    let (code, out, _) = paper(&["make", "--quiet"], &root);
+    assert!(code == 0 && out.contains("period: differs: 2.197225 (2.3 in the paper"), "{out}");
+    change(&root, "claims.toml", "read = \"period\"", "read = \"perod\"");
+    let (code, out, _) = paper(&["make", "--quiet"], &root);
+    assert!(code == 3 && out.contains("no fact \"perod\""), "{out}");
+    let (code, _, said) = paper(&["bless", "--reason", "x", "--quiet"], &root);
+    assert!(code == 3 && said.contains("what fails is not blessed"), "{said}");
+}
+
+/// The share of starts in which a check holds.
+#[test]
+fn a_check_has_odds_from_other_starts() {
+    let place = small();
+    let root = place.path().join("p");
+    let claim = "\n[[claim]]\nid = \"above\"\nplace = \"-\"\nsays = \"It ends above zero.\"\ndecided = 2026-11-26\n\
+                 check = \"order\"\nof = \"end\"\nread = \"x/0\"\nrelation = \"greater\"\nthan = 0\nodds = { starts = 40, spread = 1, at-least = 0.9 }\n";
+    let mut text = fs::read_to_string(root.join("claims.toml")).unwrap();
+    text.push_str(claim);
+    fs::write(root.join("claims.toml"), text).unwrap();
+    let mut text = fs::read_to_string(root.join("measures.toml")).unwrap();
+    // x' = -x keeps its sign: it ends above zero if it starts there.
+    text.push_str("\n[end]\nrun = { system = \"systems/decay.toml\", t-end = 1 }\n");
+    fs::write(root.join("measures.toml"), text).unwrap();
+    fs::write(root.join("systems/decay.toml"), "states = [\"x\"]\nstart = [0.1]\nf = [\"-x\"]\n").unwrap();
+    let (code, out, said) = paper(&["make", "--quiet", "--json"], &root);
+    assert_eq!(code, 0, "{said}");
+    let out: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let found = out["claims"].as_array().unwrap().iter().find(|c| c["claim"] == "above").unwrap();
+    let hits = found["odds"][0].as_u64().unwrap();
+    // 0.1 + u with u uniform in [-1, 1]: 0.55 of them; 40 draws lie within five standard deviations.
+    assert!((7..=37).contains(&hits) && found["odds"][1] == 40, "{found}");
+    assert_eq!(found["outcome"], "differs", "{found}");
+}
+
+/// Bad input: what is wrong, where, what to do; exit code 2 and nothing written.
+#[test]
+fn what_is_wrong_in_a_folder_is_said_with_its_place() {
+    let reading = "[readings.a]\nabout = \"\"\nextends = \"b\"\n[readings.b]\nabout = \"\"\nextends = \"a\"\n[run]";
+    let cases: [(&str, &str, &str, &[&str]); 19] = [
+        (
+            "paper.toml",
+            "rtol = 1e-9",
+            "rtoll = 1e-9",
+            &["unknown key `rtoll`", "paper.toml:13:1", "did you mean `rtol`?"],
+        ),
+        ("paper.toml", "format = 1", "format = 2", &["format 2 is not known", "paper.toml:2:10"]),
+        ("paper.toml", "title =", "titel =", &["unknown field `titel`", "paper.toml:3:1"]),
+        ("paper.toml", "[run]", reading, &["readings extend each other in a circle: a -> b -> a"]),
+        (
+            "figures/fig1.toml",
+            "t-end = 12",
+            "t-edn = 12",
+            &["unknown key `t-edn`", "fig1.toml:10:40", "did you mean `t-end`?"],
+        ),
+        ("figures/fig1.toml", "t-end = 12", "t-end = \"x\"", &["invalid value 'x'", "fig1.toml:10:40"]),
+        ("figures/fig1.toml", "t-end = 12", "t-end = { a = 1 }", &["`t-end` is a table", "fig1.toml:10:48"]),
+        ("figures/fig1.toml", "t-end = 12", "t-end = 12, out = \"../x\"", &["`out` is not part of a question"]),
+        ("figures/fig1.toml", "t-end = 12", "t-end = 12, eps = 1", &["--eps has no effect", "fig1.toml:10:"]),
+        ("figures/fig1.toml", "label = \"b\"", "label = \"a\"", &["two panels `a`", "fig1.toml:13:9"]),
+        ("figures/fig1.toml", "label = \"b\"", "label = \"../b\"", &["the label `../b` is no plain name"]),
+        ("figures/fig1.toml", "draw = \"series\"", "draw = \"serie\"", &["unknown variant `serie`", "fig1.toml:9:8"]),
+        (
+            "figures/fig1.toml",
+            "systems/relay.toml",
+            "../p/systems/relay.toml",
+            &["does not lie in this folder", "fig1.toml:10:9"],
+        ),
+        ("figures/fig1.toml", "systems/relay.toml", "systems/reley.toml", &["there is no system `systems/reley.toml`"]),
+        ("claims.toml", "of = \"cycle\"", "of = \"cycel\"", &["no panel or measure `cycel`", "did you mean `cycle`?"]),
+        ("claims.toml", "read = \"period\"", "", &["the claim reads nothing", "claims.toml:2:1"]),
+        ("claims.toml", "check = \"value\"", "check = \"valeu\"", &["no check `valeu`", "did you mean `value`?"]),
+        ("claims.toml", "within = 1e-6", "within = 1e-6\nsame = true", &["`same` has no effect on a check of value"]),
+        (
+            "measures.toml",
+            "orbit = {",
+            "lyapunov = {}\norbit = {",
+            &["asks no question, or more than one", "measures.toml:2:1"],
+        ),
+    ];
+    for (file, from, to, said) in cases {
+        let place = small();
+        let root = place.path().join("p");
+        change(&root, file, from, to);
+        let (code, out, error) = paper(&["make", "--quiet"], &root);
+        assert_eq!(code, 2, "{to}: {out}{error}");
+        assert!(said.iter().all(|s| error.contains(s)), "{to}: {error}");
+        assert!(!root.join("out").exists(), "{to}");
+    }
+}
+
+/// A link that leads out of the folder is not followed.
+#[cfg(unix)]
+#[test]
+fn a_system_behind_a_link_is_refused() {
+    let place = small();
+    let root = place.path().join("p");
+    let outside = place.path().join("relay.toml");
+    fs::rename(root.join("systems/relay.toml"), &outside).unwrap();
+    std::os::unix::fs::symlink(&outside, root.join("systems/relay.toml")).unwrap();
+    let (code, _, error) = paper(&["make", "--quiet"], &root);
+    assert!(code == 2 && error.contains("does not lie in this folder"), "{error}");
+}
+
+/// Words of a paper reach its page as text.
+#[test]
+fn hostile_words_are_shown_as_they_are() {
+    let place = small();
+    let root = place.path().join("p");
+    change(&root, "paper.toml", "A relay with hysteresis, as an example", "<script>alert(1)</script>");
+    change(&root, "claims.toml", "A narrower loop", "<img src=x onerror=y>");
+    change(&root, "figures/fig1.toml", "w = 0.1\"", "*_{<b>\"");
+    let (code, _, said) = paper(&["report", "--quiet"], &root);
+    assert_eq!(code, 0, "{said}");
+    let page = fs::read_to_string(root.join("out/report.html")).unwrap();
+    assert!(!page.contains("<script") && !page.contains("<img src=x") && page.contains("&lt;script&gt;"), "{page}");
+}
