@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 
 use twofold_num::tape::{Program, Recorded};
-use twofold_num::{Arithmetic, Decimal, Elementary, Tape};
+use twofold_num::{Arithmetic, Decimal, Dual, Elementary, Tape};
 use twofold_system::Expression;
 use twofold_system::expression::{Function, General};
 
@@ -50,8 +50,16 @@ pub struct Compiled {
     pub active: Vec<usize>,
     /// Number of values of `watched`.
     pub outputs: usize,
+    /// The place of each guard among the active ones.
+    place: Vec<Option<usize>>,
     /// Which variables each value depends on: derivatives, then watched values.
     depends: Vec<Vec<u64>>,
+    /// The states and the time that each watched value depends on, and for each of those variables a colour: no value depends on two of one colour,
+    /// so that one derivative a colour gives all gradients (Curtis, Powell & Reid 1974).
+    pub(crate) touches: Vec<Vec<usize>>,
+    colours: Vec<usize>,
+    /// Watched values that are sums of variables with constant factors.
+    pub(crate) affine: Vec<Option<Affine>>,
     /// What can be flat where a step looks and steep elsewhere, and the program of its arguments.
     pub(crate) gates: Vec<Gate>,
     pub(crate) gate_arguments: Program,
@@ -365,12 +373,19 @@ impl Equation {
             outputs
         });
         let outputs = n + active.len() + self.watched.len();
+        let depends = dependencies(&tape);
+        let on = |value: usize, variable: usize| depends[value][variable / 64] & (1 << (variable % 64)) != 0;
+        let touches: Vec<Vec<usize>> = (n..outputs).map(|o| (0..=n).filter(|v| on(o, *v)).collect()).collect();
         let (gates, watched_gates) = (gates(&tape.select(0..n)), gates(&tape.select(n..outputs)));
         Compiled {
             field: Program::new(&tape.select(0..n)),
             watched: Program::new(&tape.select(n..outputs)),
             outputs: outputs - n,
-            depends: dependencies(&tape),
+            place: (0..self.guards.len()).map(|guard| active.iter().position(|a| *a == guard)).collect(),
+            affine: affine(&tape).split_off(n),
+            colours: colours(&touches, n + 1),
+            touches,
+            depends,
             gate_arguments: Program::new(&with_outputs(&tape, gates.iter().map(|(_, a)| *a).collect())),
             watched_gate_arguments: Program::new(&with_outputs(&tape, watched_gates.iter().map(|(_, a)| *a).collect())),
             watched_gates: watched_gates.into_iter().map(|(gate, _)| gate).collect(),
@@ -481,7 +496,99 @@ fn dependencies(tape: &Tape) -> Vec<Vec<u64>> {
     tape.outputs().iter().map(|node| of[*node].clone()).collect()
 }
 
+/// A sum of variables with constant factors.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Affine {
+    pub constant: f64,
+    pub factors: Vec<(usize, f64)>,
+}
+
+impl Affine {
+    fn plus(mut self, other: &Self, factor: f64) -> Self {
+        self.constant += factor * other.constant;
+        for (variable, f) in &other.factors {
+            match self.factors.iter_mut().find(|(v, _)| v == variable) {
+                Some((_, own)) => *own += factor * f,
+                None => self.factors.push((*variable, factor * f)),
+            }
+        }
+        self
+    }
+}
+
+/// The values of a tape that are sums of variables with constant factors.
+fn affine(tape: &Tape) -> Vec<Option<Affine>> {
+    use twofold_num::tape::Operation::{Add, Div, Mul, Neg, Sub, Variable};
+    // What depends on no variable is a number, whatever the variables are.
+    let fixed = tape.values(&vec![f64::NAN; tape.variables()]);
+    let number = |constant: f64| Affine { constant, factors: Vec::new() };
+    let mut of: Vec<Option<Affine>> = Vec::with_capacity(tape.operations().len());
+    for (node, operation) in tape.operations().iter().enumerate() {
+        let scaled = |a: usize, factor: f64| of[a].as_ref().map(|a| number(0.0).plus(a, factor));
+        let value = match *operation {
+            _ if fixed[node].is_finite() => Some(number(fixed[node])),
+            Variable(i) => Some(Affine { constant: 0.0, factors: vec![(i, 1.0)] }),
+            Neg(a) => scaled(a, -1.0),
+            Add(a, b) => of[b].as_ref().and_then(|b| Some(of[a].clone()?.plus(b, 1.0))),
+            Sub(a, b) => of[b].as_ref().and_then(|b| Some(of[a].clone()?.plus(b, -1.0))),
+            Mul(a, b) if fixed[a].is_finite() => scaled(b, fixed[a]),
+            Mul(a, b) if fixed[b].is_finite() => scaled(a, fixed[b]),
+            Div(a, b) if fixed[b].is_finite() => scaled(a, 1.0 / fixed[b]),
+            _ => None,
+        };
+        // Long sums are as fast by the program.
+        of.push(value.filter(|v| v.factors.len() <= 8));
+    }
+    tape.outputs().iter().map(|node| of[*node].clone()).collect()
+}
+
+/// Colours of variables, so that no list has two of one colour: the smallest that is free, one variable after the other.
+fn colours(lists: &[Vec<usize>], variables: usize) -> Vec<usize> {
+    let mut member = vec![Vec::new(); variables];
+    lists.iter().enumerate().for_each(|(i, list)| list.iter().for_each(|v| member[*v].push(i)));
+    let mut taken = vec![Vec::new(); lists.len()];
+    let free = |of: &Vec<usize>| {
+        let colour = (0..).find(|c| of.iter().all(|i| !taken[*i].contains(c))).unwrap_or(0);
+        of.iter().for_each(|i| taken[*i].push(colour));
+        colour
+    };
+    member.iter().map(free).collect()
+}
+
+/// Derivatives in so many directions at once.
+const WIDE: usize = 4;
+
 impl Compiled {
+    /// The place of a guard among the active ones.
+    pub(crate) fn place(&self, guard: usize) -> Option<usize> {
+        self.place[guard]
+    }
+
+    /// The derivatives of the watched values by the variables that each [touches](Self::touches).
+    pub(crate) fn gradients(&self, variables: &[f64]) -> Vec<Vec<f64>> {
+        let mut gradients: Vec<Vec<f64>> = self.touches.iter().map(|list| vec![0.0; list.len()]).collect();
+        let colours = self.colours.iter().max().map_or(0, |most| most + 1);
+        let mut out = vec![Dual::<f64, WIDE>::constant(0.0); self.outputs];
+        for from in (0..colours).step_by(WIDE) {
+            let mut duals: Vec<Dual<f64, WIDE>> = variables.iter().map(|v| Dual::constant(*v)).collect();
+            for (dual, colour) in duals.iter_mut().zip(&self.colours) {
+                if (from..from + WIDE).contains(colour) {
+                    dual.partials[colour - from] = 1.0;
+                }
+            }
+            self.watched.evaluate(&duals, &mut out);
+            for ((gradient, touches), value) in gradients.iter_mut().zip(&self.touches).zip(&out) {
+                for (slope, variable) in gradient.iter_mut().zip(touches) {
+                    let colour = self.colours[*variable];
+                    if (from..from + WIDE).contains(&colour) {
+                        *slope = value.partials[colour - from];
+                    }
+                }
+            }
+        }
+        gradients
+    }
+
     /// Whether a value (derivatives, then watched values) depends on a variable.
     pub(crate) fn depends(&self, value: usize, variable: usize) -> bool {
         self.depends[value][variable / 64] & (1 << (variable % 64)) != 0

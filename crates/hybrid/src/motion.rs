@@ -348,6 +348,8 @@ struct Follower<'a> {
     variables: Vec<f64>,
     /// Guards that are slid upon, and for each the configuration on its positive side (all others slid upon on their negative one).
     sliding: Vec<usize>,
+    /// Whether each guard is slid upon.
+    slides: Vec<bool>,
     base: Vec<(Rc<Compiled>, Vec<f64>)>,
     /// Where mixtures differ: the fields on all sides of the surfaces slid upon, for the rule that chooses among them.
     corners: Vec<(Rc<Compiled>, Vec<f64>)>,
@@ -376,6 +378,7 @@ struct Follower<'a> {
     next_record: f64,
     /// Room for values.
     scratch: Vec<f64>,
+    scale: Vec<f64>,
     outcome: Outcome,
 }
 
@@ -393,7 +396,7 @@ pub fn follow(
 }
 
 /// What each state's error is measured by in a step.
-fn scale_now(follower: &Follower, step: &Step) -> Vec<f64> {
+fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
     let options = follower.options;
     let span = options.t_end - options.t_start;
     let scale = |i: usize| {
@@ -409,7 +412,8 @@ fn scale_now(follower: &Follower, step: &Step) -> Vec<f64> {
             }
         }
     };
-    (0..step.x.len()).map(scale).collect()
+    out.clear();
+    out.extend((0..step.x.len()).map(scale));
 }
 
 /// The switching functions that the rule orders.
@@ -511,6 +515,7 @@ impl<'a> Follower<'a> {
             compiled,
             variables: vec![0.0; equation.variables()],
             sliding: Vec::new(),
+            slides: vec![false; guards],
             base: Vec::new(),
             corners: Vec::new(),
             order,
@@ -529,6 +534,7 @@ impl<'a> Follower<'a> {
             growth: None,
             next_record: f64::INFINITY,
             scratch: Vec::new(),
+            scale: Vec::new(),
             outcome: Outcome { ending: Ending::Finished, t: t0, x: x.clone(), steps: 0, switches: 0, events: 0 },
             config,
             x,
@@ -569,7 +575,7 @@ impl<'a> Follower<'a> {
                 self.next_record = ((self.t / every).floor() + 1.0) * every;
             }
         }
-        let mut last_values = Vec::new();
+        let (mut last_values, mut list) = (Vec::new(), Vec::new());
         let mut room = vec![0.0; self.n];
         loop {
             // Times at which something is known to happen.
@@ -589,14 +595,13 @@ impl<'a> Follower<'a> {
             }
             step.t = self.t;
             step.x.copy_from_slice(&self.x);
-            let (t, x) = (self.t, self.x.clone());
-            self.rhs(t, &x, &mut room);
+            self.rhs(step.t, &step.x, &mut room);
             step.k[0].copy_from_slice(&room);
             if !room.iter().all(|v| v.is_finite()) {
-                return Err(self.left_domain(t, &x));
+                return Err(self.left_domain(step.t, &step.x));
             }
             if self.options.method == Method::Radau5 {
-                step.jacobian = Some(self.jacobian(t, &x));
+                step.jacobian = Some(self.jacobian(step.t, &step.x));
             }
             if h == 0.0 {
                 h = self.first_step(&room);
@@ -616,7 +621,7 @@ impl<'a> Follower<'a> {
             let stopped = to_stop && !rejected;
             let most = if rejected { 1.2 } else { 5.0 };
             let h_next = wanted * if error > 0.0 { (0.9 * rough_pow(error, -0.2)).clamp(0.2, most) } else { most };
-            let list = self.sought();
+            self.sought(&step, &mut list);
             let found = self.find(&step, &list, &parts, &mut last_values);
             let earliest = found.iter().map(|(theta, _)| *theta).fold(f64::INFINITY, f64::min);
             if earliest.is_finite() {
@@ -685,14 +690,21 @@ impl<'a> Follower<'a> {
 
     /// Makes a step of at most this length that the tolerance allows and that has seen what there is; none if none is short enough.
     fn step_within(&mut self, step: &mut Step, longest: f64) -> Option<Accepted> {
+        let mut scale = std::mem::take(&mut self.scale);
+        let accepted = self.step_in_units(step, longest, &mut scale);
+        self.scale = scale;
+        accepted
+    }
+
+    fn step_in_units(&mut self, step: &mut Step, longest: f64, scale: &mut Vec<f64>) -> Option<Accepted> {
         let mut length = longest;
         for tried in 0..=MOST_SHORTENINGS {
             step.take(length, &mut |t, x, out| self.rhs(t, x, out));
-            let scale = scale_now(self, step);
+            scale_now(self, step, scale);
             let error = step.error(&|i| scale[i]);
             let factor = if error <= 1.0 {
                 // What the step did not see begins there: it is made to end before.
-                let unseen = self.unseen(step, &scale).map(|theta| theta.clamp(0.05, 0.9));
+                let unseen = self.unseen(step, scale).map(|theta| theta.clamp(0.05, 0.9));
                 match unseen.or_else(|| self.too_long_for_tangents(step)) {
                     Some(factor) => factor,
                     None => match self.parts(step) {
@@ -787,8 +799,8 @@ impl<'a> Follower<'a> {
         }
         if ending.is_none() && !self.equation.tables.is_empty() {
             // A table's jump may let sliding end, and make switching functions jump.
-            let zero = self.sliding.clone();
-            self.settle(&zero)?;
+            let (zero, none) = (self.sliding.clone(), vec![false; self.slides.len()]);
+            self.decide(&zero, &none)?;
         }
         Ok(ending)
     }

@@ -32,6 +32,11 @@ pub(crate) fn stays(v: &[f64; 5], side: f64) -> bool {
     if !(b[1..].iter().all(|c| c * side > 0.0) && b[0] * side >= 0.0) {
         return false;
     }
+    keeps_away(&b, side)
+}
+
+/// Whether Bernstein coefficients on one side of zero say that there is no zero.
+pub(crate) fn keeps_away(b: &[f64; 5], side: f64) -> bool {
     // A polynomial that only comes near to zero between its ends is not what the function is: it is looked at closer.
     let (low, high) = b.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), c| (l.min(c * side), h.max(c * side)));
     let goes_one_way = b.windows(2).all(|w| w[0] <= w[1]) || b.windows(2).all(|w| w[0] >= w[1]);

@@ -227,6 +227,18 @@ impl Step {
         }
     }
 
+    /// The Bernstein coefficients of degree 4 of a state's continuous extension.
+    pub fn bernstein(&self, i: usize) -> [f64; 5] {
+        let [a, b, c, d] = self.extension.each_ref().map(|e| e[i]);
+        let x = self.x[i];
+        if self.jacobian.is_some() {
+            return [x, x + 0.25 * a, x + 0.5 * a + b / 6.0, x + 0.75 * a + 0.5 * b + 0.25 * c, x + a + b + c];
+        }
+        let first = x + 0.25 * (a + b);
+        let third = x + 0.75 * a + 0.25 * (b + c);
+        [x, first, x + 0.5 * a + b / 3.0 + (c + d) / 6.0, third, x + a]
+    }
+
     /// The state at the fraction `theta` of the step.
     pub fn at(&self, theta: f64, out: &mut [f64]) {
         let rest = 1.0 - theta;
@@ -239,6 +251,39 @@ impl Step {
         }
         for i in 0..out.len() {
             out[i] = self.x[i] + theta * (a[i] + rest * (b[i] + theta * (c[i] + rest * d[i])));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bernstein_coefficients_are_those_of_the_continuous_extension() {
+        for jacobian in [None, Some(vec![-0.3])] {
+            let mut step = Step::new(1);
+            let mut rhs = |t: f64, x: &[f64], out: &mut [f64]| out[0] = -0.3 * x[0] + (3.0 * t).cos() + t * t;
+            (step.t, step.x[0], step.jacobian) = (0.2, 1.5, jacobian);
+            let mut first = [0.0];
+            rhs(0.2, &[1.5], &mut first);
+            step.k[0][0] = first[0];
+            step.take(0.7, &mut rhs);
+            let b = step.bernstein(0);
+            for theta in [0.0, 0.1, 0.5, 0.8, 1.0_f64] {
+                let w = 1.0 - theta;
+                let basis = [
+                    w.powi(4),
+                    4.0 * theta * w.powi(3),
+                    6.0 * (theta * w).powi(2),
+                    4.0 * w * theta.powi(3),
+                    theta.powi(4),
+                ];
+                let mut want = [0.0];
+                step.at(theta, &mut want);
+                let found: f64 = b.iter().zip(basis).map(|(b, p)| b * p).sum();
+                assert!((found - want[0]).abs() < 1e-14, "{found} {want:?}");
+            }
         }
     }
 }

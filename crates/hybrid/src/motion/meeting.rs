@@ -374,25 +374,44 @@ impl Follower<'_> {
         if off.iter().all(|v| *v == 0.0) && self.tangents.is_none() {
             return;
         }
-        let mut rows = vec![vec![0.0; self.n]; k];
-        let mut out = vec![Dual::<f64, 1>::constant(0.0); outputs];
-        for i in 0..self.n {
-            let mut duals: Vec<Dual<f64, 1>> = self.variables.iter().map(|v| Dual::constant(*v)).collect();
-            duals[i].partials = [1.0];
-            self.compiled.watched.evaluate(&duals, &mut out);
-            for (row, guard) in self.sliding.iter().enumerate() {
-                let place = self.compiled.active.iter().position(|g| g == guard);
-                rows[row][i] = place.map_or(0.0, |p| out[p].partials[0]);
+        // Gradients by states, as far as each surface depends on them.
+        let gradients = self.compiled.gradients(&self.variables);
+        let rows: Vec<Vec<(usize, f64)>> = self
+            .sliding
+            .iter()
+            .map(|guard| {
+                let Some(place) = self.compiled.place(*guard) else { return Vec::new() };
+                let entries = self.compiled.touches[place].iter().copied().zip(gradients[place].iter().copied());
+                entries.filter(|(state, _)| *state < self.n).collect()
+            })
+            .collect();
+        // Surfaces that depend on a state together are met together.
+        let (mut owner, mut part): (Vec<Option<usize>>, Vec<usize>) = (vec![None; self.n], (0..k).collect());
+        for (i, row) in rows.iter().enumerate() {
+            for (state, _) in row {
+                let other = part[*owner[*state].get_or_insert(i)];
+                let (from, to) = (part[i].max(other), part[i].min(other));
+                if from != to {
+                    part.iter_mut().filter(|p| **p == from).for_each(|p| *p = to);
+                }
             }
         }
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let mut gram = Vec::with_capacity(k * k);
-        for a in &rows {
-            gram.extend(rows.iter().map(|b| dot(a, b)));
-        }
-        let onto = |v: &mut [f64], off: &[f64]| {
-            for (row, weight) in rows.iter().zip(solve_any(&gram, off, 0.0).unwrap_or_default()) {
-                v.iter_mut().zip(row).for_each(|(v, r)| *v -= weight * r);
+        let mut parts: Vec<Vec<usize>> = vec![Vec::new(); k];
+        part.iter().enumerate().for_each(|(i, p)| parts[*p].push(i));
+        let dot = |a: &[(usize, f64)], v: &[f64]| a.iter().map(|(state, slope)| slope * v[*state]).sum::<f64>();
+        let mut dense = vec![0.0; self.n];
+        let mut onto = |v: &mut [f64], off: &[f64]| {
+            for part in parts.iter().filter(|part| !part.is_empty()) {
+                let mut gram = Vec::with_capacity(part.len() * part.len());
+                for i in part {
+                    rows[*i].iter().for_each(|(state, slope)| dense[*state] = *slope);
+                    gram.extend(part.iter().map(|j| dot(&rows[*j], &dense)));
+                    rows[*i].iter().for_each(|(state, _)| dense[*state] = 0.0);
+                }
+                let off: Vec<f64> = part.iter().map(|i| off[*i]).collect();
+                for (i, weight) in part.iter().zip(solve_any(&gram, &off, 0.0).unwrap_or_default()) {
+                    rows[*i].iter().for_each(|(state, slope)| v[*state] -= weight * slope);
+                }
             }
         };
         onto(&mut self.x, &off);

@@ -14,20 +14,29 @@ const DEEPEST: usize = 16;
 const LARGEST_DEFECT: f64 = 1e3;
 
 impl Follower<'_> {
-    pub(super) fn sought(&self) -> Vec<(Sought, f64)> {
-        let mut list = Vec::new();
-        for guard in &self.compiled.active {
-            if self.sliding.contains(guard) {
+    /// What may be met in a step, with the side that it is on.
+    pub(super) fn sought(&self, step: &Step, list: &mut Vec<(Sought, f64)>) {
+        list.clear();
+        for (place, guard) in self.compiled.active.iter().enumerate() {
+            let side = self.config.sides[*guard];
+            if self.slides[*guard] {
                 continue;
             }
             if self.equation.guards[*guard].whole {
-                list.push((Sought::Guard { guard: *guard, upper: false }, 1.0));
-                list.push((Sought::Guard { guard: *guard, upper: true }, 1.0));
-            } else {
-                list.push((Sought::Guard { guard: *guard, upper: false }, self.config.sides[*guard]));
+                for (upper, boundary, way) in [(false, side, 1.0), (true, side + 1.0, -1.0)] {
+                    if self.fresh_guard[*guard] || !self.stays_away(step, place, boundary, way) {
+                        list.push((Sought::Guard { guard: *guard, upper }, 1.0));
+                    }
+                }
+            } else if self.fresh_guard[*guard] || !self.stays_away(step, place, 0.0, side) {
+                list.push((Sought::Guard { guard: *guard, upper: false }, side));
             }
         }
+        let watched = self.compiled.active.len();
         for (i, side) in self.watch_side.iter().enumerate() {
+            if *side != 0.0 && !self.fresh_watch[i] && self.stays_away(step, watched + i, 0.0, *side) {
+                continue;
+            }
             if *side != 0.0 && !self.contacts.iter().any(|c| c.watched == i) {
                 list.push((Sought::Watched(i), *side));
             }
@@ -40,7 +49,25 @@ impl Follower<'_> {
             list.push((Sought::Repelling, 1.0));
         }
         list.extend((0..self.contacts.len()).map(|place| (Sought::Release(place), 1.0)));
-        list
+    }
+
+    /// Whether a watched value stays on its side of `boundary` in a step, as can be told without evaluating it: a sum of states is a polynomial along the
+    /// step's continuous extension, and lies between its Bernstein coefficients.
+    fn stays_away(&self, step: &Step, place: usize, boundary: f64, side: f64) -> bool {
+        let Some(sum) = &self.compiled.affine[place] else { return false };
+        let mut b = [sum.constant - boundary; 5];
+        let mut size = b[0].abs();
+        for (variable, factor) in &sum.factors {
+            let part = match *variable {
+                i if i < self.n => step.bernstein(i),
+                i if i == self.n => [0.0, 0.25, 0.5, 0.75, 1.0].map(|theta| step.t + theta * step.h),
+                i => [self.variables[i]; 5],
+            };
+            size += (factor * part[0]).abs();
+            b.iter_mut().zip(part).for_each(|(b, p)| *b += factor * p);
+        }
+        let least = b.iter().fold(f64::INFINITY, |least, b| least.min(b * side));
+        least > 1e-12 * size && crate::roots::keeps_away(&b, side)
     }
 
     /// The values of all that is sought at a point.
@@ -372,5 +399,5 @@ fn are_quiet(gates: &[Gate], first: &[f64], between: &[f64], last: &[f64]) -> bo
 
 /// The value of a guard among those of a compiled structure.
 pub(super) fn active_value(compiled: &Compiled, values: &[f64], guard: usize) -> f64 {
-    compiled.active.iter().position(|g| *g == guard).map_or(f64::NAN, |i| values[i])
+    compiled.place(guard).map_or(f64::NAN, |i| values[i])
 }

@@ -99,10 +99,17 @@ impl Follower<'_> {
         HybridError::Undecided { t: self.t, x: self.x.clone(), surfaces: self.names(zero), ways: ways.into() }
     }
 
-    /// Decides where motion goes from a point at which the functions in `zero` are zero.
+    /// Decides where motion goes from a point at which the functions in `zero` are zero. Those that are slid upon and depend on none that is met anew
+    /// go on as they did.
     pub(super) fn settle(&mut self, zero: &[usize]) -> Result<(), HybridError> {
+        let kept = self.slides.clone();
+        self.decide(zero, &kept)
+    }
+
+    /// The same, where what is slid upon is decided, too, but for the guards in `kept`.
+    pub(super) fn decide(&mut self, zero: &[usize], kept: &[bool]) -> Result<(), HybridError> {
         // Only what the equations ask here; what they do not ask keeps its side until it is asked.
-        let zero: Vec<usize> = zero.iter().copied().filter(|g| self.compiled.active.contains(g)).collect();
+        let zero: Vec<usize> = zero.iter().copied().filter(|g| self.compiled.place(*g).is_some()).collect();
         if zero.is_empty() {
             let config = self.config.clone();
             self.adopt(config, Vec::new());
@@ -117,7 +124,7 @@ impl Follower<'_> {
             }
             follower.ask_new(&mut config);
             let (compiled, rates) = follower.rates(&config);
-            let place: Vec<Option<usize>> = zero.iter().map(|g| compiled.active.iter().position(|a| a == g)).collect();
+            let place: Vec<Option<usize>> = zero.iter().map(|g| compiled.place(*g)).collect();
             (config, place, rates)
         };
         let k = zero.len();
@@ -125,9 +132,22 @@ impl Follower<'_> {
         let sets = if k == 1 {
             vec![vec![0]]
         } else {
-            let (_, place0, base) = vertex(self, &|_| false);
+            let (config, place0, base) = vertex(self, &|_| false);
+            let compiled = self.equation.compiled(&config);
             let mut coupled = vec![false; k * k];
             for j in 0..k {
+                // Without a way from the side to a function nothing has to be computed.
+                let side = self.n + 1 + zero[j];
+                let acts = |place: &Option<usize>| {
+                    place.is_none_or(|p| {
+                        let through = |v: &usize| *v < self.n && compiled.depends(*v, side);
+                        compiled.depends(self.n + p, side) || compiled.touches[p].iter().any(through)
+                    })
+                };
+                let other = |i: usize| i != j && acts(&place0[i]);
+                if !self.equation.chooses(zero[j]) && !(0..k).any(other) {
+                    continue;
+                }
                 let (_, place, rates) = vertex(self, &|i| i == j);
                 for i in 0..k {
                     let (Some(a), Some(b)) = (place0[i], place[i]) else {
@@ -142,6 +162,10 @@ impl Follower<'_> {
         };
         let mut ways = vec![Way::Plus; k];
         for set in &sets {
+            if set.iter().all(|i| kept[zero[*i]]) {
+                set.iter().for_each(|i| ways[*i] = Way::Stay);
+                continue;
+            }
             if set.len() > MOST_TOGETHER {
                 let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
                 let why = format!(
@@ -276,7 +300,12 @@ impl Follower<'_> {
         // Surfaces that do not change each other's speeds may still act on other states together.
         let stay: Vec<usize> = (0..k).filter(|i| ways[*i] == Way::Stay).collect();
         let mut differ = false;
-        if stay.len() > 1 {
+        let on_one_state = |s: usize| {
+            let on = stay.iter().filter(|i| self.compiled.depends(s, self.n + 1 + zero[**i]));
+            on.count() > 1
+        };
+        let chooses = stay.iter().any(|i| self.equation.chooses(zero[*i]));
+        if stay.len() > 1 && (chooses || (0..self.n).any(on_one_state)) {
             let fields = |follower: &mut Self, on: &dyn Fn(usize) -> bool| {
                 vertex(follower, &|i| ways[i] == Way::Plus || (ways[i] == Way::Stay && on(i))).2.field
             };

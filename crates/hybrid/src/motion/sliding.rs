@@ -25,6 +25,8 @@ impl Follower<'_> {
         for guard in &sliding {
             config.sides[*guard] = self.low(*guard);
         }
+        self.slides.fill(false);
+        sliding.iter().for_each(|guard| self.slides[*guard] = true);
         self.sliding = sliding;
         self.compiled = self.equation.compiled(&config);
         self.variables = self.load(&config);
@@ -46,8 +48,8 @@ impl Follower<'_> {
             .iter()
             .enumerate()
             .map(|(i, guard)| match () {
-                () if !self.compiled.active.contains(&i) => '.',
-                () if self.sliding.contains(&i) => '0',
+                () if self.compiled.place(i).is_none() => '.',
+                () if self.slides[i] => '0',
                 () if guard.whole => '#',
                 () if self.config.sides[i] > 0.0 => '+',
                 () => '-',
@@ -72,7 +74,7 @@ impl Follower<'_> {
             }
         }
         for place in 0..k {
-            let active = self.compiled.active.iter().position(|g| *g == self.sliding[place])?;
+            let active = self.compiled.place(self.sliding[place])?;
             let strange = (0..n).any(|i| self.compiled.depends(n + active, i) && owner[i].is_some_and(|o| o != place));
             let asks = (0..k).any(|other| self.compiled.depends(n + active, variable(other)));
             if strange || asks {
@@ -102,8 +104,7 @@ impl Follower<'_> {
         sides(self, -2.0);
         let mut jumps = Vec::with_capacity(self.sliding.len());
         let weight = |guard: &usize| {
-            let place = self.compiled.active.iter().position(|g| g == guard);
-            let (a, b) = place.map_or((f64::NAN, f64::NAN), |p| (low[p], high[p]));
+            let (a, b) = self.compiled.place(*guard).map_or((f64::NAN, f64::NAN), |p| (low[p], high[p]));
             jumps.push(b - a);
             -a / (b - a)
         };
@@ -131,11 +132,11 @@ impl Follower<'_> {
         self.variables[..n].copy_from_slice(x);
         self.variables[n] = t;
         self.compiled.field.evaluate(&self.variables, out);
-        if let Some(owner) = self.separate.clone() {
+        if self.separate.is_some() {
             let (weights, _, field1) = self.separate_weights(t, x, out);
-            for i in 0..n {
-                if let Some(place) = owner[i] {
-                    out[i] += weights[place] * (field1[i] - out[i]);
+            for (i, owner) in self.separate.iter().flatten().enumerate() {
+                if let Some(place) = owner {
+                    out[i] += weights[*place] * (field1[i] - out[i]);
                 }
             }
         } else if !self.corners.is_empty() {
@@ -183,7 +184,7 @@ impl Follower<'_> {
             let mut field = vec![0.0; n];
             compiled.field.evaluate(variables, &mut field);
             let all = Self::along(compiled, variables, &field);
-            let of = |guard: &usize| compiled.active.iter().position(|g| g == guard).map_or(f64::NAN, |i| all[i]);
+            let of = |guard: &usize| compiled.place(*guard).map_or(f64::NAN, |i| all[i]);
             rates.push(self.sliding.iter().map(of).collect::<Vec<f64>>());
             fields.push(field);
         }
@@ -230,10 +231,9 @@ impl Follower<'_> {
         let n = self.n;
         self.variables[..n].copy_from_slice(x);
         self.variables[n] = t;
-        let place = |compiled: &Compiled, guard: usize| compiled.active.iter().position(|g| *g == guard);
         let rates = Self::along(&self.compiled, &self.variables, field0);
         let of =
-            |rates: &[f64], compiled: &Compiled, guard: usize| place(compiled, guard).map_or(f64::NAN, |i| rates[i]);
+            |rates: &[f64], compiled: &Compiled, guard: usize| compiled.place(guard).map_or(f64::NAN, |i| rates[i]);
         let a: Vec<f64> = self.sliding.iter().map(|g| of(&rates, &self.compiled, *g)).collect();
         let mut matrix = vec![0.0; k * k];
         for column in 0..k {
@@ -300,22 +300,13 @@ impl Follower<'_> {
         let n = self.n;
         let mut field = vec![0.0; n];
         compiled.field.evaluate(&variables, &mut field);
-        let outputs = compiled.active.len() + self.equation.watched.len();
+        let outputs = compiled.outputs;
         let (mut slopes, mut terms) = (vec![0.0; outputs], vec![0.0; outputs]);
-        const WIDE: usize = 4;
-        let mut out = vec![Dual::<f64, WIDE>::constant(0.0); outputs];
-        for from in (0..=n).step_by(WIDE) {
-            let mut duals: Vec<Dual<f64, WIDE>> = variables.iter().map(|v| Dual::constant(*v)).collect();
-            for j in 0..WIDE.min(n + 1 - from) {
-                duals[from + j].partials[j] = 1.0;
-            }
-            compiled.watched.evaluate(&duals, &mut out);
-            for (o, d) in out.iter().enumerate() {
-                for j in 0..WIDE.min(n + 1 - from) {
-                    let speed = if from + j == n { 1.0 } else { field[from + j] };
-                    slopes[o] += d.partials[j] * speed;
-                    terms[o] += (d.partials[j] * speed).abs();
-                }
+        for (o, gradient) in compiled.gradients(&variables).iter().enumerate() {
+            for (variable, slope) in compiled.touches[o].iter().zip(gradient) {
+                let change = slope * if *variable == n { 1.0 } else { field[*variable] };
+                slopes[o] += change;
+                terms[o] += change.abs();
             }
         }
         // Second derivatives matter where first ones are zero; they are asked of the present programs.
