@@ -25,7 +25,7 @@ use twofold_system::Expression;
 use crate::definition::{Direction, When};
 use crate::equation::{Compiled, Configuration, Equation, EquationError};
 use crate::model::Model;
-use crate::roots::{PLACES, first, stays};
+use crate::roots::{PLACES, at_fraction, first, first_of_polynomial, stays};
 use crate::selection::{Intersection, MOST_TOGETHER, Mixture, Way, groups, mixture, possibilities};
 use crate::step::Step;
 
@@ -329,7 +329,7 @@ struct Contact {
 struct Accepted {
     length: f64,
     error: f64,
-    /// Where it is searched.
+    /// Where it is searched: in parts, or the whole of it without any.
     parts: Vec<(f64, f64)>,
     /// Whether longer ones were tried.
     rejected: bool,
@@ -379,6 +379,8 @@ struct Follower<'a> {
     /// Room for values.
     scratch: Vec<f64>,
     scale: Vec<f64>,
+    room: Vec<f64>,
+    samples: [Vec<f64>; 5],
     outcome: Outcome,
 }
 
@@ -535,6 +537,8 @@ impl<'a> Follower<'a> {
             next_record: f64::INFINITY,
             scratch: Vec::new(),
             scale: Vec::new(),
+            room: Vec::new(),
+            samples: Default::default(),
             outcome: Outcome { ending: Ending::Finished, t: t0, x: x.clone(), steps: 0, switches: 0, events: 0 },
             config,
             x,
@@ -624,9 +628,9 @@ impl<'a> Follower<'a> {
             self.sought(&step, &mut list);
             let found = self.find(&step, &list, &parts, &mut last_values);
             let earliest = found.iter().map(|(theta, _)| *theta).fold(f64::INFINITY, f64::min);
+            let met: Vec<Sought> =
+                found.iter().filter(|(theta, _)| *theta <= earliest + 1e-9).map(|(_, sought)| *sought).collect();
             if earliest.is_finite() {
-                let met: Vec<Sought> =
-                    found.iter().filter(|(theta, _)| *theta <= earliest + 1e-9).map(|(_, sought)| *sought).collect();
                 self.land(&mut step, earliest * wanted, wanted, met[0]);
             }
             // The step stands.
@@ -665,8 +669,6 @@ impl<'a> Follower<'a> {
                 let why = "the same surface is met again and again without time passing: the motion there is not resolved; smooth the switch, or describe what holds there by an [[event]]".into();
                 return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
             }
-            let met: Vec<Sought> =
-                found.iter().filter(|(theta, _)| *theta <= earliest + 1e-9).map(|(_, sought)| *sought).collect();
             let rounding = 4.0 * f64::EPSILON * self.t.abs().max(length);
             let ending = match clock.next().filter(|time| *time - self.t <= rounding) {
                 Some(time) => {
@@ -737,9 +739,29 @@ impl<'a> Follower<'a> {
         if list.is_empty() {
             return found;
         }
-        let mut at = vec![0.0; self.n];
-        let mut values = [const { Vec::new() }; 5];
-        for &(from, to) in parts {
+        // Sums of states are polynomials, which need no evaluation.
+        let polynomial = |follower: &Self, sought: Sought| {
+            let b = follower.polynomial_of(step, sought)?;
+            b.iter().all(|b| b.is_finite()).then_some(b)
+        };
+        if list.iter().all(|(sought, _)| polynomial(self, *sought).is_some()) {
+            last.clear();
+            for (sought, side) in list {
+                let Some(b) = polynomial(self, *sought) else { continue };
+                let mut v = PLACES.map(|theta| at_fraction(&b, theta));
+                last.push(v[4]);
+                if self.is_fresh(*sought) || v[0] * side < 0.0 {
+                    v[0] = 0.0;
+                }
+                found.extend(first_of_polynomial(v, *side).map(|theta| (theta, *sought)));
+            }
+            return found;
+        }
+        let mut at = std::mem::take(&mut self.room);
+        at.resize(self.n, 0.0);
+        let mut values = std::mem::take(&mut self.samples);
+        let whole = [(0.0, 1.0)];
+        for &(from, to) in if parts.is_empty() { &whole } else { parts } {
             for (place, values) in PLACES.iter().zip(&mut values) {
                 let theta = from + place * (to - from);
                 if theta == 1.0 {
@@ -777,6 +799,7 @@ impl<'a> Follower<'a> {
             }
         }
         std::mem::swap(last, &mut values[4]);
+        (self.room, self.samples) = (at, values);
         found
     }
 

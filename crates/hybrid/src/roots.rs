@@ -22,6 +22,18 @@ fn bernstein(v: &[f64; 5]) -> [f64; 5] {
     ]
 }
 
+/// The value of a polynomial by its Bernstein coefficients.
+pub(crate) fn at_fraction(b: &[f64; 5], u: f64) -> f64 {
+    let w = 1.0 - u;
+    let mut level = *b;
+    for n in (1..5).rev() {
+        for i in 0..n {
+            level[i] = w * level[i] + u * level[i + 1];
+        }
+    }
+    level[0]
+}
+
 /// Whether the polynomial through these values stays on its side of zero, where it may begin at zero.
 pub(crate) fn stays(v: &[f64; 5], side: f64) -> bool {
     // What is zero all along passes it nowhere.
@@ -60,9 +72,7 @@ pub(crate) fn first(
     }
     let b = bernstein(&v);
     let ends_beyond = v[4] * side <= 0.0;
-    let mut signs = b.iter().map(|c| c * side).filter(|c| *c != 0.0).map(|c| c > 0.0).collect::<Vec<_>>();
-    signs.dedup();
-    if ends_beyond && v[0] * side > 0.0 && signs.len() <= 2 {
+    if ends_beyond && v[0] * side > 0.0 && changes(&b) <= 1 {
         return Some(narrow(from, to, &v, side, f));
     }
     if depth >= if ends_beyond { DEEPEST } else { DEPTH } {
@@ -76,6 +86,26 @@ pub(crate) fn first(
     }
     let (p, q) = (f(middle + 0.5 * quarter), f(middle + 1.5 * quarter));
     first([v[2], p, v[3], q, v[4]], side, middle, to, f, depth + 1)
+}
+
+/// [`first`] of the polynomial through five values itself.
+pub(crate) fn first_of_polynomial(v: [f64; 5], side: f64) -> Option<f64> {
+    let b = bernstein(&v);
+    // One change of sign is one zero (Descartes), from zero on one behind the beginning.
+    if v[0] == 0.0 && b[1] * side > 0.0 && v[4] * side < 0.0 && changes(&b) == 1 {
+        return Some(polynomial_root(&v, side));
+    }
+    first(v, side, 0.0, 1.0, &mut |u| at_fraction(&b, u), 0)
+}
+
+/// How often coefficients change their sign.
+fn changes(b: &[f64; 5]) -> usize {
+    let (mut changes, mut before) = (0, 0.0);
+    for c in b.iter().filter(|c| **c != 0.0) {
+        changes += usize::from(before * c < 0.0);
+        before = *c;
+    }
+    changes
 }
 
 /// Where the polynomial through five values, which has one change of sign, is zero, as a fraction: Newton's method within bounds.
@@ -104,7 +134,7 @@ fn polynomial_root(v: &[f64; 5], side: f64) -> f64 {
         }
         let newton = u - p / slope;
         let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        if (next - u).abs() <= f64::EPSILON * u {
+        if (next - u).abs() <= 2.0 * f64::EPSILON * u {
             return next;
         }
         u = next;
@@ -163,6 +193,12 @@ mod tests {
         // Two zeros between two samples.
         near(find(|x| (x - 0.30) * (x - 0.31) * (1.0 + x), 1.0), 0.3);
         assert_eq!(find(|x| (x - 0.3) * (x - 0.3) + 1e-6, 1.0), None);
+        // Polynomials themselves, from zero and not.
+        let of = |f: &dyn Fn(f64) -> f64, side| first_of_polynomial(PLACES.map(f), side);
+        near(of(&|x| x * (0.3 - x), 1.0), 0.3);
+        near(of(&|x| x * (x - 0.3) * (x - 0.8), 1.0), 0.3);
+        near(of(&|x| (x - 0.4) * (1.0 + x), -1.0), 0.4);
+        assert_eq!(of(&|x| x * (1.1 - x), 1.0), None);
         // From zero, leaving.
         assert_eq!(find(|x| x, 1.0), None);
         near(find(|x| x * (0.5 - x), 1.0), 0.5);

@@ -54,7 +54,14 @@ impl Follower<'_> {
     /// Whether a watched value stays on its side of `boundary` in a step, as can be told without evaluating it: a sum of states is a polynomial along the
     /// step's continuous extension, and lies between its Bernstein coefficients.
     fn stays_away(&self, step: &Step, place: usize, boundary: f64, side: f64) -> bool {
-        let Some(sum) = &self.compiled.affine[place] else { return false };
+        let Some((b, size)) = self.polynomial(step, place, boundary) else { return false };
+        let least = b.iter().fold(f64::INFINITY, |least, b| least.min(b * side));
+        least > 1e-12 * size && crate::roots::keeps_away(&b, side)
+    }
+
+    /// The Bernstein coefficients of a sum of states along a step, and the size of its terms.
+    fn polynomial(&self, step: &Step, place: usize, boundary: f64) -> Option<([f64; 5], f64)> {
+        let sum = self.compiled.affine[place].as_ref()?;
         let mut b = [sum.constant - boundary; 5];
         let mut size = b[0].abs();
         for (variable, factor) in &sum.factors {
@@ -66,8 +73,42 @@ impl Follower<'_> {
             size += (factor * part[0]).abs();
             b.iter_mut().zip(part).for_each(|(b, p)| *b += factor * p);
         }
-        let least = b.iter().fold(f64::INFINITY, |least, b| least.min(b * side));
-        least > 1e-12 * size && crate::roots::keeps_away(&b, side)
+        Some((b, size))
+    }
+
+    /// The same for what is sought, of which whole parts are measured as they are.
+    pub(super) fn polynomial_of(&self, step: &Step, sought: Sought) -> Option<[f64; 5]> {
+        let place = self.plain_place(sought)?;
+        self.polynomial(step, place, 0.0).map(|(b, _)| b)
+    }
+
+    /// The place of a sign or a watched value.
+    fn plain_place(&self, sought: Sought) -> Option<usize> {
+        match sought {
+            Sought::Guard { guard, .. } if !self.equation.guards[guard].whole => self.compiled.place(guard),
+            Sought::Watched(i) => Some(self.compiled.active.len() + i),
+            _ => None,
+        }
+    }
+
+    /// The value of what is sought at a point.
+    fn value_of(&mut self, sought: Sought, t: f64, x: &[f64]) -> f64 {
+        let Some(sum) = self.plain_place(sought).and_then(|place| self.compiled.affine[place].as_ref()) else {
+            let mut value = Vec::new();
+            self.measure(&[(sought, 1.0)], t, x, &mut value);
+            return value[0];
+        };
+        let n = self.n;
+        let variable = |i: usize| {
+            if i < n {
+                x[i]
+            } else if i == n {
+                t
+            } else {
+                self.variables[i]
+            }
+        };
+        sum.factors.iter().fold(sum.constant, |value, (i, factor)| value + factor * variable(*i))
     }
 
     /// The values of all that is sought at a point.
@@ -146,7 +187,7 @@ impl Follower<'_> {
     pub(super) fn parts(&mut self, step: &Step) -> Option<Vec<(f64, f64)>> {
         let compiled = self.compiled.clone();
         if compiled.watched_gates.is_empty() {
-            return Some(vec![(0.0, 1.0)]);
+            return Some(Vec::new());
         }
         let arguments = |follower: &mut Self, theta: f64| {
             follower.arguments(&compiled.watched_gate_arguments, compiled.watched_gates.len(), step, theta)
@@ -216,16 +257,16 @@ impl Follower<'_> {
 
     /// Makes the step end where `sought` is zero, near `h`: Newton's method on steps of their own length.
     pub(super) fn land(&mut self, step: &mut Step, h: f64, longest: f64, sought: Sought) {
-        let mut room = vec![0.0; self.n];
-        let (mut low, mut high) = (Vec::new(), Vec::new());
-        let one = [(sought, 1.0)];
+        let mut room = std::mem::take(&mut self.room);
+        room.resize(self.n, 0.0);
         let delta = 1e-4;
         let (a, b) = ((h / longest - delta).max(0.0), (h / longest + delta).min(1.0));
         step.at(a, &mut room);
-        self.measure(&one, self.t + a * longest, &room, &mut low);
+        let low = self.value_of(sought, self.t + a * longest, &room);
         step.at(b, &mut room);
-        self.measure(&one, self.t + b * longest, &room, &mut high);
-        let slope = (high[0] - low[0]) / ((b - a) * longest);
+        let high = self.value_of(sought, self.t + b * longest, &room);
+        self.room = room;
+        let slope = (high - low) / ((b - a) * longest);
         let mut length = h;
         for correction in 0.. {
             let follower = &mut *self;
@@ -233,8 +274,7 @@ impl Follower<'_> {
             if correction == 3 {
                 break;
             }
-            self.measure(&one, self.t + length, &step.y, &mut low);
-            let correction = low[0] / slope;
+            let correction = self.value_of(sought, self.t + length, &step.y) / slope;
             // Where the function only touches zero, or is none at all, the first place stays.
             let rounding = 2.0 * f64::EPSILON * (self.t + length).abs();
             let wanted = (length - correction).clamp(0.0, longest);

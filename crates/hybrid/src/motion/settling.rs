@@ -445,10 +445,28 @@ impl Follower<'_> {
                 return;
             }
         }
+        self.fresh_watch[i] = true;
+        // A sum of states has its slope at hand.
+        if let Some(sum) = &self.compiled.affine[place] {
+            let n = self.n;
+            self.variables[..n].copy_from_slice(&self.x);
+            self.variables[n] = self.t;
+            self.scratch.resize(n, 0.0);
+            self.compiled.field.evaluate(&self.variables, &mut self.scratch);
+            let (mut slope, mut terms) = (0.0, 0.0_f64);
+            for (variable, factor) in sum.factors.iter().filter(|(v, _)| *v <= n) {
+                let change = factor * if *variable == n { 1.0 } else { self.scratch[*variable] };
+                slope += change;
+                terms += change.abs();
+            }
+            if slope.abs() > 1e-11 * terms {
+                self.watch_side[i] = slope.signum();
+                return;
+            }
+        }
         let config = self.config.clone();
         let (_, rates) = self.rates(&config);
         self.watch_side[i] = rates.direction(place);
-        self.fresh_watch[i] = true;
     }
 
     /// The values of guards and watched expressions at the present point.
