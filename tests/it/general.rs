@@ -112,7 +112,7 @@ fn switches_and_events_are_where_formulas_have_them() {
     near(t[2], 10.0 + (4.0_f64 / 9.81).sqrt(), 1e-12);
     // A section by any expression: x - v = 0.1.
     let ball = run(at, &["--system", "bouncing-ball", "--t-end", "3", "--section", "x - v = 0.1"]);
-    assert_eq!(names(&ball), ["t", "x", "v"]);
+    assert_eq!(names(&ball), ["t", "x", "v", "direction"]);
     assert!(ball.len() >= 5);
     for (x, v) in ball.numbers("x").iter().zip(ball.numbers("v")) {
         near(x - v, 0.1, 1e-12);
@@ -226,6 +226,33 @@ fn facts_say_how_a_run_ends() {
     let (answer, said) = json(at, &["--system", "stop.toml", "--t-end", "6"]);
     assert_eq!(answer["facts"]["stopped_by"], "impact");
     assert!(said.contains("impact ends the run at t = 0.45152364098"), "{said}");
+    // Two tanks between which one inflow switches: no state is set, so that nothing can rest on a surface.
+    let tanks = "states = ['a', 'b']\nstart = [1, 1]\n[modes.left]\nf = ['1.5 - 1', '-1']\n[modes.right]\nf = ['-1', '1.5 - 1']\n\
+        [[event]]\nname = 'to b'\nwhen = 'b'\ndirection = 'down'\nfrom = 'left'\nmode = 'right'\n\
+        [[event]]\nname = 'to a'\nwhen = 'a'\ndirection = 'down'\nfrom = 'right'\nmode = 'left'";
+    fs::write(at.join("tanks.toml"), tanks).unwrap();
+    let (answer, said) = json(at, &["--system", "tanks.toml", "--t-end", "9"]);
+    near(answer["facts"]["zeno"]["t"].as_f64().unwrap(), 4.0, 1e-9);
+    assert!(said.contains("infinitely often") && !said.contains("after_zeno"), "{said}");
+}
+
+/// On the circle x = cos t, v = -sin t: the section is crossed downwards at pi/3 and upwards at 5 pi/3.
+#[test]
+fn sections_say_their_direction_and_answers_their_switching_functions() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let text = "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-x - 0*sign(v - 3) + 0*floor(x/9)']";
+    fs::write(at.join("circle.toml"), text).unwrap();
+    let arguments = ["--system", "circle.toml", "--t-end", "6", "--section", "x = max(v, 0.5)"];
+    let crossings = run(at, &arguments);
+    assert_eq!(names(&crossings), ["t", "x", "v", "signs", "direction"]);
+    assert_eq!(crossings.words("direction").collect::<Vec<_>>(), ["down", "up"]);
+    near(crossings.numbers("t")[0], std::f64::consts::FRAC_PI_3, 1e-9);
+    let (answer, _) = json(at, &arguments);
+    let functions = answer["facts"]["signs"].as_array().unwrap();
+    assert_eq!(functions, &["v - 3", "floor(x/9)", "0.5 - v"]);
+    let signs = crossings.words("signs").next().unwrap();
+    assert_eq!((signs, signs.len()), ("-#+", functions.len()));
 }
 
 const GUST: &str = "name = 'gust'\nstates = ['x']\nstart = [0]\nf = ['wind - x']\n[tables.wind]\nfile = 'wind.csv'\ntime = 't'\ncolumn = 'speed'\n";

@@ -287,14 +287,14 @@ const COLUMNS: [(&str, &str); 46] = [
     ("y", ""),
     ("v", ""),
     ("z", ""),
-    ("direction", "+1 if the plane is crossed upwards, -1 downwards; in a closed orbit `up` or `down`"),
+    ("direction", "`up` or `down`: the way in which the section is crossed"),
     (
         "mode",
         "`plus` or `minus` in that field, `sliding-attracting` or `sliding-repelling` on the surface; of a general system the mode's name",
     ),
     (
         "signs",
-        "a character for each switching function: `+`, `-`, `0` where motion slides on its zero, `#` for `floor` and `mod`, `.` where it decides nothing",
+        "a character for each switching function: `+`, `-`, `0` where motion slides on its zero, `#` for `floor` and `mod`, `.` where it decides nothing; the fact `signs` names the functions",
     ),
     ("piece", "number of the piece of the motion between two events"),
     (
@@ -351,6 +351,10 @@ fn columns_are_as_the_page_says() {
         ("`twofold run --switch hysteretic`", vec!["run", "--t-end", "0.1", "--switch", "hysteretic"]),
         ("`twofold run --switch filippov`", [&["run", "--t-end", "3"][..], &filippov].concat()),
         ("`twofold run`, a general system", vec!["run", "--t-end", "1", "--system", "general.toml"]),
+        (
+            "`twofold run --section`, a general system",
+            vec!["run", "--t-end", "1", "--system", "general.toml", "--section", "x=0.5"],
+        ),
         (
             "`twofold orbit`",
             vec!["orbit", "--system", "stick-slip", "--switch", "filippov", "--section", "v=0", "--format", "csv"],

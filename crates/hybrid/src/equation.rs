@@ -277,6 +277,12 @@ impl Equation {
         self.by_text.get(&key).copied().unwrap_or((0, false))
     }
 
+    /// The switching functions as text, in the order of a point's signs.
+    pub fn switching_functions(&self) -> Vec<String> {
+        let text = |g: &Guard| if g.whole { format!("floor({})", g.expression) } else { g.expression.to_string() };
+        self.guards.iter().map(text).collect()
+    }
+
     /// The switching function that an expression or its negative is.
     pub fn switching(&self, e: &Expression) -> Option<usize> {
         let key = match e {
@@ -409,7 +415,10 @@ impl Equation {
             if operation.arguments().all(|a| values[a].is_finite()) {
                 let what = match operation {
                     Operation::Sqrt(_) => "the square root of a negative number",
-                    Operation::Ln(_) => "the logarithm (or a power) of a number that is not positive",
+                    Operation::Ln(_) if makes_a_power(&tape, node) => {
+                        "a power whose exponent is no whole number, of a number that is not positive (an odd root of one is sign(x)*abs(x)^(1/3))"
+                    }
+                    Operation::Ln(_) => "the logarithm of a number that is not positive",
                     Operation::Div(..) => "a division by zero",
                     _ => "a number beyond the range of double precision",
                 };
@@ -424,6 +433,14 @@ impl Equation {
         }
         None
     }
+}
+
+/// Whether a logarithm stands in a power, exp(b ln a).
+fn makes_a_power(tape: &Tape, logarithm: usize) -> bool {
+    use twofold_num::tape::Operation::{Exp, Mul};
+    let operations = tape.operations();
+    let is_factor = |product: usize| matches!(operations[product], Mul(a, b) if a == logarithm || b == logarithm);
+    operations.iter().any(|o| matches!(o, Exp(product) if is_factor(*product)))
 }
 
 /// An operation that can be flat where a step looks and steep elsewhere, by its argument.

@@ -47,4 +47,4 @@ mod tests;
 pub use definition::Definition;
 pub use equation::Equation;
 pub use model::Model;
-pub use motion::{Ending, HybridError, Options, Point, follow};
+pub use motion::{Ending, HybridError, Options, Point, follow, follow_watched};

@@ -381,6 +381,7 @@ struct Follower<'a> {
     scale: Vec<f64>,
     room: Vec<f64>,
     samples: [Vec<f64>; 5],
+    reached: Option<&'a dyn Fn(f64) -> bool>,
     outcome: Outcome,
 }
 
@@ -394,8 +395,26 @@ pub fn follow(
     options: &Options,
     observe: &mut dyn FnMut(&Point) -> bool,
 ) -> Result<Outcome, HybridError> {
-    Follower::new(model, options)?.run_whole(observe).map(|(outcome, _)| outcome)
+    follow_watched(model, options, observe, &|_| true)
 }
+
+/// [`follow`], with a word on the time `reached` now and then, whether or not something is recorded; it says whether more is wanted.
+///
+/// # Errors
+/// As [`follow`].
+pub fn follow_watched(
+    model: &Model,
+    options: &Options,
+    observe: &mut dyn FnMut(&Point) -> bool,
+    reached: &dyn Fn(f64) -> bool,
+) -> Result<Outcome, HybridError> {
+    let mut follower = Follower::new(model, options)?;
+    follower.reached = Some(reached);
+    follower.run_whole(observe).map(|(outcome, _)| outcome)
+}
+
+/// Steps between two words on the time reached.
+const STEPS_BETWEEN_WORDS: u64 = 64;
 
 /// What each state's error is measured by in a step.
 fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
@@ -539,6 +558,7 @@ impl<'a> Follower<'a> {
             scale: Vec::new(),
             room: Vec::new(),
             samples: Default::default(),
+            reached: None,
             outcome: Outcome { ending: Ending::Finished, t: t0, x: x.clone(), steps: 0, switches: 0, events: 0 },
             config,
             x,
@@ -593,6 +613,11 @@ impl<'a> Follower<'a> {
             }
             if self.t >= self.options.t_end {
                 return Ok(Ending::Finished);
+            }
+            if self.outcome.steps.is_multiple_of(STEPS_BETWEEN_WORDS)
+                && self.reached.is_some_and(|go_on| !go_on(self.t))
+            {
+                return Ok(Ending::Interrupted);
             }
             if self.outcome.steps >= self.options.max_steps {
                 return Err(HybridError::Budget { steps: self.outcome.steps, t: self.t });

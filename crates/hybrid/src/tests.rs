@@ -70,6 +70,22 @@ fn a_ball_comes_to_rest_when_its_impacts_accumulate() {
     assert!((t - zeno).abs() <= error + 1e-11 && error < 1e-9, "{t} {error}");
 }
 
+/// A section that is never met gives no row to ask with.
+#[test]
+fn a_run_without_rows_says_its_time_and_can_be_ended() {
+    let model = model("states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-x']");
+    let section = twofold_system::Expression::parse_general("x - 2", &["x", "v"]).unwrap();
+    let options = Options { t_end: 1e6, record: Record::Section(section), ..Options::default() };
+    let times = std::cell::RefCell::new(Vec::new());
+    let outcome = crate::follow_watched(&model, &options, &mut |_| panic!("no row is there"), &|t| {
+        times.borrow_mut().push(t);
+        t < 100.0
+    });
+    assert_eq!(outcome.unwrap().ending, Ending::Interrupted);
+    let times = times.into_inner();
+    assert!(times.len() > 10 && times.is_sorted() && (100.0..150.0).contains(times.last().unwrap()), "{times:?}");
+}
+
 /// Inelastic impacts rest at once; a table that moves lets go where it falls faster than the ball.
 #[test]
 fn contacts_open_where_the_surface_falls_away() {
@@ -307,6 +323,13 @@ fn the_end_of_a_domain_is_named() {
     let HybridError::Domain { t, what, .. } = error else { panic!("{error}") };
     near(t, 2.0 * (2.0 - 3.0_f64.ln()), 1e-8);
     assert!(what.contains("square root") && what.contains("-sqrt(x) - 1"), "{what}");
+    for (text, said) in
+        [("-x^(1/3) - 1", "an odd root of one is sign(x)*abs(x)^(1/3)"), ("log(x) - 9", "the logarithm of")]
+    {
+        let error =
+            run(&model(&format!("states = ['x']\nstart = [4]\nf = ['{text}']")), 50.0).1.unwrap_err().to_string();
+        assert!(error.contains(said) && error.contains(text), "{error}");
+    }
     // A branch that motion never reaches is never computed.
     let x = end("states = ['x']\nstart = [1]\nf = ['if(x > 0, -x, sqrt(x))']", 5.0);
     near(x[0], (-5.0_f64).exp(), 1e-10);

@@ -7,7 +7,7 @@ use twofold_hybrid::motion::tangent::{Return, closed_orbit, exponents};
 use twofold_hybrid::motion::{Exit, Record};
 use twofold_hybrid::rests::{Place, rests};
 use twofold_hybrid::selection::Intersection;
-use twofold_hybrid::{Ending, HybridError, Model, Options, Point, follow};
+use twofold_hybrid::{Ending, Equation, HybridError, Model, Options, Point, follow, follow_watched};
 use twofold_integrate::Watch;
 
 use super::answer::{Answer, Stop};
@@ -89,7 +89,9 @@ impl GeneralRun {
         if self.model.has_switches() {
             names.push("signs");
         }
-        if !definition.events().is_empty() && !matches!(self.options.record, Record::Section(_)) {
+        if matches!(self.options.record, Record::Section(_)) {
+            names.push("direction");
+        } else if !definition.events().is_empty() {
             names.push("event");
         }
         names
@@ -100,6 +102,7 @@ impl GeneralRun {
         row.extend(columns.iter().map(|column| match *column {
             "mode" => Entry::Word(self.model.definition().modes()[point.mode].name.clone()),
             "signs" => Entry::Word(point.signs.to_owned()),
+            "direction" => Entry::Word(if point.direction > Some(0.0) { "up" } else { "down" }.to_owned()),
             _ => Entry::Word(point.event.unwrap_or_default().to_owned()),
         }));
         row
@@ -118,7 +121,7 @@ impl GeneralRun {
         let columns = self.columns();
         let empty = self.table();
         let mut table = empty.clone();
-        let found = follow(&self.model, &self.options, &mut |point| {
+        let mut observe = |point: &Point| {
             table.push(self.row(&columns, point));
             let mut more = reached(point.t);
             if table.len() >= PART {
@@ -126,7 +129,8 @@ impl GeneralRun {
                 table = empty.clone();
             }
             more
-        });
+        };
+        let found = follow_watched(&self.model, &self.options, &mut observe, reached);
         rows(&table);
         let outcome = found?;
         let mut answer = Answer::of_tables(vec![empty])
@@ -135,6 +139,13 @@ impl GeneralRun {
             .with_fact("steps", &outcome.steps)
             .with_fact("switches", &outcome.switches)
             .with_fact("events", &outcome.events);
+        if columns.contains(&"signs") {
+            let section = match &self.options.record {
+                Record::Section(e) => Some(e),
+                _ => None,
+            };
+            answer = answer.with_fact("signs", &Equation::new(&self.model, section)?.switching_functions());
+        }
         match &outcome.ending {
             Ending::Finished => {}
             Ending::Stopped(event) => answer = answer.with_fact("stopped_by", event),

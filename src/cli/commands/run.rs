@@ -97,7 +97,7 @@ fn general_run(arguments: &Arguments, run: &GeneralRun) -> Result<Exit, CliError
         let answer = Executor::new(None, &progress).ask(run)?;
         let bytes = encode::json(&answer, &run.about());
         let stopped = if answer.stop == Stop::Interrupted { progress.asked_to_stop() } else { None };
-        return deliver_whole_or_part(&answer, &bytes, out, stopped).map(|()| said_how_it_ended(&answer));
+        return deliver_whole_or_part(&answer, &bytes, out, stopped).map(|()| said_how_it_ended(run, &answer));
     }
     let watch = job::Progress::begin(&progress, if title.is_empty() { "run" } else { title }, run.options.t_end);
     let reached = |t: f64| {
@@ -159,18 +159,22 @@ fn general_run(arguments: &Arguments, run: &GeneralRun) -> Result<Exit, CliError
             let t: f64 = answer.fact("t").map_err(JobError::from)?;
             Err(stopped_at(t, count, part.as_deref(), exit))
         }
-        (None, answer) => Ok(answer.map_or(Exit::Fine, |a| said_how_it_ended(&a))),
+        (None, answer) => Ok(answer.map_or(Exit::Fine, |a| said_how_it_ended(run, &a))),
     }
 }
 
 /// Says why a run ended before its time, if it did by what its file says.
-fn said_how_it_ended(answer: &Answer) -> Exit {
+fn said_how_it_ended(run: &GeneralRun, answer: &Answer) -> Exit {
     if let Some(zeno) = answer.facts.get("zeno") {
+        let name = zeno["event"].as_str().unwrap_or_default();
+        // Motion can rest on the surface of an event that sets a state; a mode has none.
+        let mut events = run.model.definition().events().iter();
+        let sets = events.any(|e| e.name == name && e.mode.is_none() && !e.set.is_empty());
         complain(&format!(
-            "{} happens infinitely often before t = {} (error at most {}), where the run ends; after_zeno = \"stick\" lets it rest there",
-            zeno["event"].as_str().unwrap_or_default(),
+            "{name} happens infinitely often before t = {} (error at most {}), where the run ends{}",
             zeno["t"],
-            zeno["error"]
+            zeno["error"],
+            if sets { "; after_zeno = \"stick\" lets it rest there" } else { "" },
         ));
     }
     if let Some(event) = answer.facts.get("stopped_by") {
