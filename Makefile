@@ -203,7 +203,7 @@ sbom: ## what the program links, with versions, licences and checksums (CycloneD
 
 .PHONY: prose reference
 reference: ## write the generated pages of docs/ anew: flags, columns, keys, exit codes, messages
-	@TWOFOLD_UPDATE=1 $(CARGO) test --locked --quiet --test it reference::
+	@TWOFOLD_UPDATE=1 $(CARGO) test --locked --quiet --test it -- reference:: paper_format::
 
 prose: ## spelling (typos; skipped without Python) and subjects of commits; the rules of pages are tests (tests/it/prose.rs)
 	@sh scripts/spelling.sh

@@ -303,7 +303,7 @@ impl Claim {
         if let Some(odds) = &c.odds {
             let OddsFile { starts, spread, at_least, .. } = odds.get_ref();
             let share = at_least.is_none_or(|s| s > 0.0 && s < 1.0);
-            if !(1..=1_000_000).contains(starts) || !(spread.is_finite() && *spread > 0.0) || !share {
+            if !((1..=1_000_000).contains(starts) && spread.is_finite() && *spread > 0.0 && share) {
                 let why = "odds have 1 to 1000000 starts, a spread above 0, and at-least between 0 and 1".to_owned();
                 return Err(wrong(odds.span(), why, String::new()));
             }

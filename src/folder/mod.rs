@@ -108,6 +108,11 @@ pub struct About {
     pub arxiv: String,
     /// What it is about, in our words, and which text the equations were taken from.
     pub summary: String,
+    /// The day on which the folder was published, for archives.
+    pub published: Option<toml::value::Datetime>,
+    /// The folder's licence for archives, by its SPDX name: "CC-BY-4.0".
+    #[serde(default)]
+    pub license: String,
     /// What it leaves open.
     #[serde(default)]
     pub open: Vec<String>,
@@ -206,9 +211,13 @@ struct PointsFile {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct MeasureFile {
+    /// A run, as `twofold run` follows it: the facts of its answer, and its table.
     run: Option<Spanned<Words>>,
+    /// A closed orbit, as `twofold orbit` finds it: period, point, multipliers; with `along` its branch.
     orbit: Option<Spanned<Words>>,
+    /// Lyapunov exponents, as `twofold lyapunov` computes them.
     lyapunov: Option<Spanned<Words>>,
+    /// Equilibria and pseudo-equilibria, as `twofold rests` finds them.
     rests: Option<Spanned<Words>>,
 }
 

@@ -156,10 +156,12 @@ pub fn codecheck(folder: &Folder, made: &Made<'_>) -> String {
     out
 }
 
-/// RO-Crate 1.1 metadata. The date of publication is the publisher's to add.
+/// RO-Crate 1.1 metadata.
 pub fn crate_metadata(folder: &Folder, made: &Made<'_>) -> Vec<u8> {
     let about = &folder.about;
     let files = files(folder, made);
+    let authors: Vec<(String, &String)> =
+        about.authors.iter().enumerate().map(|(i, name)| (format!("#author-{}", i + 1), name)).collect();
     let identifiers: Vec<&String> = [&about.doi, &about.arxiv].into_iter().filter(|i| !i.is_empty()).collect();
     let mut graph = vec![
         json!({
@@ -173,7 +175,7 @@ pub fn crate_metadata(folder: &Folder, made: &Made<'_>) -> Vec<u8> {
         }),
         json!({
             "@id": "#article", "@type": "ScholarlyArticle", "name": about.title, "datePublished": about.year.to_string(),
-            "author": about.authors.iter().map(|a| json!({ "@type": "Person", "name": a })).collect::<Vec<_>>(),
+            "author": authors.iter().map(|(id, _)| json!({ "@id": id })).collect::<Vec<_>>(),
             "identifier": identifiers,
         }),
         json!({ "@id": "#software", "@type": "SoftwareApplication", "name": "twofold", "softwareVersion": env!("CARGO_PKG_VERSION") }),
@@ -181,6 +183,16 @@ pub fn crate_metadata(folder: &Folder, made: &Made<'_>) -> Vec<u8> {
         json!({ "@id": "report.html", "@type": "File", "name": "report", "encodingFormat": "text/html" }),
         json!({ "@id": "claims.json", "@type": "File", "name": "outcomes of the claims", "encodingFormat": "application/json" }),
     ];
+    graph.extend(authors.iter().map(|(id, name)| json!({ "@id": id, "@type": "Person", "name": name })));
+    // RO-Crate asks for both; they are the publisher's to give.
+    if let Some(day) = &about.published {
+        graph[1]["datePublished"] = day.to_string().into();
+    }
+    if !about.license.is_empty() {
+        let id = format!("https://spdx.org/licenses/{}", about.license);
+        graph[1]["license"] = json!({ "@id": id });
+        graph.push(json!({ "@id": id, "@type": "CreativeWork", "name": about.license }));
+    }
     graph.extend(
         files
             .iter()

@@ -20,7 +20,11 @@ const CRATES: [(&str, &[&str], &[&str]); 12] = [
     ("instances", &["system", "integrate", "analyse"], &[]),
     ("job", &["num", "system", "hybrid", "integrate", "rigor", "analyse", "instances"], &["csv", "zmij"]),
     ("render", &["num"], &["plotters", "plotters-backend", "tiny-skia", "pdf-writer", "png", "miniz_oxide"]),
-    ("paper", &["num", "system", "integrate", "rigor", "analyse", "job", "render"], &["base64", "percent-encoding"]),
+    (
+        "paper",
+        &["num", "system", "hybrid", "integrate", "rigor", "analyse", "job", "render"],
+        &["base64", "percent-encoding"],
+    ),
 ];
 
 /// Packages that hold only data, with the crate that embeds each.

@@ -40,6 +40,7 @@ mod layered;
 mod long_term;
 mod misprint;
 mod odepack;
+mod paper_format;
 mod papers;
 mod properties;
 mod prose;

@@ -29,7 +29,10 @@ fn golden_table_of_verdicts_is_that_of_the_references() {
 #[test]
 fn golden_embedded_references_are_the_files() {
     for figure in figures::all() {
-        assert_eq!(figures::reference(&figure.id), Some(text(&format!("figures/{}/expected.json", figure.id)).as_str()));
+        assert_eq!(
+            figures::reference(&figure.id),
+            Some(text(&format!("figures/{}/expected.json", figure.id)).as_str())
+        );
     }
 }
 

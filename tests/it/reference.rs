@@ -12,16 +12,16 @@ use twofold::cli::commands::definition;
 const BEGIN: &str = "<!-- made by `TWOFOLD_UPDATE=1 cargo test --test it reference::`; do not edit -->";
 const END: &str = "<!-- end of what is made -->";
 
-fn root() -> &'static Path {
+pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-fn source(file: &str) -> String {
+pub fn source(file: &str) -> String {
     fs::read_to_string(root().join(file)).unwrap_or_else(|e| panic!("{file}: {e}"))
 }
 
 /// Compares the generated blocks of a page with `blocks`, in order; or writes them.
-fn hold(page: &str, blocks: &[String]) {
+pub fn hold(page: &str, blocks: &[String]) {
     let committed = source(page);
     let mut made = String::new();
     let mut rest = committed.as_str();
@@ -59,7 +59,7 @@ fn flag(arg: &Arg) -> String {
 }
 
 /// What a flag's help says, its choices and its default.
-fn meaning(arg: &Arg) -> String {
+pub fn meaning(arg: &Arg) -> String {
     let help = arg.get_long_help().or(arg.get_help()).map(ToString::to_string).unwrap_or_default();
     let mut text = help.trim_end_matches('.').to_owned();
     let choices: Vec<String> = arg.get_possible_values().iter().map(|v| format!("`{}`", v.get_name())).collect();
@@ -86,7 +86,7 @@ fn shown(arg: &&Arg) -> bool {
 }
 
 /// The flags that every command with a run takes.
-fn run_flags() -> Vec<Arg> {
+pub fn run_flags() -> Vec<Arg> {
     use clap::Args as _;
     let command = twofold::cli::flags::RunFlags::augment_args(clap::Command::new("x"));
     command.get_arguments().cloned().collect()
@@ -151,13 +151,15 @@ fn commands_are_as_the_pages_say() {
 }
 
 /// A field of a struct in a source file: its name in files, whether it must be given, and its documentation.
-struct Key {
-    name: String,
-    needed: bool,
-    about: String,
+pub struct Key {
+    pub name: String,
+    pub needed: bool,
+    pub about: String,
+    /// Its type in the source.
+    pub of: String,
 }
 
-fn keys(text: &str, of: &str) -> Vec<Key> {
+pub fn keys(text: &str, of: &str) -> Vec<Key> {
     let (_, body) = text.split_once(&format!("struct {of} {{")).unwrap_or_else(|| panic!("no struct {of}"));
     let (body, _) = body.split_once("\n}").unwrap();
     let (mut about, mut needed, mut renamed) = (String::new(), true, None);
@@ -169,10 +171,12 @@ fn keys(text: &str, of: &str) -> Vec<Key> {
         } else if let Some(attribute) = line.strip_prefix("#[serde(") {
             needed &= !attribute.contains("default");
             renamed = attribute.split_once("rename = \"").and_then(|(_, r)| r.split('"').next()).map(str::to_owned);
-        } else if let Some((name, _)) = line.split_once(':') {
+        } else if let Some((name, rest)) = line.split_once(':') {
+            let of_type = rest.trim().trim_end_matches(',').to_owned();
+            needed &= !of_type.starts_with("Option<");
             assert!(!about.is_empty(), "{of}: {name} has no documentation");
             let name = renamed.take().unwrap_or_else(|| name.trim_start_matches("pub ").to_owned());
-            keys.push(Key { name, needed, about: cell(&about) });
+            keys.push(Key { name, needed, about: cell(&about), of: of_type });
             (about, needed) = (String::new(), true);
         }
     }
@@ -224,11 +228,11 @@ fn keys_of_the_system_file_are_as_the_page_says() {
 }
 
 /// A table of keys for each of these structs.
-fn keys_tables(text: &str, structs: &[(&str, &str)]) -> String {
+pub fn keys_tables(text: &str, structs: &[(&str, &str)]) -> String {
     let mut block = String::new();
     for (title, of) in structs {
         let _ = write!(block, "### {title}\n\n| key | needed | meaning |\n|---|---|---|\n");
-        for Key { name, needed, about } in keys(text, of) {
+        for Key { name, needed, about, .. } in keys(text, of) {
             let _ = writeln!(block, "| `{name}` | {} | {about} |", if needed { "yes" } else { "" });
         }
         block.push('\n');

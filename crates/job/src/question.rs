@@ -135,7 +135,9 @@ impl JobError {
     pub fn is_bad_question(&self) -> bool {
         match self {
             JobError::Spec(_) | JobError::Dimension(_) => true,
-            JobError::General(e) => matches!(**e, HybridError::Equation(_) | HybridError::Start(_) | HybridError::Bad(_)),
+            JobError::General(e) => {
+                matches!(**e, HybridError::Equation(_) | HybridError::Start(_) | HybridError::Bad(_))
+            }
             JobError::Rests(e) => !matches!(e, RestError::Driven),
             _ => false,
         }

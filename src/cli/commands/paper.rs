@@ -86,7 +86,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     };
     let folder = Folder::read(&flags.folder)?;
     let progress = Progress::new(flags.quiet);
-    let store = (!flags.fresh).then(|| Store::new(&folder.out().join(".store")));
+    let store = (!flags.fresh).then(|| Store::new(folder.out().join(".store")));
     let executor = Executor::new(store, &progress);
     let made = in_pool(flags.threads, || folder.make(&executor))??;
     if let Some((claim, why)) = made.failure()
@@ -97,7 +97,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         return Err(CliError::Stopped { said, exit });
     }
     let (holds, all) = made.score();
-    let score = format!("{} pictures, {holds} of {all} claims agree", made.pictures.len());
+    let pictures = made.pictures.len();
+    let plural = if pictures == 1 { "" } else { "s" };
+    let score = format!("{pictures} picture{plural}, {holds} of {all} claims agree");
     let failed = if made.failure().is_some() { Exit::Failed } else { Exit::Fine };
     let claims: Vec<_> = made
         .claims

@@ -22,9 +22,9 @@ mod prose;
 mod rules;
 mod space;
 
-pub use html::escape;
 pub use archive::{RELEASE_DATE, archive};
 pub use assemble::{MadeFile, Program, assemble};
+pub use html::escape;
 pub use model::*;
 pub use page::{Links, page};
 pub use space::SpaceView;
