@@ -713,6 +713,15 @@ fn turns_that_shorten_without_end_are_named() {
     assert!((t - 8.0).abs() <= error + 1e-9, "{t} {error}");
 }
 
+/// The reset leaves the expression at zero and rising, in a mode in which the event does not fire.
+#[test]
+fn an_event_of_the_other_mode_does_not_fire_again() {
+    let text = "states = ['x', 'v']\nstart = [-1, 1]\n[modes.a]\nf = ['v', '0']\n[modes.b]\nf = ['v', '0']\n\
+        [[event]]\nfrom = 'a'\nwhen = 'x'\ndirection = 'up'\nmode = 'b'\nset = { v = '2*v' }";
+    let x = end(text, 3.0);
+    near(x[0], 4.0, 1e-12);
+}
+
 #[test]
 fn what_an_event_makes_true_happens_at_once() {
     // A counter ends the run; two modes that send motion back to where it came from happen without end.

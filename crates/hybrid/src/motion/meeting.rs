@@ -219,7 +219,8 @@ impl Follower<'_> {
                     Direction::Up => self.watch_side[*i] > 0.0,
                     Direction::Both => false,
                 };
-                if into && fired.contains(&event) && !definition.events()[event].set.is_empty() {
+                let asked = definition.events()[event].from.is_none_or(|mode| mode == self.config.mode);
+                if into && asked && fired.contains(&event) && !definition.events()[event].set.is_empty() {
                     zeno = Some((event, self.t, 4.0 * f64::EPSILON * self.t.abs()));
                 }
             }
