@@ -457,11 +457,11 @@ enum Misuse {
     #[error("--switch relay needs its band: give half its width by --band, such as --band 0.001")]
     NoBand,
     #[error(
-        "--switch delayed: the state is the whole past, of which neither closed orbits nor exponents are computed; follow a long run (twofold run, twofold sweep), or give another --switch"
+        "--switch delayed: the state is the whole past, of which no closed orbits are computed; follow a long run (twofold run, twofold sweep), or give another --switch"
     )]
     Past,
     #[error(
-        "--switch relay: the state has a mode beside it, with which neither closed orbits nor exponents are computed; follow a long run (twofold run, twofold sweep), or give another --switch"
+        "--switch relay: the state has a mode beside it, with which no closed orbits are computed; follow a long run (twofold run, twofold sweep), or give another --switch"
     )]
     Mode,
     #[error(
@@ -620,14 +620,14 @@ impl RunFlags {
                 relaxation: self.hysteresis.unwrap_or(Relaxation::Literal).into(),
                 phi0: 1.0,
             },
-            Switch::Delayed if !command.is_a_run() => return Err(Misuse::Past),
+            Switch::Delayed if command == Use::Orbit => return Err(Misuse::Past),
             Switch::Delayed => SwitchSpec::Delayed {
                 delay: self.delay.ok_or(Misuse::NoDelay)?,
                 eps: self.eps,
                 transition: self.eps.map(|_| transition),
                 history: self.history.map(Into::into).unwrap_or_default(),
             },
-            Switch::Relay if !command.is_a_run() => return Err(Misuse::Mode),
+            Switch::Relay if command == Use::Orbit => return Err(Misuse::Mode),
             Switch::Relay => SwitchSpec::Relay {
                 band: self.band.ok_or(Misuse::NoBand)?,
                 inside: self.inside.map(Into::into).unwrap_or_default(),
@@ -934,9 +934,7 @@ mod tests {
                             let other = ["--kick-every", "--exit", "delayed", "relay"];
                             !kind.contains(&"--section") || kind.iter().any(|k| other.contains(k))
                         }
-                        Use::Exponent => {
-                            kind.iter().any(|k| ["filippov", "delayed", "relay", "--section", "--every"].contains(k))
-                        }
+                        Use::Exponent => kind.iter().any(|k| ["filippov", "--section", "--every"].contains(k)),
                     };
                     assert!(fine, "{command:?} {kind:?}");
                     continue;

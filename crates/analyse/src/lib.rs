@@ -37,6 +37,7 @@ pub mod digits;
 pub mod divider;
 pub mod filippov_return;
 pub mod floquet;
+pub mod late_lyapunov;
 pub mod limit;
 pub mod lyapunov;
 pub mod motion;

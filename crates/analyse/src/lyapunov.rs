@@ -168,57 +168,117 @@ pub fn estimate_along<const N: usize, const M: usize, T: VectorField<M>>(
     watch: &dyn Watch,
 ) -> Result<Estimate, Failure> {
     const { assert!(M == 2 * N) };
-    let mut stepper = Dopri5::<M>::new(settings.tolerance);
+    let stepper = Dopri5::<M>::new(settings.tolerance);
+    averaged(&mut Alone { tangent, stepper, t: 0.0, state: begin(&x0) }, kicked_states, settings, watch)
+}
+
+/// An orbit with a disturbance, `M` numbers.
+pub(super) trait Disturbed<const M: usize> {
+    /// Begins where it is, towards `stop`.
+    fn begin(&mut self, stop: f64, max_step: f64) -> Result<(), Failure>;
+    /// Makes a step.
+    fn step(&mut self) -> Result<(), Failure>;
+    /// The time reached, and the state with its tangent vector.
+    fn reached(&self) -> (f64, SVector<f64, M>);
+    /// Takes another state for the same disturbance.
+    fn displace(&mut self, state: SVector<f64, M>);
+    /// The disturbance's length.
+    fn length(&self) -> f64;
+    /// Divides the disturbance by a number.
+    fn shorten(&mut self, by: f64);
+    /// Steps made.
+    fn steps(&self) -> u64;
+}
+
+/// An equation with its variational equation.
+struct Alone<'a, T, const M: usize> {
+    tangent: &'a T,
+    stepper: Dopri5<M>,
+    t: f64,
+    state: SVector<f64, M>,
+}
+
+impl<T: VectorField<M>, const M: usize> Disturbed<M> for Alone<'_, T, M> {
+    fn begin(&mut self, stop: f64, max_step: f64) -> Result<(), Failure> {
+        self.stepper.restart(self.tangent, self.t, self.state, stop, max_step)
+    }
+    fn step(&mut self) -> Result<(), Failure> {
+        let step = self.stepper.step(self.tangent)?;
+        (self.t, self.state) = (step.t1, step.x1);
+        Ok(())
+    }
+    fn reached(&self) -> (f64, SVector<f64, M>) {
+        (self.t, self.state)
+    }
+    fn displace(&mut self, state: SVector<f64, M>) {
+        self.state = state;
+    }
+    fn length(&self) -> f64 {
+        length(&self.state)
+    }
+    fn shorten(&mut self, by: f64) {
+        for v in self.state.iter_mut().skip(M / 2) {
+            *v /= by;
+        }
+    }
+    fn steps(&self) -> u64 {
+        self.stepper.statistics().steps
+    }
+}
+
+/// The mean rate at which a disturbance grows, as [`estimate_along`] has it.
+pub(super) fn averaged<const M: usize>(
+    orbit: &mut dyn Disturbed<M>,
+    kicked_states: usize,
+    settings: &LyapunovOptions,
+    watch: &dyn Watch,
+) -> Result<Estimate, Failure> {
     let mut kicker = settings.kick.map(|kick| Kicker::new(kick, kicked_states));
     let mut kicks = 1_u64;
-    let mut state = begin::<N, M>(&x0);
     let mut rates = Vec::with_capacity(BLOCKS);
     let mut t = 0.0;
     for block in 0..=BLOCKS {
         let end = block_end(settings, block);
         let start = t;
-        let mut growth = -ln(length::<N, M>(&state));
+        let mut growth = -ln(orbit.length());
         while t < end {
             let kick_at = settings.kick.map_or(f64::INFINITY, |k| k.every * kicks as f64);
             let stop = end.min(kick_at);
             if stop > t {
-                stepper.restart(tangent, t, state, stop, settings.max_step)?;
+                orbit.begin(stop, settings.max_step)?;
             }
             while t < stop {
-                let step = stepper.step(tangent)?;
-                (t, state) = (step.t1, step.x1);
-                let size = length::<N, M>(&state);
+                orbit.step()?;
+                t = orbit.reached().0;
+                let size = orbit.length();
                 if !(1.0 / RANGE..=RANGE).contains(&size) {
                     growth += ln(size);
-                    for v in state.iter_mut().skip(N) {
-                        *v /= size;
-                    }
+                    orbit.shorten(size);
                     if t < stop {
-                        stepper.restart(tangent, t, state, stop, settings.max_step)?;
+                        orbit.begin(stop, settings.max_step)?;
                     }
                 }
-                if stepper.statistics().steps.is_multiple_of(4096) && !watch.reached(t) {
-                    return Ok(estimate_of(&rates, settings, t, stepper.statistics().steps));
+                if orbit.steps().is_multiple_of(4096) && !watch.reached(t) {
+                    return Ok(estimate_of(&rates, settings, t, orbit.steps()));
                 }
-                if stepper.statistics().steps >= settings.max_steps {
-                    let x: Vec<f64> = state.iter().take(N).copied().collect();
+                if orbit.steps() >= settings.max_steps {
+                    let x: Vec<f64> = orbit.reached().1.iter().take(M / 2).copied().collect();
                     return Err(Failure::TooManySteps { t, limit: settings.max_steps, state: x });
                 }
             }
             if stop == kick_at {
                 kicks += 1;
                 if let Some(k) = kicker.as_mut() {
-                    let kicked = k.apply(SVector::<f64, N>::from_fn(|i, _| state[i]));
-                    state = SVector::from_fn(|i, _| if i < N { kicked[i] } else { state[i] });
+                    orbit.displace(k.apply(orbit.reached().1));
                 }
             }
         }
-        growth += ln(length::<N, M>(&state));
+        growth += ln(orbit.length());
         if block > 0 {
             rates.push(growth / (t - start));
         }
     }
-    Ok(estimate_of(&rates, settings, t, stepper.statistics().steps))
+    Ok(estimate_of(&rates, settings, t, orbit.steps()))
 }
 
 /// [`largest_watched`] for many orbits side by side in the lanes of vector registers: of each the number that it has alone, bit for bit, in the
@@ -293,7 +353,7 @@ impl<const M: usize> Observer<M> for Growth<'_> {
 }
 
 /// The state to begin with: a start with no preferred direction; almost every vector turns into the fastest one.
-fn begin<const N: usize, const M: usize>(x0: &SVector<f64, N>) -> SVector<f64, M> {
+pub(super) fn begin<const N: usize, const M: usize>(x0: &SVector<f64, N>) -> SVector<f64, M> {
     SVector::from_fn(|i, _| if i < N { x0[i] } else { 1.0 / sqrt(N as f64) })
 }
 
@@ -332,8 +392,8 @@ pub(super) fn estimate_of(rates: &[f64], settings: &LyapunovOptions, t: f64, ste
 }
 
 /// Length of the tangent vector.
-fn length<const N: usize, const M: usize>(state: &SVector<f64, M>) -> f64 {
-    sqrt(state.iter().skip(N).map(|v| v * v).sum())
+fn length<const M: usize>(state: &SVector<f64, M>) -> f64 {
+    sqrt(state.iter().skip(M / 2).map(|v| v * v).sum())
 }
 
 /// Standard error of the mean of a correlated series: the largest over repeated joining of neighbours.

@@ -1,6 +1,8 @@
-//! Orbits of systems whose switch depends on the past.
+//! Orbits of systems whose switch depends on the past, and how disturbances of them grow.
 
 use nalgebra::SVector;
+use twofold_analyse::late_lyapunov::late_estimate;
+use twofold_analyse::lyapunov::{Estimate, LyapunovOptions};
 use twofold_integrate::delay::{DelayError, Delayed, LateSwitch, Own, Sides};
 use twofold_integrate::{Failure, Observer, Summary, Watch};
 use twofold_system::{BindError, Bound, Caricature, Compiled, PiecewiseSmooth, System};
@@ -22,6 +24,19 @@ pub trait Late<const N: usize> {
         observer: &mut dyn Observer<N>,
         watch: &dyn Watch,
     ) -> Result<Result<Summary<N>, Failure>, DelayError>;
+
+    /// As [`late_estimate`].
+    ///
+    /// # Errors
+    /// As there.
+    fn late_growth(
+        &self,
+        data: &System,
+        switch: LateSwitch,
+        x0: SVector<f64, N>,
+        settings: &LyapunovOptions,
+        watch: &dyn Watch,
+    ) -> Result<Estimate, Failure>;
 }
 
 fn late_orbit<P: PiecewiseSmooth<N> + Clone, const N: usize>(
@@ -51,6 +66,16 @@ macro_rules! late {
                 watch: &dyn Watch,
             ) -> Result<Result<Summary<$n>, Failure>, DelayError> {
                 late_orbit(self, data, switch, x0, how, observer, watch)
+            }
+            fn late_growth(
+                &self,
+                data: &System,
+                switch: LateSwitch,
+                x0: SVector<f64, $n>,
+                settings: &LyapunovOptions,
+                watch: &dyn Watch,
+            ) -> Result<Estimate, Failure> {
+                late_estimate::<_, $n, { 2 * $n }>(self, data, switch, x0, settings, watch)
             }
         })*
     };

@@ -163,10 +163,12 @@ impl Classification {
     /// The largest exponent of the run's system, from its final state.
     fn exponent(&self, start: Vec<f64>) -> LargestExponent {
         let settings = match self.run.switch {
-            SwitchSpec::Hysteretic { .. } => lyapunov::LyapunovOptions {
-                duration: LENGTHS.hysteretic_average,
-                ..lyapunov::LyapunovOptions::default()
-            },
+            SwitchSpec::Hysteretic { .. } | SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } => {
+                lyapunov::LyapunovOptions {
+                    duration: LENGTHS.hysteretic_average,
+                    ..lyapunov::LyapunovOptions::default()
+                }
+            }
             _ => lyapunov::LyapunovOptions::default(),
         };
         LargestExponent { system: self.run.system.clone(), switch: self.run.switch, start, settings }

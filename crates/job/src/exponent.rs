@@ -11,10 +11,10 @@ use super::rest::switching;
 use super::spec::SwitchSpec;
 use twofold_analyse::lyapunov::{self, Estimate, Exponent};
 use twofold_analyse::tangent::Tangent;
-use twofold_instances::{Exponents, Growth};
+use twofold_instances::{self as instances, Exponents, Growth, Late};
 use twofold_integrate::Watch;
 use twofold_integrate::ensemble::InstructionSet;
-use twofold_system::{BoundField, Compiled, Field, Hysteretic, ParameterBatch, Smoothed, System};
+use twofold_system::{Bound, BoundField, Compiled, Field, Hysteretic, ParameterBatch, Smoothed, System};
 
 /// The largest Lyapunov exponent of the orbit from `start`. Facts: `exponent` ([`Exponent`]), `half_width` of its 95 % interval and `sign`
 /// ([`Sign`](lyapunov::Sign)) by that interval; or `failure` with the reason if the orbit could not be followed (it leaves, or its
@@ -115,7 +115,7 @@ impl LargestExponent {
             (SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. }, _) => {
                 Field::hysteretic(&self.system, eps, eps_prime, relaxation)
             }
-            (SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. }, _) => return Err(DELAYED.into()),
+            (SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. }, _) => return self.of_late_switch(watch),
             (SwitchSpec::Filippov { .. }, _) => return Err("a set-valued motion has no tangent flow".into()),
         };
         let tangent = field.variational(1);
@@ -133,6 +133,31 @@ impl LargestExponent {
         }
     }
 
+    /// Of a switch that depends on the past.
+    fn of_late_switch(&self, watch: &dyn Watch) -> Result<Estimate, String> {
+        match self.start.len() {
+            1 => self.late::<1>(&self.bound()?, watch),
+            2 => self.late::<2>(&self.bound()?, watch),
+            3 => self.late::<3>(&*instances::late(&self.system).map_err(|e| e.to_string())?, watch),
+            4 => self.late::<4>(&self.bound()?, watch),
+            5 => self.late::<5>(&self.bound()?, watch),
+            6 => self.late::<6>(&self.bound()?, watch),
+            7 => self.late::<7>(&self.bound()?, watch),
+            8 => self.late::<8>(&self.bound()?, watch),
+            n => Err(format!("exponents of switches with a past are computed for up to eight states, not for {n}")),
+        }
+    }
+
+    fn bound<const N: usize>(&self) -> Result<Bound<N>, String> {
+        self.system.bind().map_err(|e| e.to_string())
+    }
+
+    fn late<const N: usize>(&self, system: &dyn Late<N>, watch: &dyn Watch) -> Result<Estimate, String> {
+        let Some(switch) = self.switch.late() else { return Err("this switch has no past".into()) };
+        let x0 = SVector::from_column_slice(&self.start);
+        system.late_growth(&self.system, switch, x0, &self.settings, watch).map_err(|e| e.to_string())
+    }
+
     /// By the recorded equation and its variational equation.
     fn along<const N: usize, const M: usize>(&self, tangent: &Field, watch: &dyn Watch) -> Result<Estimate, String>
     where
@@ -148,9 +173,6 @@ impl LargestExponent {
         if switching(&self.system, &self.start) > 0.0 { 1.0 } else { 0.0 }
     }
 }
-
-/// Why there is no exponent of a delayed switch here.
-const DELAYED: &str = "the state of a delayed switch is its whole past, whose tangent flow is not computed: compare neighbouring runs instead";
 
 impl Question for LargestExponent {
     fn kind(&self) -> &'static str {
@@ -224,6 +246,24 @@ mod tests {
                 let exponent: Exponent = answer.fact("exponent").unwrap_or_else(|e| panic!("{n} {switch:?}: {e}"));
                 assert!((exponent.value + 1.0).abs() < 1e-5, "{n} {switch:?}: {exponent:?}");
                 assert_eq!((exponent.duration, answer.stop), (10.0, Stop::Finished));
+            }
+        }
+    }
+
+    /// The same where the switch depends on the past, which these orbits never ask: h is far from 0.
+    #[test]
+    fn decays_have_the_slowest_rate_whatever_the_switch() {
+        let smooth = SwitchSpec::Delayed {
+            delay: 0.3,
+            eps: Some(1e-2),
+            transition: Some(Transition::Tanh),
+            history: twofold_integrate::delay::History::Constant,
+        };
+        for n in 1..=8 {
+            for switch in [SwitchSpec::delayed(0.3), SwitchSpec::relay(0.1), smooth] {
+                let answer = question(cases::decays(n), switch, 10.0).compute(&Executor::quiet(), &()).unwrap();
+                let exponent: Exponent = answer.fact("exponent").unwrap_or_else(|e| panic!("{n} {switch:?}: {e}"));
+                assert!((exponent.value + 1.0).abs() < 1e-5, "{n} {switch:?}: {exponent:?}");
             }
         }
     }
@@ -335,6 +375,7 @@ mod tests {
         assert!(said(filippov).contains("no tangent flow"));
         assert!(said(question(cases::decays(10), SwitchSpec::tanh(1e-2), 9.0)).contains("not for 10"));
         assert!(said(question(cases::decays(9), hysteretic(), 9.0)).contains("not for 10"));
+        assert!(said(question(cases::decays(9), SwitchSpec::relay(0.1), 9.0)).contains("not for 9"));
         // x' = x^2 leaves at t = 1.
         let leaving = cases::smooth(&["x"], "x + 1", &["x*x"]);
         assert!(!said(question(leaving, SwitchSpec::tanh(1e-2), 9.0)).is_empty());

@@ -16,6 +16,7 @@
 mod past;
 mod sharp;
 mod smooth;
+mod tangent;
 
 use std::sync::Arc;
 
@@ -35,6 +36,7 @@ use twofold_system::{Field, PiecewiseSmooth, System, Transition, VectorField};
 
 use sharp::Sharp;
 use smooth::Smooth;
+pub use tangent::{Carry, Shift, TangentStepper, Varied, WithTangent};
 
 /// Where the orbit was before the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -176,8 +178,17 @@ pub struct Sides<'a, P> {
 impl<'a, P> Sides<'a, P> {
     /// Of `system`, which `data` describes.
     pub fn new(system: &'a P, data: &System) -> Self {
+        Self::made(system, data, |field| field)
+    }
+
+    /// Of a system [with a tangent vector](Varied); `data` describes the system without it.
+    pub fn varied(system: &'a P, data: &System) -> Self {
+        Self::made(system, data, |field| field.variational(1))
+    }
+
+    fn made(system: &'a P, data: &System, with: impl Fn(Field) -> Field) -> Self {
         let side = |plus: bool| {
-            let field = if plus { Field::plus(data) } else { Field::minus(data) };
+            let field = with(if plus { Field::plus(data) } else { Field::minus(data) });
             let (tape, ends) = (field.tape().clone(), Ends::new(field.tape().clone()));
             OneSide { system, plus, tape, ends }
         };
@@ -292,7 +303,7 @@ pub struct Delayed<'a, P, const N: usize> {
     pub x0: SVector<f64, N>,
 }
 
-impl<P: PiecewiseSmooth<N> + Clone, const N: usize> Delayed<'_, P, N> {
+impl<'a, P: PiecewiseSmooth<N> + Clone, const N: usize> Delayed<'a, P, N> {
     /// Gives a stepper of this switch by `method` to `user`. `order` is the degree of extended series, where another is asked for than the tolerance
     /// does.
     ///
@@ -307,15 +318,8 @@ impl<P: PiecewiseSmooth<N> + Clone, const N: usize> Delayed<'_, P, N> {
         user: U,
     ) -> Result<U::Answer, DelayError> {
         let refused = |instead| Err(DelayError::Method { method: method.name(), instead });
-        let smooth = match self.switch {
-            LateSwitch::Delayed { delay, smooth, history } => smooth.map(|layer| (layer, delay, history)),
-            LateSwitch::Relay { .. } => None,
-        };
-        match (smooth, method) {
-            (None, Method::Dopri5) => {
-                let dopri5 = || Cut::new(Guarded::new(Dopri5::new(tolerance), tolerance));
-                Ok(user.with(Sharp::new(self, [dopri5(), dopri5()])?))
-            }
+        match (self.smooth(), method) {
+            (None, Method::Dopri5) => Ok(user.with(self.sharp_dopri5(tolerance)?)),
             (None, Method::Taylor) => {
                 let taylor = || Taylor::<N>::new(tolerance);
                 Ok(user.with(Sharp::new(self, [taylor(), taylor()])?))
@@ -340,7 +344,40 @@ impl<P: PiecewiseSmooth<N> + Clone, const N: usize> Delayed<'_, P, N> {
             (Some(_), _) => refused("dopri5 or radau5"),
         }
     }
+
+    /// What the smooth rule is described by, if this is one.
+    fn smooth(&self) -> Option<((Transition, f64), f64, History)> {
+        match self.switch {
+            LateSwitch::Delayed { delay, smooth, history } => smooth.map(|layer| (layer, delay, history)),
+            LateSwitch::Relay { .. } => None,
+        }
+    }
+
+    fn sharp_dopri5(&self, tolerance: Tolerance) -> Result<SharpDopri5<'a, P, N>, DelayError> {
+        let dopri5 = || Cut::new(Guarded::new(Dopri5::new(tolerance), tolerance));
+        Sharp::new(self, [dopri5(), dopri5()])
+    }
+
+    /// Gives a stepper by Dormand and Prince's method that carries a disturbance along to `user`, for a system [with a tangent vector](Varied).
+    ///
+    /// # Errors
+    ///
+    /// If there is no such history.
+    pub fn with_tangent<U: WithTangent<N>>(&self, tolerance: Tolerance, user: U) -> Result<U::Answer, DelayError>
+    where
+        P: Carry<N>,
+    {
+        Ok(match self.smooth() {
+            None => user.with(self.sharp_dopri5(tolerance)?.carrying(self.sides.system)),
+            Some(smooth) => {
+                user.with(Smooth::new(self, smooth, Dopri5::new(tolerance), tolerance)?.carrying(self.sides.system))
+            }
+        })
+    }
 }
+
+/// The sharp rule by Dormand and Prince's method.
+type SharpDopri5<'a, P, const N: usize> = Sharp<'a, P, Cut<Guarded<Dopri5<N>, N>, N>, N>;
 
 #[cfg(test)]
 mod tests;

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use nalgebra::SVector;
 
 use super::Cuttable;
+use super::tangent::shortened;
 use crate::step::{Failure, Interpolant, Statistics, Step, Stepper};
 use twofold_system::VectorField;
 
@@ -229,6 +230,15 @@ impl<const N: usize> Past<N> {
         }
         let theta = ((t - piece.t0) / (piece.t1 - piece.t0)).clamp(0.0, 1.0);
         piece.polynomial.at(theta)
+    }
+
+    /// Divides the disturbance, the second half of the components, by a number.
+    pub(super) fn shorten(&mut self, by: f64) {
+        self.before = shortened(&self.before, by);
+        for Piece { polynomial, .. } in &mut self.pieces {
+            polynomial.x0 = shortened(&polynomial.x0, by);
+            polynomial.coefficients = polynomial.coefficients.map(|c| shortened(&c, by));
+        }
     }
 
     #[cfg(test)]

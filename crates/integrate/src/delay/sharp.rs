@@ -4,10 +4,12 @@ use std::collections::VecDeque;
 
 use nalgebra::SVector;
 
+use super::tangent::{Carry, Shift, TangentStepper, shortened, square};
 use super::{Backwards, Cuttable, DelayError, Delayed, History, LateSwitch, ONE_TIME, Sides, is_due};
 use crate::roots::CrossingFinder;
 use crate::step::{Failure, Statistics, Step, Stepper};
 use crate::taylor::Precision;
+use twofold_num::elementary::sqrt;
 use twofold_num::{Arithmetic, Scalar};
 use twofold_system::filippov::lie_derivatives;
 use twofold_system::{PiecewiseSmooth, VectorField};
@@ -18,12 +20,15 @@ struct Coming<S> {
     /// From when on.
     at: S,
     plus: bool,
+    /// What a disturbance makes of it.
+    shift: Shift,
 }
 
 /// The stepper of the sharp rule, which has one method for each mode. A relay is one whose passages are those of the band's far edge, and switch at once.
-#[derive(Clone, Debug)]
 pub(super) struct Sharp<'a, P, M: Cuttable<N>, const N: usize> {
     sides: Sides<'a, P>,
+    /// What is carried along.
+    carry: Option<&'a dyn Carry<N>>,
     /// Zero for a relay.
     delay: f64,
     /// Zero for a delayed switch.
@@ -69,6 +74,7 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M: Cuttable<N>, const N: usize> Sharp<'a
         let mut sharp = Self {
             reached: methods[0].exactly(0.0, *x0),
             sides: sides.clone(),
+            carry: None,
             delay,
             band,
             methods,
@@ -89,6 +95,21 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M: Cuttable<N>, const N: usize> Sharp<'a
             sharp.look_back()?;
         }
         Ok(sharp)
+    }
+
+    /// With these switches to come, having just passed the surface.
+    #[cfg(test)]
+    pub(super) fn with_queue(mut self, plus: bool, positive: bool, queue: &[(f64, bool)]) -> Self {
+        let coming =
+            |(at, plus): &(f64, bool)| Coming { at: M::Number::from_f64(*at), plus: *plus, shift: Shift::default() };
+        self.queue = queue.iter().map(coming).collect();
+        (self.plus, self.positive) = (plus, positive);
+        self
+    }
+
+    /// Carries a disturbance along.
+    pub(super) fn carrying(self, carry: &'a dyn Carry<N>) -> Self {
+        Self { carry: Some(carry), ..self }
     }
 }
 
@@ -131,7 +152,7 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
             if self.crosses(&point) != Some(positive) {
                 return Err(none(t.to_f64(), "comes to a part of the surface that is not crossed".into()));
             }
-            self.queue.push_front(Coming { at: delay - t, plus: positive });
+            self.queue.push_front(Coming { at: delay - t, plus: positive, shift: Shift::default() });
             positive = !positive;
             (from, crossed_at) = ((t, x), Some(t.to_f64()));
         }
@@ -183,6 +204,12 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
         time(b)
     }
 
+    /// What a disturbance makes of a passage at the fraction `theta` of the last step.
+    fn shift(&self, theta: f64) -> Shift {
+        let at = || self.methods[usize::from(self.plus)].last().at(theta);
+        self.carry.map_or_else(Shift::default, |carry| carry.shift(&at(), self.plus))
+    }
+
     /// Begins where the orbit has come to, towards the next switch or the end.
     fn begin(&mut self, longest: f64) -> Result<(), Failure> {
         let i = usize::from(self.plus);
@@ -202,6 +229,10 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
             && is_due(next.at.to_f64(), t)
         {
             self.lasted[usize::from(self.plus)] = t - self.since;
+            if let Some(carry) = self.carry.filter(|_| next.plus != self.plus) {
+                let x = carry.switched(&self.reached.1.map(M::Number::to_f64), next.plus, next.shift);
+                self.reached.1 = self.methods[0].exactly(t, x).1;
+            }
             (self.plus, self.since, self.end) = (next.plus, t, None);
             self.queue.pop_front();
         }
@@ -237,7 +268,7 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
             let cut = self.queue.is_empty() && (to - due).to_f64() > ONE_TIME * to.to_f64().abs();
             if cut && is_due(due.to_f64(), from.to_f64()) {
                 // A relay on the edge of its band: the switch comes before the step.
-                self.queue.push_back(Coming { at: from, plus: first.upward });
+                self.queue.push_back(Coming { at: from, plus: first.upward, shift: self.shift(first.theta) });
                 self.positive = first.upward;
                 self.switch();
                 self.begin(self.max_step)?;
@@ -258,7 +289,8 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
                 if cut && at > due {
                     break;
                 }
-                self.queue.push_back(Coming { at: at + delay, plus: passage.upward });
+                let shift = self.shift(passage.theta);
+                self.queue.push_back(Coming { at: at + delay, plus: passage.upward, shift });
                 self.positive = passage.upward;
             }
             if cut {
@@ -288,7 +320,9 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Stepper<N> for Sharp
         let positive = h > edge || (h == edge && edge < 0.0);
         let here = self.methods[0].exactly(t, x);
         if t > 0.0 && x != self.reached.1.map(M::Number::to_f64) && positive != self.positive {
-            self.queue.push_back(Coming { at: here.0 + M::Number::from_f64(self.delay), plus: positive });
+            // It is moved when it is, whatever the disturbance.
+            let shift = Shift::default();
+            self.queue.push_back(Coming { at: here.0 + M::Number::from_f64(self.delay), plus: positive, shift });
             self.positive = positive;
         }
         (self.reached, self.t_end, self.max_step, self.end) = (here, t_end, max_step, None);
@@ -310,5 +344,22 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Stepper<N> for Sharp
 
     fn statistics(&self) -> &Statistics {
         &self.statistics
+    }
+}
+
+impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> TangentStepper<N> for Sharp<'_, P, M, N> {
+    fn reached(&self) -> (f64, SVector<f64, N>) {
+        (self.reached.0.to_f64(), self.reached.1.map(M::Number::to_f64))
+    }
+
+    fn length(&self) -> f64 {
+        let coming = self.queue.iter().map(|coming| coming.shift.length());
+        sqrt(square(&TangentStepper::reached(self).1) + coming.map(|l| l * l).sum::<f64>())
+    }
+
+    fn shorten(&mut self, by: f64) {
+        let (t, x) = TangentStepper::reached(self);
+        self.reached.1 = self.methods[0].exactly(t, shortened(&x, by)).1;
+        self.queue.iter_mut().for_each(|coming| coming.shift.shorten(by));
     }
 }

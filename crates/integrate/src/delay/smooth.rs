@@ -3,18 +3,21 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::past::{Look, Past};
+use super::tangent::{Carry, TangentStepper, shortened, square, square_of_past};
 use super::{Backwards, DelayError, Delayed, History, ONE_TIME, Sides, is_due};
 use crate::driver::{DriveOptions, Observer, drive};
 use crate::guard::Redoable;
 use crate::roots::CrossingFinder;
 use crate::step::{Driven, DrivenStepper, Failure, Flow, Statistics, Step, Stepper, Tolerance};
 use crate::{Dopri5, Guarded};
+use twofold_num::elementary::sqrt;
 use twofold_system::{Blended, PiecewiseSmooth, Smoothed, Transition, VectorField, jacobian};
 
 /// The stepper of the smooth rule.
-#[derive(Clone, Debug)]
 pub(super) struct Smooth<'a, P, M, const N: usize> {
     sides: Sides<'a, P>,
+    /// What is carried along.
+    carry: Option<&'a dyn Carry<N>>,
     delay: f64,
     transition: Transition,
     eps: f64,
@@ -43,6 +46,7 @@ const LOOKS: usize = 8;
 /// The equation while its past is known: a field that depends on time.
 struct Weighted<'a, P, const N: usize> {
     system: &'a P,
+    carry: Option<&'a dyn Carry<N>>,
     transition: Transition,
     eps: f64,
     delay: f64,
@@ -52,20 +56,29 @@ struct Weighted<'a, P, const N: usize> {
 }
 
 impl<P: PiecewiseSmooth<N>, const N: usize> Weighted<'_, P, N> {
-    fn at(&self, t: f64) -> Blended<'_, P> {
+    /// The state one delay ago.
+    fn past(&self, t: f64) -> SVector<f64, N> {
         let slack = 2.0 * ONE_TIME * t.abs();
         let look = if is_due(self.end, t) { Look::Before } else { Look::After };
-        let h = self.system.switching(&self.past.at(t - self.delay, look, slack));
-        Blended { system: self.system, phi: self.transition.eval(h, self.eps) }
+        self.past.at(t - self.delay, look, slack)
+    }
+
+    fn under(&self, past: &SVector<f64, N>) -> Blended<'_, P> {
+        Blended { system: self.system, phi: self.transition.eval(self.system.switching(past), self.eps) }
     }
 }
 
 impl<P: PiecewiseSmooth<N>, const N: usize> Driven<N> for Weighted<'_, P, N> {
     fn eval(&self, t: f64, x: &SVector<f64, N>) -> SVector<f64, N> {
-        self.at(t).eval(x)
+        let past = self.past(t);
+        let f = self.under(&past).eval(x);
+        match self.carry {
+            Some(carry) => f + carry.feedback(x, &past, self.transition, self.eps),
+            None => f,
+        }
     }
     fn jacobian(&self, t: f64, x: &SVector<f64, N>) -> SMatrix<f64, N, N> {
-        jacobian(&self.at(t), x)
+        jacobian(&self.under(&self.past(t)), x)
     }
 }
 
@@ -79,6 +92,7 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M, const N: usize> Smooth<'a, P, M, N> {
         let Delayed { sides, x0, .. } = delayed;
         let mut smooth = Self {
             sides: sides.clone(),
+            carry: None,
             delay,
             transition,
             eps,
@@ -98,6 +112,11 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M, const N: usize> Smooth<'a, P, M, N> {
             smooth.end_at(f64::from(k) * delay);
         }
         Ok(smooth)
+    }
+
+    /// Carries a disturbance along.
+    pub(super) fn carrying(self, carry: &'a dyn Carry<N>) -> Self {
+        Self { carry: Some(carry), ..self }
     }
 
     /// Follows the orbit without delay backwards from the start for one delay.
@@ -179,8 +198,9 @@ impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N>, const N: usize> Smooth<'_, P, M
         }
         let next = self.ends.first().copied().filter(|end| self.t_end - end > ONE_TIME * self.t_end);
         let end = next.unwrap_or(self.t_end);
-        let Self { sides, delay, transition, eps, past, method, .. } = self;
-        let field = Weighted { system: sides.system, transition: *transition, eps: *eps, delay: *delay, past, end };
+        let Self { sides, carry, delay, transition, eps, past, method, .. } = self;
+        let (system, carry) = (sides.system, *carry);
+        let field = Weighted { system, carry, transition: *transition, eps: *eps, delay: *delay, past, end };
         if self.end != Some(end) {
             let longest = self.max_step.min(LONGEST * *delay);
             method.restart_driven(&field, t, self.reached.1, end, longest)?;
@@ -226,5 +246,23 @@ impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N> + Redoable<N>, const N: usize> S
 
     fn statistics(&self) -> &Statistics {
         self.method.statistics()
+    }
+}
+
+impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N> + Redoable<N>, const N: usize> TangentStepper<N>
+    for Smooth<'_, P, M, N>
+{
+    fn reached(&self) -> (f64, SVector<f64, N>) {
+        self.reached
+    }
+
+    fn length(&self) -> f64 {
+        let (t, x) = &self.reached;
+        sqrt(square(x) + square_of_past(&self.past, *t, self.delay))
+    }
+
+    fn shorten(&mut self, by: f64) {
+        self.reached.1 = shortened(&self.reached.1, by);
+        self.past.shorten(by);
     }
 }

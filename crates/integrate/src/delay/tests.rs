@@ -485,3 +485,92 @@ fn methods_that_cannot_say_what_can() {
         }
     }
 }
+
+/// Follows an orbit with a disturbance to a time.
+struct To(f64);
+
+impl<const M: usize> WithTangent<M> for To {
+    type Answer = SVector<f64, M>;
+    fn with<S: TangentStepper<M>>(self, mut stepper: S) -> Self::Answer {
+        let (_, start) = stepper.reached();
+        stepper.restart(&Own, 0.0, start, self.0, f64::INFINITY).unwrap();
+        while stepper.reached().0 < self.0 {
+            stepper.step(&Own).unwrap();
+        }
+        assert!(stepper.length() > 0.0);
+        stepper.reached().1
+    }
+}
+
+fn switches() -> [LateSwitch; 4] {
+    let delayed = |smooth, history| LateSwitch::Delayed { delay: 0.05, smooth, history };
+    [
+        delayed(None, History::Constant),
+        delayed(Some((Transition::Tanh, 0.01)), History::Constant),
+        delayed(Some((Transition::Algebraic, 0.2)), History::Constant),
+        LateSwitch::Relay { band: 0.02, inside: Inside::Sign },
+    ]
+}
+
+/// A disturbance carried along is what neighbouring orbits are apart: through chatter, by every rule, from three directions.
+#[test]
+fn disturbances_are_those_of_neighbouring_orbits() {
+    let system = Caricature::with_reinjection(1e-1, 1e-5);
+    let data = System::from(system);
+    let (x0, size, until) = (vector![0.01, 0.4, 0.5], 1e-6, 0.5);
+    for switch in switches() {
+        let end = |x0: SVector<f64, 3>| {
+            let delayed = Delayed { sides: Sides::new(&system, &data), switch, x0 };
+            let run = Run { course: DriveOptions::to(until), coordinate: 0, x0 };
+            let (seen, end) = delayed.with_stepper(Method::Dopri5, None, tolerance(1e-13), run).unwrap();
+            let in_layer = matches!(switch, LateSwitch::Delayed { smooth: Some((Transition::Algebraic, _)), .. });
+            assert!(in_layer || seen.crossings.len() > 3, "{switch:?}: {}", seen.crossings.len());
+            end.x
+        };
+        for i in 0..3 {
+            let direction = SVector::<f64, 3>::ith(i, 1.0);
+            let varied = Varied(&system);
+            let start = SVector::<f64, 6>::from_fn(|k, _| if k < 3 { x0[k] } else { direction[k - 3] });
+            let delayed = Delayed { sides: Sides::varied(&varied, &data), switch, x0: start };
+            let found = delayed.with_tangent(tolerance(1e-12), To(until)).unwrap();
+            let (a, b) = (end(x0 + direction * size), end(x0 - direction * size));
+            for k in 0..3 {
+                let apart = (a[k] - b[k]) / (2.0 * size);
+                let allowed = 1e-5 * (1.0 + apart.abs());
+                assert!((found[3 + k] - apart).abs() < allowed, "{switch:?} {i} {k}: {} {apart}", found[3 + k]);
+            }
+        }
+    }
+}
+
+/// x' = -sign(x(t - 1)) on its second orbit, of period 4/5, on which three switches are always on their way. A zero t(n) and the switch that the zero
+/// before the last but one causes make the next zero: t(n + 1) = 2 (t(n - 2) + 1) - t(n), so that disturbances of the zeros obey d(n + 1) = 2 d(n - 2) - d(n):
+/// multipliers 1 and -1 +- i.
+#[test]
+fn disturbances_of_rapid_oscillations_grow_by_the_root_of_two() {
+    let data = relay(1.0, 1.0);
+    let bound: Bound<1> = data.bind().unwrap();
+    let varied = Varied(&bound);
+    let switch = LateSwitch::Delayed { delay: 1.0, smooth: None, history: History::Constant };
+    let delayed = Delayed { sides: Sides::varied(&varied, &data), switch, x0: vector![0.0, 1.0] };
+    let queue = [(0.2, true), (0.6, false), (1.0, true)];
+    let mut stepper = delayed.sharp_dopri5(tolerance(1e-12)).unwrap().carrying(&varied).with_queue(false, true, &queue);
+    stepper.restart(&Own, 0.0, vector![0.0, 1.0], 100.0, f64::INFINITY).unwrap();
+    let mut zeros = vec![0.0, 0.0, 0.0, 1.0];
+    let mut finder = CrossingFinder::starting(true);
+    while zeros.len() < 34 {
+        let step = stepper.step(&Own).unwrap();
+        let (t0, found) = (step.t0, finder.through_plane(&step, 0, 0.0));
+        for crossing in found {
+            let n = zeros.len() - 3;
+            assert!((step.time(crossing.theta) - 0.4 * n as f64).abs() < 1e-9, "{t0}");
+            // The speed is 1: a later zero is a higher orbit while it falls.
+            let later = step.at(crossing.theta)[1] * if crossing.upward { -1.0 } else { 1.0 };
+            let due = zeros[zeros.len() - 1];
+            assert!((later - due).abs() < 1e-9 * f64::abs(due).max(1.0), "{n}: {later} {due}");
+            zeros.push(2.0 * zeros[zeros.len() - 3] - due);
+        }
+    }
+    // Eight zeros, three turns of the pair: 2^4, beside what stays.
+    assert!((zeros[33] / zeros[25] - 16.0).abs() < 0.1, "{zeros:?}");
+}
