@@ -123,7 +123,7 @@ delay-data: ## the data of figures/delay: passages, and a hundred runs of each r
 	@target/release/examples/delay_growth growth > target/delay-growth.csv && mv target/delay-growth.csv figures/delay/growth.csv
 	@target/release/examples/delay_growth exits > target/delay-exits.csv && mv target/delay-exits.csv figures/delay/exits.csv
 	@target/release/examples/delay_runs sections > target/delay-sections.csv && mv target/delay-sections.csv figures/delay/sections.csv
-	@target/release/examples/delay_runs figures/delay/runs.csv
+	@target/release/examples/delay_runs > target/delay-runs.csv && mv target/delay-runs.csv figures/delay/runs.csv
 
 .PHONY: returns
 returns: ## how many orbits that leave the repelling sliding region come back to the two-fold (minutes)

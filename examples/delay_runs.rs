@@ -1,11 +1,11 @@
 //! Runs of a delayed switch beside smoothed and hysteretic ones, compared by the rules of sentence 4.8 (crates/paper/src/claims.toml): the data
 //! of figures/delay.
 //!
-//! `make delay-data`: late sections go to a journal first, target/delay-sections.jsonl, and a call goes on with it.
+//! `make delay-data`: late sections go to a journal first, target/delay-sections-*.jsonl, and a call of the same version goes on with it.
 
 use std::collections::BTreeMap;
 use std::error::Error;
-use std::fs::{File, OpenOptions, read_to_string};
+use std::fs::{OpenOptions, read_to_string};
 use std::io::Write;
 
 use nalgebra::{SVector, vector};
@@ -15,6 +15,7 @@ use twofold::analyse::{Crossing, Direction};
 use twofold::integrate::delay::{Delayed, History, LateSwitch, Own, Sides};
 use twofold::integrate::roots::CrossingFinder;
 use twofold::integrate::{Dopri5, Failure, Method, Schedule, Stepper, Tolerance, WithStepper};
+use twofold::job::question::NUMERICS;
 use twofold::job::recording::Data;
 use twofold::job::simulate::simulate;
 use twofold::job::spec::{MethodSpec, Observation, RunSpec, SwitchSpec};
@@ -23,6 +24,7 @@ use twofold::num::random::RandomStream;
 use twofold::paper::Reading;
 use twofold::paper::claims::{Similarity, claims};
 use twofold::paper::similarity::{RULES, Rule};
+use twofold::record::Hash;
 use twofold::system::{Caricature, Hysteretic, Relaxation, Smoothed, System, Transition, VectorField};
 
 /// Of all rules.
@@ -304,9 +306,16 @@ impl Runs {
     }
 }
 
+/// The journal of the runs that this version of the program makes by these rules.
+fn journal() -> String {
+    let rules = format!("{:?} {:?}", claims().rules, claims().similarity);
+    let version: String = Hash::of(format!("{NUMERICS} {rules} {}", include_str!("delay_runs.rs")).as_bytes()).into();
+    format!("target/delay-sections-{}.jsonl", &version[..12])
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
+    let mut out = std::io::stdout().lock();
     if std::env::args().nth(1).as_deref() == Some("sections") {
-        let mut out = std::io::stdout().lock();
         writeln!(out, "reading,rule,x,z")?;
         for reading in Reading::ALL {
             for rule in [Rule::Literal, Rule::Delayed] {
@@ -315,32 +324,31 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         return Ok(());
     }
-    let journal = "target/delay-sections.jsonl";
+    let journal = journal();
     let Similarity { runs, .. } = claims().similarity;
-    let known: Vec<Value> = match read_to_string(journal) {
-        Ok(text) => text.lines().map(serde_json::from_str).collect::<Result<_, _>>()?,
+    let known: Vec<Value> = match read_to_string(&journal) {
+        // Without a line that a stopped call has not finished.
+        Ok(text) => text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect(),
         Err(_) => Vec::new(),
     };
     let find = |all: &[Value], reading: Reading, rule: Rule, run: u64| {
         let is_it = |v: &&Value| v["reading"] == reading.word() && v["rule"] == rule.name() && v["run"] == run;
         all.iter().find(is_it).cloned()
     };
-    let mut writer = OpenOptions::new().create(true).append(true).open(journal)?;
+    let mut writer = OpenOptions::new().create(true).append(true).open(&journal)?;
     let mut all = known;
     for number in 0..runs {
         for reading in Reading::ALL {
             for rule in RULES {
                 if find(&all, reading, rule, number).is_none() {
                     let line = section(reading, rule, number)?;
-                    writeln!(writer, "{line}")?;
+                    writer.write_all(format!("{line}\n").as_bytes())?;
                     all.push(line);
                 }
             }
         }
     }
-    let out = std::env::args().nth(1).unwrap_or_else(|| "figures/delay/runs.csv".into());
-    let mut csv = File::create(out)?;
-    writeln!(csv, "{}", twofold::paper::similarity::HEADER)?;
+    writeln!(out, "{}", twofold::paper::similarity::HEADER)?;
     for reading in Reading::ALL {
         let mut of = Vec::new();
         for rule in RULES {
@@ -390,7 +398,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                     }
                 }
                 row.extend(distances);
-                writeln!(csv, "{row}")?;
+                writeln!(out, "{row}")?;
             }
         }
     }
