@@ -11,6 +11,18 @@ struct End {
 
 /// `fields`: f+ and f-, or those of the signs ++, -+, +-, -- of two functions. Columns of the rows: time and states.
 fn run(states: &[&str], start: &str, h: &[&str], fields: &[&[&str]], t_end: f64, exit: Option<&str>) -> End {
+    run_by("--switch filippov", states, start, h, fields, t_end, exit)
+}
+
+fn run_by(
+    rule: &str,
+    states: &[&str],
+    start: &str,
+    h: &[&str],
+    fields: &[&[&str]],
+    t_end: f64,
+    exit: Option<&str>,
+) -> End {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("system.toml");
     let mut text = format!("name = \"case\"\nstates = {states:?}\nstart = [{start}]\n");
@@ -20,7 +32,7 @@ fn run(states: &[&str], start: &str, h: &[&str], fields: &[&[&str]], t_end: f64,
     }
     std::fs::write(&file, text).unwrap();
     let mut command = Command::cargo_bin("twofold").unwrap();
-    command.args(["run", "--quiet", "--switch", "filippov", "--t-end", &t_end.to_string(), "--system"]).arg(&file);
+    command.args(["run", "--quiet", "--t-end", &t_end.to_string()]).args(rule.split(' ')).arg("--system").arg(&file);
     if let Some(rule) = exit {
         command.args(["--exit", rule]);
     }
@@ -140,6 +152,22 @@ fn fields_are_asked_on_their_own_side_only() {
     run(&["y", "z"], "0, 0", &["y"], &fields, 3.0, None).is(&[0.0, 6.0], 1e-6);
     // From below, with y' = 1 + sqrt(-y).
     run(&y, "-1", &["y"], &[&["1"], &["1 + sqrt(-y)"]], 2.0, None).is(&[fall], 1e-6);
+}
+
+/// Friction that both fields write with the sign of h itself: a block that comes to rest at x = 1.2 - sqrt(1.94), by every rule.
+#[test]
+fn the_sign_of_h_in_a_field_is_that_of_its_side() {
+    let rest = [1.2 - 1.94_f64.sqrt(), 0.0];
+    let friction: [&[&str]; 2] = [&["v", "-x - 0.4*sign(v)"]; 2];
+    let states = ["x", "v"];
+    run(&states, "0.9, 0.5", &["v"], &friction, 20.0, None).is(&rest, 1e-6);
+    let half: [&[&str]; 2] = [&["v", "-x - 0.1 - 0.3*sign(2*v)"], &["v", "-x + 0.1 - 0.3*sign(2*v)"]];
+    run(&states, "0.9, 0.5", &["v"], &half, 20.0, None).is(&rest, 1e-6);
+    for method in ["lsoda", "radau5", "taylor"] {
+        // In the layer x creeps at speed eps atanh(x/0.4), 16.5 time units long.
+        let rule = format!("--switch smoothed --eps 1e-5 --method {method} --max-steps 400000");
+        run_by(&rule, &states, "0.9, 0.5", &["v"], &friction, 20.0, None).is(&rest, 2e-4);
+    }
 }
 
 #[test]

@@ -473,6 +473,11 @@ impl<'a> Replay<'a> {
         self.node(node)
     }
 
+    /// Gives an operation another value, for those that are written from here on.
+    pub fn set(&mut self, node: Node, value: Recorded) {
+        self.values[node] = Some(value);
+    }
+
     fn node(&mut self, wanted: Node) -> Recorded {
         // Depth first without recursion: a node is written when its arguments have been.
         let mut open = vec![wanted];

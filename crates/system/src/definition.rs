@@ -44,6 +44,7 @@ use serde::{Deserialize, Serialize};
 use super::diagnostic::{Diagnostic, nearest};
 use super::document::{Canonical, Document, Ordered, ParameterEntry, SecondEntry, StateEntry};
 use super::expression::{Expression, ExpressionError, is_name, is_reserved};
+use super::own_side::on_own_sides;
 use twofold_num::tape::{Recorded, Tape};
 use twofold_num::{Arithmetic, Decimal};
 
@@ -346,7 +347,7 @@ impl Definition {
 
     /// The equations on a tape: h, then f+, then f-; of a system with two surfaces then the same three of the second. `values` are the parameters', in their order.
     pub(super) fn tape(&self, values: &[Decimal]) -> Tape {
-        Tape::record(self.dimension(), |x| {
+        let tape = Tape::record(self.dimension(), |x| {
             let mut known: BTreeMap<&str, Recorded> = BTreeMap::new();
             for (state, x) in self.states.iter().zip(x) {
                 known.insert(&state.name, *x);
@@ -366,8 +367,9 @@ impl Definition {
             let second = self.second.iter().flat_map(|s| std::iter::once(&s.switching).chain(&s.plus).chain(&s.minus));
             let all = std::iter::once(&self.switching).chain(&self.plus).chain(&self.minus).chain(second);
             all.map(|e| record(e, &known)).collect()
-        })
-        .with_names(self.states.iter().map(|s| s.name.clone()))
+        });
+        let tape = if self.second.is_none() { on_own_sides(tape) } else { tape };
+        tape.with_names(self.states.iter().map(|s| s.name.clone()))
     }
 
     fn from_document(document: Document) -> Result<Self, Problem> {

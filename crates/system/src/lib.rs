@@ -26,6 +26,7 @@ pub mod filippov;
 pub mod hysteretic;
 pub mod instance;
 pub mod library;
+mod own_side;
 pub mod reversed;
 pub mod singular;
 pub mod smoothed;
