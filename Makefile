@@ -118,7 +118,7 @@ capture-rest: ## what the study of methods leaves out for its cost: Radau IIA in
 	@$(SWEEP) $(CAPTURE) 2015 --method radau5 $(RECONSTRUCTED) $(STARTS) --random 200 --out $(K)/radau5-reconstructed.csv
 
 .PHONY: delay-data
-delay-data: ## the data of figures/delay: passages, and a hundred runs of each rule to compare (an hour; a stopped call goes on)
+delay-data: ## the data of figures/delay: passages, and a hundred runs of each rule to compare (a quarter of an hour; a stopped call goes on)
 	@$(CARGO) build --release --locked --quiet --example delay_growth --example delay_runs
 	@target/release/examples/delay_growth growth > target/delay-growth.csv && mv target/delay-growth.csv figures/delay/growth.csv
 	@target/release/examples/delay_growth exits > target/delay-exits.csv && mv target/delay-exits.csv figures/delay/exits.csv
