@@ -50,7 +50,7 @@ for reader in "$@"; do
     case $reader in
         system) cp systems/*.toml "$work/seeds-$reader" ;;
         certificate) cp proofs/certificates/*.json "$work/seeds-$reader" ;;
-        manifest) for figure in fig1 fig2 fig6; do cp "figures/$figure/expected.json" "$work/seeds-$reader/$figure.json"; done ;;
+        manifest) for figure in fig2 fig6; do cp "papers/jeffrey-2013/expected/$figure.json" "$work/seeds-$reader/$figure.json"; done ;;
     esac
     if [ "$only" = corpus ]; then
         # Edges alone, not how often each: a handful of inputs instead of thousands. Small ones are tried first.

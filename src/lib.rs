@@ -60,9 +60,9 @@ pub use twofold_integrate as integrate;
 pub use twofold_job as job;
 pub use twofold_job::record;
 pub use twofold_num as num;
-#[cfg(feature = "figures")]
+#[cfg(feature = "cli")]
 pub use twofold_paper::{compare, draw, report};
-#[cfg(feature = "figures")]
+#[cfg(feature = "cli")]
 pub use twofold_render as render;
 pub use twofold_rigor as rigor;
 pub use twofold_system as system;
@@ -81,11 +81,11 @@ pub use twofold_verify as verify;
 /// assert!(reference.contains(picture.record.hashes.pixels.as_str()));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[cfg(feature = "figures")]
+#[cfg(feature = "cli")]
 pub mod paper {
-    #[doc(inline)]
-    pub use twofold_jeffrey_2013 as figures;
     pub use twofold_paper::*;
+
+    pub mod figures;
 }
 
 #[cfg(feature = "cli")]

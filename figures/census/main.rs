@@ -5,5 +5,5 @@
 mod mathematics;
 
 fn main() -> std::process::ExitCode {
-    twofold::cli::main(twofold::paper::figures::census::figure())
+    twofold::cli::main(twofold::paper::figures::named("census"))
 }

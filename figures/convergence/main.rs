@@ -5,5 +5,5 @@
 mod mathematics;
 
 fn main() -> std::process::ExitCode {
-    twofold::cli::main(twofold::paper::figures::convergence::figure())
+    twofold::cli::main(twofold::paper::figures::named("convergence"))
 }

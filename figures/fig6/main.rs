@@ -1,9 +1,9 @@
-//! Makes the figure: every number of it stands in figure.rs beside this.
+//! Makes the figure: every number of it stands in papers/jeffrey-2013/figures/fig6.toml.
 
 #[cfg(target_os = "linux")]
 #[path = "../../src/bin/twofold/mathematics.rs"]
 mod mathematics;
 
 fn main() -> std::process::ExitCode {
-    twofold::cli::main(twofold::paper::figures::fig6::figure())
+    twofold::cli::main(twofold::paper::figures::named("fig6"))
 }

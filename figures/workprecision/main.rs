@@ -5,5 +5,5 @@
 mod mathematics;
 
 fn main() -> std::process::ExitCode {
-    twofold::cli::main(twofold::paper::figures::workprecision::figure())
+    twofold::cli::main(twofold::paper::figures::named("workprecision"))
 }

@@ -59,7 +59,7 @@ pub fn run<'py>(py: Python<'py>, text: &str, show: Option<&Bound<'py, PyAny>>) -
 }
 
 /// A table's columns by name. The vectors themselves change hands; words are their codes and a vocabulary.
-fn arrays(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
+pub fn arrays(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
     let columns = PyDict::new(py);
     for column in table.columns {
         match column.cells {
@@ -153,15 +153,20 @@ pub fn fates(
     })
 }
 
-/// Independent jobs on a pool of threads, their results in order. The pool is made for the call: a global one would not survive a fork.
+/// A pool that is made for one call: a global one would not survive a fork.
+pub fn pool(threads: usize) -> Result<rayon::ThreadPool, JobError> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|e| JobError::Other(format!("{threads} threads could not be started: {e}")))
+}
+
+/// Independent jobs on a pool of threads, their results in order.
 fn side_by_side<A: Send, B: Send>(
     jobs: Vec<A>,
     threads: usize,
     work: &Work,
     job: impl Fn(usize, A) -> Result<B, JobError> + Sync,
 ) -> Result<Vec<B>, JobError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|e| JobError::Other(format!("{threads} threads could not be started: {e}")))?;
+    let pool = pool(threads)?;
     let (all, done) = (jobs.len(), AtomicUsize::new(0));
     work.says(&format!("{all} runs"));
     work.finished(0, all);

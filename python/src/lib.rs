@@ -6,6 +6,7 @@
 
 mod answers;
 mod errors;
+mod folder;
 // The names of the platform's mathematics that dependencies ask for, defined as our own; python/build.rs binds them.
 #[cfg(target_os = "linux")]
 #[path = "../../src/bin/twofold/mathematics.rs"]
@@ -19,6 +20,8 @@ mod system;
 mod _native {
     #[pymodule_export]
     use super::answers::{classify, fates, run, sweep, written};
+    #[pymodule_export]
+    use super::folder::{paper, paper_answer, paper_claims};
     #[pymodule_export]
     use super::paper::{panels, verdict_table};
     #[pymodule_export]

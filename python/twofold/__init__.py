@@ -13,6 +13,7 @@ transition, a hysteretic one, or the discontinuous system itself in Filippov's s
 :func:`spec`, :func:`run_spec`  a run as data, as ``twofold run --spec`` reads it
 :func:`panels`                  the panels of the paper's figures, as runs with their hashes
 :func:`verdicts`                whether the paper's claims hold
+:class:`Paper`                  any paper as a folder: figures, claims, answers
 =============================== ============================================================================
 
 Units are the system's own: the built-in systems are dimensionless. Arrays are float64; ``y`` has the shape (states, points). Errors derive from
@@ -26,6 +27,7 @@ True
 
 from . import errors
 from ._native import NUMERICS as _NUMERICS, VERSION as __version__
+from ._folder import Claim, Figure, Paper, PaperAnswer
 from ._paper import Panel, Verdict, panels, verdict_table, verdicts
 from ._runs import (
     Classification,
@@ -52,13 +54,17 @@ numerics: str = _NUMERICS
 """Digest of the sources that numbers depend on: equal digests give equal bits."""
 
 __all__ = [
+    "Claim",
     "Classification",
     "ComputationError",
     "DefinitionError",
+    "Figure",
     "Funnel",
     "Future",
     "InternalError",
     "Panel",
+    "Paper",
+    "PaperAnswer",
     "ParameterError",
     "Section",
     "Solution",

@@ -94,7 +94,7 @@ pub struct RunFlags {
     /// Absolute tolerance [default: that of --rtol's default].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub atol: Option<f64>,
-    /// Longest step [default: a tenth of the time between restarts or kicks, NDSolve's].
+    /// Longest step, inf for any [default: a tenth of the time between restarts or kicks, NDSolve's].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub max_step: Option<f64>,
     /// Number of steps after which the run is given up [default: 400000000].
@@ -683,7 +683,11 @@ impl RunFlags {
                 rtol: self.rtol.unwrap_or(defaults.tolerance.rtol),
                 atol: self.atol.unwrap_or(defaults.tolerance.atol),
             },
-            step_cap: self.max_step.map_or(defaults.step_cap, StepCap::Absolute),
+            step_cap: match self.max_step {
+                None => defaults.step_cap,
+                Some(longest) if longest == f64::INFINITY => StepCap::None,
+                Some(longest) => StepCap::Absolute(longest),
+            },
             max_steps: self.max_steps.unwrap_or(DEFAULT_MAX_STEPS),
             precision: self.precision,
             order: self.order,

@@ -9,6 +9,7 @@ use super::{Folder, FolderError, page};
 use crate::cli::{CliError, make};
 use crate::job::{AnyQuestion, Executor, JobError};
 use crate::paper::pipeline::{PictureRecord, questions};
+use crate::paper::verdict::PanelVerdict;
 use crate::record::files::{read_text, try_folder};
 use crate::record::manifest::VERSION;
 use crate::record::{self, Manifest};
@@ -120,7 +121,7 @@ impl Folder {
                     // The data were known: was it by this rule that they were first judged?
                     found.rule_after_data =
                         known.is_some_and(|v| v.data == found.data && (v.rule != found.rule || v.rule_after_data));
-                    executor.progress().line(&format!("{}: {}: {}", claim.id, outcome(&found), found.found));
+                    executor.progress().line(&format!("{}: {}: {}", claim.id, outcome(found.agrees), found.found));
                     found
                 });
                 if let Err(why) = &verdict {
@@ -275,10 +276,16 @@ impl Made<'_> {
         Outcomes { version: 1, verdicts: self.claims.iter().filter_map(|s| s.verdict.as_ref().ok().cloned()).collect() }
     }
 
-    /// Claims that hold, and all of them.
+    /// What panels say of themselves (`says`), and whether it holds.
+    pub fn panels(&self) -> impl Iterator<Item = &PanelVerdict> {
+        self.pictures.iter().flat_map(|p| &p.verdicts)
+    }
+
+    /// Claims that hold, and all of them, those of panels among them.
     pub fn score(&self) -> (usize, usize) {
-        let holds = |s: &&Scored<'_>| s.verdict.as_ref().is_ok_and(|v| v.agrees);
-        (self.claims.iter().filter(holds).count(), self.claims.len())
+        let claims = self.claims.iter().map(|s| s.verdict.as_ref().is_ok_and(|v| v.agrees));
+        let all: Vec<bool> = claims.chain(self.panels().map(|v| v.agrees)).collect();
+        (all.iter().filter(|holds| **holds).count(), all.len())
     }
 
     /// The first claim that could not be scored.
@@ -288,8 +295,8 @@ impl Made<'_> {
 }
 
 /// The word for an outcome.
-pub fn outcome(verdict: &Verdict) -> &'static str {
-    if verdict.agrees { "agrees" } else { "differs" }
+pub fn outcome(agrees: bool) -> &'static str {
+    if agrees { "agrees" } else { "differs" }
 }
 
 impl From<FolderError> for CliError {

@@ -28,9 +28,11 @@ use toml::Spanned;
 
 use crate::cli::flags::Use;
 use crate::job::AnyQuestion;
+use crate::job::spec::RunSpec;
 use crate::paper::draw::plot::{self, Kind, Look};
-use crate::paper::plots::{Columns, Drawing, Plot, Plots, Points};
-use crate::paper::{Figure, Picture, View};
+use crate::paper::plots::{Columns, Drawing, Plot, Plots, Points, Recorded};
+use crate::paper::verdict::Claim as PanelClaim;
+use crate::paper::{Camera, Figure, Panel, Picture, Reading, Repeats, View, figures};
 use crate::record::FileError;
 use crate::record::files::read_text;
 use crate::record::manifest::is_plain_name;
@@ -60,6 +62,7 @@ pub enum FolderError {
 pub struct Folder {
     /// Where it lies.
     pub root: PathBuf,
+    files: Files,
     /// The paper.
     pub about: About,
     /// The file that says so.
@@ -150,6 +153,14 @@ struct FigureFile {
     shows: String,
     /// Panels in a row [default: at most three].
     columns: Option<Spanned<usize>>,
+    /// The readings of which it has a picture [default: all].
+    readings: Option<Vec<Spanned<String>>>,
+    /// How panels are drawn that do not say it.
+    draw: Option<Spanned<Draw>>,
+    /// States on the axes of panels that do not say it.
+    axes: Option<Spanned<Vec<String>>>,
+    /// Azimuth and elevation in degrees, of panels in space that do not say it.
+    camera: Option<Spanned<[f64; 2]>>,
     /// Its panels.
     panel: Vec<Spanned<PanelFile>>,
 }
@@ -163,10 +174,17 @@ struct PanelFile {
     /// A few words.
     #[serde(default)]
     title: String,
-    /// How it is drawn.
-    draw: Spanned<Draw>,
+    /// How it is drawn [default: as the figure says].
+    draw: Option<Spanned<Draw>>,
     /// The run that it shows; of `draw = "columns"` nothing.
     run: Option<Spanned<Words>>,
+    /// What a reading changes in the run.
+    #[serde(default)]
+    r#in: BTreeMap<Spanned<String>, Spanned<Words>>,
+    /// What the paper says of a section or path drawn as `halves` or `surface`; the verdict stands on its face.
+    says: Option<Spanned<PanelClaim>>,
+    /// Committed runs that repeat it, by study and name; the share that bears out what the paper says stands on its face.
+    repeats: Option<Spanned<String>>,
     /// States on the axes.
     axes: Option<Spanned<Vec<String>>>,
     /// Azimuth and elevation in degrees, of a panel in space.
@@ -195,6 +213,17 @@ enum Draw {
     Space,
     Section,
     Columns,
+    /// A section: the later half, and below it the early half.
+    Halves,
+    /// A path in space with the surface where h = 0.
+    Surface,
+}
+
+/// How a panel is drawn: as it says, or else as its figure does.
+struct Drawn<'a> {
+    draw: &'a Spanned<Draw>,
+    axes: Option<&'a Spanned<Vec<String>>>,
+    camera: Option<&'a Spanned<[f64; 2]>>,
 }
 
 /// Numbers read off the paper.
@@ -231,13 +260,86 @@ struct ClaimsFile {
 /// A file of a folder: its path there and its text.
 type Origin = Arc<(String, String)>;
 
+/// The path of a file in the folder, and its text.
+pub type Embedded = &'static [(&'static str, &'static str)];
+
+/// Where a folder's files are.
+#[derive(Clone, Debug)]
+enum Files {
+    Disk(PathBuf),
+    Embedded(Embedded),
+}
+
+impl Files {
+    /// A file's text, if it is there.
+    fn text(&self, path: &str) -> Result<Option<String>, FolderError> {
+        match self {
+            Files::Disk(root) => {
+                let file = root.join(path);
+                Ok(if file.exists() { Some(read_text(&file)?) } else { None })
+            }
+            Files::Embedded(all) => Ok(all.iter().find(|f| f.0 == path).map(|f| f.1.to_owned())),
+        }
+    }
+
+    /// The TOML files of a part of the folder, by name.
+    fn names(&self, part: &str) -> Result<Vec<String>, FolderError> {
+        let paths: Vec<String> = match self {
+            Files::Disk(root) if root.join(part).is_dir() => {
+                let tree = read_tree(&root.join(part), &|path| path.ends_with(".toml") && !path.contains('/'))?;
+                tree.files.into_iter().map(|f| f.path).collect()
+            }
+            Files::Disk(_) => Vec::new(),
+            Files::Embedded(all) => {
+                all.iter().filter_map(|f| f.0.strip_prefix(part)?.strip_prefix('/').map(str::to_owned)).collect()
+            }
+        };
+        let mut names = Vec::new();
+        for path in paths {
+            let name = path.trim_end_matches(".toml").to_owned();
+            if !is_plain_name(&name) {
+                let why = format!("{part}/{}: no plain name; use letters, digits, - and _", path.escape_debug());
+                return Err(FolderError::Missing(why));
+            }
+            names.push(name);
+        }
+        names.sort();
+        Ok(names)
+    }
+
+    /// A file of the folder, if it is there.
+    fn parsed<T: DeserializeOwned>(&self, path: &str) -> Result<Option<(Origin, T)>, FolderError> {
+        let Some(text) = self.text(path)? else { return Ok(None) };
+        let origin = Arc::new((path.to_owned(), text));
+        match toml::from_str(&origin.1) {
+            Ok(read) => Ok(Some((origin, read))),
+            Err(error) => {
+                let message = error.message().lines().next().unwrap_or_default().to_owned();
+                Err(FolderError::at(&origin, error.span().unwrap_or(0..0), message, None))
+            }
+        }
+    }
+}
+
 impl Folder {
     /// Reads a folder, all of it, and checks that every question can be asked and every claim reads something.
     ///
     /// # Errors
     /// What is wrong first, with its file, place and remedy.
     pub fn read(root: &Path) -> Result<Self, FolderError> {
-        let (origin, about): (Origin, About) = parsed(root, "paper.toml")?.ok_or_else(|| {
+        Self::read_from(root, Files::Disk(root.to_owned()))
+    }
+
+    /// The same of a folder that the program carries with it.
+    ///
+    /// # Errors
+    /// As [`Folder::read`].
+    pub fn embedded(root: &str, files: Embedded) -> Result<Self, FolderError> {
+        Self::read_from(Path::new(root), Files::Embedded(files))
+    }
+
+    fn read_from(root: &Path, files: Files) -> Result<Self, FolderError> {
+        let (origin, about): (Origin, About) = files.parsed("paper.toml")?.ok_or_else(|| {
             FolderError::Missing(format!(
                 "{}: there is no paper.toml; name a paper's folder, or make one with twofold paper new",
                 root.display()
@@ -250,6 +352,7 @@ impl Folder {
         let readings = readings(&origin, &about)?;
         let mut folder = Self {
             root: root.to_owned(),
+            files,
             figures: Vec::new(),
             shows: Vec::new(),
             sources: BTreeMap::new(),
@@ -258,7 +361,7 @@ impl Folder {
             common: origin,
         };
         folder.read_measures()?;
-        for name in names(root, "figures")? {
+        for name in folder.files.names("figures")? {
             folder.read_figure(&name, &readings)?;
         }
         folder.read_claims()?;
@@ -267,7 +370,7 @@ impl Folder {
 
     fn read_measures(&mut self) -> Result<(), FolderError> {
         type Measures = BTreeMap<Spanned<String>, Spanned<MeasureFile>>;
-        let Some((origin, measures)) = parsed::<Measures>(&self.root, "measures.toml")? else { return Ok(()) };
+        let Some((origin, measures)) = self.files.parsed::<Measures>("measures.toml")? else { return Ok(()) };
         for (name, measure) in measures {
             plain(&origin, &name, "measure")?;
             let place = measure.span();
@@ -286,9 +389,9 @@ impl Folder {
         Ok(())
     }
 
-    fn read_figure(&mut self, id: &str, readings: &[Reading]) -> Result<(), FolderError> {
+    fn read_figure(&mut self, id: &str, readings: &[Given]) -> Result<(), FolderError> {
         let path = format!("figures/{id}.toml");
-        let Some((origin, figure)) = parsed::<FigureFile>(&self.root, &path)? else { return Ok(()) };
+        let Some((origin, figure)) = self.files.parsed::<FigureFile>(&path)? else { return Ok(()) };
         if figure.panel.is_empty() {
             return Err(FolderError::at(&origin, 0..0, "the figure has no panel", Some("add [[panel]]".into())));
         }
@@ -299,60 +402,196 @@ impl Folder {
             Some(columns) => *columns.get_ref(),
             None => figure.panel.len().clamp(1, 3),
         };
+        let none = [Given { name: String::new(), about: String::new(), words: Vec::new() }];
+        let mut shown: Vec<&Given> =
+            if readings.is_empty() { none.iter().collect() } else { readings.iter().collect() };
+        if let Some(only) = &figure.readings {
+            for name in only {
+                known(&origin, name, readings)?;
+            }
+            shown.retain(|r| only.iter().any(|name| *name.get_ref() == r.name));
+            if only.is_empty() {
+                shown = none.iter().collect();
+            }
+        }
         let mut pictures = Vec::new();
-        let none = [Reading { name: String::new(), about: String::new(), words: Vec::new() }];
-        for reading in if readings.is_empty() { &none[..] } else { readings } {
-            let mut plots = Vec::new();
-            for panel in &figure.panel {
-                let label = &panel.get_ref().label;
-                plain(&origin, label, "label")?;
-                if plots.iter().any(|p: &Plot| p.label == *label.get_ref()) {
-                    let why = format!("there are two panels `{}`", label.get_ref());
-                    return Err(FolderError::at(&origin, label.span(), why, None));
-                }
-                let plot = self.plot(&origin, panel, reading)?;
-                if let Some(words) = &panel.get_ref().run {
-                    let at = if reading.name.is_empty() { String::new() } else { format!("@{}", reading.name) };
-                    let said = self.said(&origin, words, reading)?;
-                    let source = Source { said, ask: Ask::Run, question: plot.question.clone() };
-                    self.sources.insert(format!("{id}/{}{at}", label.get_ref()), source);
-                }
-                plots.push(plot);
-            }
-            let (name, mut caption) = (id.to_owned(), figure.caption.clone());
-            let name = if reading.name.is_empty() { name } else { format!("{name}-{}", reading.name) };
-            if !reading.about.is_empty() {
-                caption = format!("{caption} Reading \"{}\": {}", reading.name, reading.about);
-            }
-            pictures.push(Picture {
-                name,
-                reading: None,
-                title: figure.title.clone().into(),
-                caption,
-                view: View::Plots(Plots { columns, plots }.into()),
-                panels: Vec::new(),
-                alterations: Vec::new(),
-            });
+        for reading in shown {
+            let picture = self.picture(&origin, id, &figure, columns, (reading, readings))?;
+            pictures.push(picture);
         }
         self.figures.push(Figure { id: id.to_owned().into(), title: figure.title.into(), pictures });
         self.shows.push(figure.shows);
         Ok(())
     }
 
-    fn said(&self, origin: &Origin, words: &Spanned<Words>, reading: &Reading) -> Result<Said, FolderError> {
-        let mut defaults = vec![&self.about.run];
-        defaults.extend(&reading.words);
-        Said::new(origin, words, &self.common, &defaults)
+    /// A figure in one reading.
+    fn picture(
+        &mut self,
+        origin: &Origin,
+        id: &str,
+        figure: &FigureFile,
+        columns: usize,
+        (reading, readings): (&Given, &[Given]),
+    ) -> Result<Picture, FolderError> {
+        let at = if reading.name.is_empty() { String::new() } else { format!("@{}", reading.name) };
+        let suffix = at.replace('@', "-");
+        let (mut plots, mut panels, mut views) = (Vec::new(), Vec::new(), Vec::new());
+        let mut labels = BTreeSet::new();
+        for panel in &figure.panel {
+            let (place, panel) = (panel.span(), panel.get_ref());
+            let label = &panel.label;
+            plain(origin, label, "label")?;
+            if !labels.insert(label.get_ref()) {
+                let why = format!("there are two panels `{}`", label.get_ref());
+                return Err(FolderError::at(origin, label.span(), why, None));
+            }
+            panel.r#in.keys().try_for_each(|name| known(origin, name, readings))?;
+            let Some(draw) = panel.draw.as_ref().or(figure.draw.as_ref()) else {
+                let help = "give draw, such as \"series\", in the panel or for the whole figure".to_owned();
+                return Err(FolderError::at(origin, place, "nothing says how the panel is drawn", Some(help)));
+            };
+            let drawn = Drawn {
+                draw,
+                axes: panel.axes.as_ref().or(figure.axes.as_ref()),
+                camera: panel.camera.as_ref().or(figure.camera.as_ref()),
+            };
+            let said = panel.run.as_ref().map(|words| {
+                let mut defaults = vec![&self.about.run];
+                defaults.extend(&reading.words);
+                let over = panel.r#in.iter().find(|(name, _)| *name.get_ref() == reading.name).map(|(_, words)| words);
+                Said::new(origin, words, &self.common, &defaults).and_then(|said| said.over(over.map(Spanned::get_ref)))
+            });
+            let said = said.transpose()?;
+            let question = if let Draw::Halves | Draw::Surface = draw.get_ref() {
+                let (spec, view) = self.spec_and_view(origin, place, said.as_ref(), &drawn)?;
+                let mut shown = Panel::new(label.get_ref(), panel.title.clone(), spec);
+                shown.claim = panel.says.as_ref().map(|c| *c.get_ref());
+                shown.repeats =
+                    panel.repeats.as_ref().map(|name| Self::repeats(origin, name, &reading.name)).transpose()?;
+                let question: AnyQuestion = Recorded::Surfaces(shown.run.clone()).question();
+                panels.push(shown);
+                views.push((view, draw.span()));
+                question
+            } else {
+                for (key, at) in [
+                    ("says", panel.says.as_ref().map(Spanned::span)),
+                    ("repeats", panel.repeats.as_ref().map(Spanned::span)),
+                ] {
+                    if let Some(at) = at {
+                        let why = format!("`{key}` has no effect on a panel drawn in this way");
+                        let help = "draw it as halves or surface, or score it in claims.toml".to_owned();
+                        return Err(FolderError::at(origin, at, why, Some(help)));
+                    }
+                }
+                let plot = self.plot(origin, panel, place, said.as_ref(), &drawn)?;
+                let question = plot.question.clone();
+                plots.push(plot);
+                question
+            };
+            if let Some(said) = said {
+                self.sources.insert(format!("{id}/{}{at}", label.get_ref()), Source { said, ask: Ask::Run, question });
+            }
+        }
+        let mut caption = figure.caption.clone();
+        let view = match views.first() {
+            None => {
+                if !reading.about.is_empty() {
+                    caption = format!("{caption} Reading \"{}\": {}", reading.name, reading.about);
+                }
+                View::Plots(Plots { columns, plots }.into())
+            }
+            Some((first, _)) => {
+                let other = views.iter().find(|(view, _)| !alike(view, first)).map(|(_, place)| place.clone());
+                if let Some(place) = other.or_else(|| (!plots.is_empty()).then(|| views[0].1.clone())) {
+                    let why = "panels drawn as halves or surface stand in a figure of their own, with the same axes and camera";
+                    return Err(FolderError::at(origin, place, why, None));
+                }
+                if let Some(columns) = &figure.columns {
+                    let why = "`columns` has no effect on a figure drawn in this way";
+                    return Err(FolderError::at(origin, columns.span(), why, Some("leave it out".into())));
+                }
+                first.clone()
+            }
+        };
+        Ok(Picture {
+            name: format!("{id}{suffix}"),
+            reading: if panels.is_empty() { None } else { Reading::ALL.into_iter().find(|r| r.word() == reading.name) },
+            title: figure.title.clone().into(),
+            caption,
+            view,
+            panels,
+            alterations: Vec::new(),
+        })
     }
 
-    fn plot(&self, origin: &Origin, panel: &Spanned<PanelFile>, reading: &Reading) -> Result<Plot, FolderError> {
-        let place = panel.span();
-        let panel = panel.get_ref();
+    /// A run with h, plus and minus, and the way in which a figure of such runs is drawn.
+    fn spec_and_view(
+        &self,
+        origin: &Origin,
+        place: Range<usize>,
+        said: Option<&Said>,
+        drawn: &Drawn<'_>,
+    ) -> Result<(RunSpec, View), FolderError> {
+        let said = said.ok_or_else(|| {
+            FolderError::at(
+                origin,
+                place,
+                "the panel shows no run",
+                Some("give run = { system = \"...\", ... }".into()),
+            )
+        })?;
+        let Recorded::Surfaces(spec) = said.recorded(&self.root, Use::Picture)? else {
+            return Err(said.complain("this way of drawing needs a system with h, plus and minus"));
+        };
+        let wrong = |at: Range<usize>, why: String| FolderError::at(origin, at, why, None);
+        let frame = plot::Frame::from(&spec);
+        let given = drawn.axes.map_or(Ok(Vec::new()), |axes| states(origin, axes, &frame))?;
+        let kind = if *drawn.draw.get_ref() == Draw::Halves { Kind::Section } else { Kind::Space };
+        let axes = plot::axes(&frame, kind, &given).map_err(|e| wrong(drawn.draw.span(), e.to_string()))?;
+        let view = match (kind, axes.as_slice(), drawn.camera) {
+            (Kind::Section, _, Some(camera)) => {
+                return Err(wrong(camera.span(), "`camera` has no effect on a section".to_owned()));
+            }
+            (Kind::Section, &[horizontal, vertical], None) => View::Section { horizontal, vertical },
+            (Kind::Section, ..) => return Err(wrong(drawn.draw.span(), "a section in halves has two axes".to_owned())),
+            (_, axes, camera) => {
+                let (azimuth, elevation) = camera.map_or(Ok((-60.0, 18.0)), |c| angles(origin, c))?;
+                View::Space { camera: Camera { axes: [axes[0], axes[1], axes[2]], azimuth, elevation } }
+            }
+        };
+        Ok((spec, view))
+    }
+
+    /// The runs that repeat a panel: "STUDY/NAME".
+    fn repeats(origin: &Origin, name: &Spanned<String>, reading: &str) -> Result<Repeats, FolderError> {
+        let found = name.get_ref().split_once('/').and_then(|(study, panel)| {
+            let reading = Reading::ALL.into_iter().find(|r| r.word() == reading)?;
+            Some(Repeats { panel: panel.to_owned(), reading, count: figures::counts(study)? })
+        });
+        found.ok_or_else(|| {
+            let why = format!("no committed runs are called `{}` in this reading", name.get_ref());
+            FolderError::at(
+                origin,
+                name.span(),
+                why,
+                Some("name a study and one of its panels, or leave it out".into()),
+            )
+        })
+    }
+
+    fn plot(
+        &self,
+        origin: &Origin,
+        panel: &PanelFile,
+        place: Range<usize>,
+        said: Option<&Said>,
+        drawn: &Drawn<'_>,
+    ) -> Result<Plot, FolderError> {
         let wrong = |at: Range<usize>, why: String, help: &str| {
             FolderError::at(origin, at, why, (!help.is_empty()).then(|| help.to_owned()))
         };
         let points = panel.points.as_ref().map(|points| self.points(origin, points)).transpose()?;
-        let draw = *panel.draw.get_ref();
+        let draw = *drawn.draw.get_ref();
         if draw == Draw::Columns {
             let idle =
                 [("run", panel.run.as_ref().map(Spanned::span)), ("axes", panel.axes.as_ref().map(Spanned::span))];
@@ -361,7 +600,7 @@ impl Folder {
             }
             let (Some(of), Some(x), false) = (&panel.of, &panel.x, panel.y.is_empty()) else {
                 let help = "give of = \"MEASURE\", x = \"COLUMN\" and y = [\"COLUMN\"]";
-                return Err(wrong(panel.draw.span(), "columns of which table?".into(), help));
+                return Err(wrong(drawn.draw.span(), "columns of which table?".into(), help));
             };
             let source = self.source(origin, of)?;
             let columns = Columns { table: panel.table.clone(), x: x.clone(), y: panel.y.clone(), dots: panel.dots };
@@ -380,43 +619,21 @@ impl Folder {
                 "give run = { ... }",
             ));
         }
-        let Some(words) = &panel.run else {
+        let Some(said) = said else {
             return Err(wrong(place, "the panel shows no run".into(), "give run = { system = \"...\", ... }"));
         };
-        let said = self.said(origin, words, reading)?;
         let recorded = said.recorded(&self.root, Use::Picture)?;
         let frame = recorded.frame();
         let kind = match draw {
             Draw::Series => Kind::Series,
             Draw::Plane => Kind::Plane,
             Draw::Space => Kind::Space,
-            Draw::Section | Draw::Columns => Kind::Section,
+            Draw::Section | Draw::Columns | Draw::Halves | Draw::Surface => Kind::Section,
         };
-        let mut axes = Vec::new();
-        if let Some(given) = &panel.axes {
-            let names: Vec<&str> = frame.states.iter().map(|s| s.name.as_str()).collect();
-            for name in given.get_ref() {
-                let Some(i) = names.iter().position(|n| *n == name.as_str()) else {
-                    let help = nearest(name, &names)
-                        .map_or(format!("states are {}", names.join(", ")), |near| format!("did you mean `{near}`?"));
-                    return Err(wrong(given.span(), format!("there is no state `{name}`"), &help));
-                };
-                axes.push(i);
-            }
-        }
-        let camera = match (&panel.camera, kind) {
+        let axes = drawn.axes.map_or(Ok(Vec::new()), |axes| states(origin, axes, &frame))?;
+        let camera = match (drawn.camera, kind) {
             (None, _) => None,
-            (Some(camera), Kind::Space) => {
-                let [azimuth, elevation] = *camera.get_ref();
-                if !(azimuth.is_finite() && elevation.abs() <= 90.0) {
-                    return Err(wrong(
-                        camera.span(),
-                        "azimuth and elevation are degrees, the elevation from -90 to 90".into(),
-                        "",
-                    ));
-                }
-                Some((azimuth, elevation))
-            }
+            (Some(camera), Kind::Space) => Some(angles(origin, camera)?),
             (Some(camera), _) => {
                 return Err(wrong(
                     camera.span(),
@@ -426,7 +643,7 @@ impl Folder {
             }
         };
         let look = Look { kind, axes, camera, title: None };
-        plot::axes(&frame, kind, &look.axes).map_err(|e| wrong(panel.draw.span(), e.to_string(), ""))?;
+        plot::axes(&frame, kind, &look.axes).map_err(|e| wrong(drawn.draw.span(), e.to_string(), ""))?;
         Ok(Plot {
             label: panel.label.get_ref().clone(),
             title: panel.title.clone(),
@@ -442,7 +659,7 @@ impl Folder {
         if !Path::new(file).components().all(|c| matches!(c, Component::Normal(_))) {
             return Err(wrong(format!("the file `{file}` does not lie in this folder")));
         }
-        let text = read_text(&self.root.join(file))?;
+        let text = self.files.text(file)?.ok_or_else(|| wrong(format!("there is no file `{file}`")))?;
         let rows = text.lines().map(str::trim).filter(|l| !l.is_empty() && !l.starts_with('#')).skip(1);
         let mut found = Vec::new();
         for row in rows {
@@ -470,7 +687,7 @@ impl Folder {
     }
 
     fn read_claims(&mut self) -> Result<(), FolderError> {
-        let Some((origin, file)) = parsed::<ClaimsFile>(&self.root, "claims.toml")? else { return Ok(()) };
+        let Some((origin, file)) = self.files.parsed::<ClaimsFile>("claims.toml")? else { return Ok(()) };
         let mut known = BTreeSet::new();
         for claim in file.claim {
             plain(&origin, &claim.get_ref().id, "claim")?;
@@ -486,13 +703,13 @@ impl Folder {
 }
 
 /// A reading, with the words of those that it extends before its own.
-struct Reading {
+struct Given {
     name: String,
     about: String,
     words: Vec<Words>,
 }
 
-fn readings(origin: &Origin, about: &About) -> Result<Vec<Reading>, FolderError> {
+fn readings(origin: &Origin, about: &About) -> Result<Vec<Given>, FolderError> {
     let named = |name: &str| about.readings.iter().find(|(k, _)| k.get_ref() == name);
     let mut all = Vec::new();
     for (name, reading) in &about.readings {
@@ -519,9 +736,53 @@ fn readings(origin: &Origin, about: &About) -> Result<Vec<Reading>, FolderError>
             words.insert(0, next.run.clone());
             at = next;
         }
-        all.push(Reading { name: name.get_ref().clone(), about: reading.about.clone(), words });
+        all.push(Given { name: name.get_ref().clone(), about: reading.about.clone(), words });
     }
     Ok(all)
+}
+
+/// Whether panels can stand in one picture of these kinds.
+fn alike(one: &View, other: &View) -> bool {
+    match (one, other) {
+        (View::Space { camera: a }, View::Space { camera: b }) => a == b,
+        (View::Section { horizontal: x, vertical: y }, View::Section { horizontal: u, vertical: v }) => {
+            (x, y) == (u, v)
+        }
+        _ => false,
+    }
+}
+
+/// The states that are named.
+fn states(origin: &Origin, given: &Spanned<Vec<String>>, frame: &plot::Frame<'_>) -> Result<Vec<usize>, FolderError> {
+    let names: Vec<&str> = frame.states.iter().map(|s| s.name.as_str()).collect();
+    let index = |name: &String| {
+        names.iter().position(|n| *n == name.as_str()).ok_or_else(|| {
+            let help = nearest(name, &names)
+                .map_or(format!("states are {}", names.join(", ")), |near| format!("did you mean `{near}`?"));
+            FolderError::at(origin, given.span(), format!("there is no state `{name}`"), Some(help))
+        })
+    };
+    given.get_ref().iter().map(index).collect()
+}
+
+/// Azimuth and elevation.
+fn angles(origin: &Origin, camera: &Spanned<[f64; 2]>) -> Result<(f64, f64), FolderError> {
+    let [azimuth, elevation] = *camera.get_ref();
+    if azimuth.is_finite() && elevation.abs() <= 90.0 {
+        return Ok((azimuth, elevation));
+    }
+    let why = "azimuth and elevation are degrees, the elevation from -90 to 90";
+    Err(FolderError::at(origin, camera.span(), why, None))
+}
+
+/// Refuses a reading that the paper does not have.
+fn known(origin: &Origin, name: &Spanned<String>, readings: &[Given]) -> Result<(), FolderError> {
+    let names: Vec<&str> = readings.iter().map(|r| r.name.as_str()).collect();
+    if names.contains(&name.get_ref().as_str()) {
+        return Ok(());
+    }
+    let help = nearest(name.get_ref(), &names).map(|near| format!("did you mean `{near}`?"));
+    Err(FolderError::at(origin, name.span(), format!("there is no reading `{}`", name.get_ref()), help))
 }
 
 /// A name that files, pages and addresses can carry as it is.
@@ -532,41 +793,4 @@ fn plain(origin: &Origin, name: &Spanned<String>, what: &str) -> Result<(), Fold
     let why = format!("the {what} `{}` is no plain name", name.get_ref().escape_debug());
     let help = "use letters, digits, - and _, such as fig3 or multipliers-24".to_owned();
     Err(FolderError::at(origin, name.span(), why, Some(help)))
-}
-
-/// The TOML files of a part of the folder, by name.
-fn names(root: &Path, part: &str) -> Result<Vec<String>, FolderError> {
-    let folder = root.join(part);
-    if !folder.is_dir() {
-        return Ok(Vec::new());
-    }
-    let tree = read_tree(&folder, &|path| path.ends_with(".toml") && !path.contains('/'))?;
-    let mut names = Vec::new();
-    for file in tree.files {
-        let name = file.path.trim_end_matches(".toml").to_owned();
-        if !is_plain_name(&name) {
-            let why = format!("{part}/{}: no plain name; use letters, digits, - and _", file.path.escape_debug());
-            return Err(FolderError::Missing(why));
-        }
-        names.push(name);
-    }
-    names.sort();
-    Ok(names)
-}
-
-/// A file of the folder, if it is there.
-fn parsed<T: DeserializeOwned>(root: &Path, path: &str) -> Result<Option<(Origin, T)>, FolderError> {
-    let file = root.join(path);
-    if !file.exists() {
-        return Ok(None);
-    }
-    let text = read_text(&file)?;
-    let origin = Arc::new((path.to_owned(), text));
-    match toml::from_str(&origin.1) {
-        Ok(read) => Ok(Some((origin, read))),
-        Err(error) => {
-            let message = error.message().lines().next().unwrap_or_default().to_owned();
-            Err(FolderError::at(&origin, error.span().unwrap_or(0..0), message, None))
-        }
-    }
 }

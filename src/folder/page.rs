@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use super::Folder;
 use super::make::{Made, Scored, outcome};
 use crate::paper::pipeline::PictureRecord;
+use crate::paper::verdict::PanelVerdict;
 use crate::record::Hash;
 use crate::report::escape;
 
@@ -32,10 +33,13 @@ pub fn page(folder: &Folder, made: &Made<'_>) -> String {
     put(format!("<p>{}</p>", escape(&citation(folder))));
     put(format!("<p>{}</p>", escape(&about.summary)));
     put(format!("<p>{holds} of {all} claims agree with what was computed.</p>"));
-    if !made.claims.is_empty() {
+    if !made.claims.is_empty() || made.panels().next().is_some() {
         put("<h2>Claims</h2>\n<table>\n<thead><tr><th scope=\"col\">where</th><th scope=\"col\">what it says</th><th scope=\"col\">outcome</th><th scope=\"col\">rule</th></tr></thead>\n<tbody>".to_owned());
         for scored in &made.claims {
             put(row(scored));
+        }
+        for verdict in made.panels() {
+            put(panel_row(verdict));
         }
         put("</tbody>\n</table>".to_owned());
     }
@@ -67,7 +71,7 @@ fn row(scored: &Scored<'_>) -> String {
         if claim.note.is_empty() { String::new() } else { format!("<br><small>{}</small>", escape(&claim.note)) };
     let (found, after) = match &scored.verdict {
         Ok(v) => {
-            let word = outcome(v);
+            let word = outcome(v.agrees);
             (format!("<span class=\"{word}\">{word}</span>: {}", escape(&v.found)), v.rule_after_data)
         }
         Err(why) => (format!("<span class=\"differs\">cannot be scored</span>: {}", escape(&why.to_string())), false),
@@ -80,6 +84,18 @@ fn row(scored: &Scored<'_>) -> String {
         escape(&claim.says),
         claim.kind(),
         escape(&claim.decided)
+    )
+}
+
+fn panel_row(verdict: &PanelVerdict) -> String {
+    let PanelVerdict { picture, panel, claim_text, found, because, agrees, .. } = verdict;
+    let word = outcome(*agrees);
+    format!(
+        "<tr><td><a href=\"#{picture}\">{picture}</a> ({})</td><td>{}</td><td><span class=\"{word}\">{word}</span>: {}<br><small>{}</small></td><td>the panel's own</td></tr>",
+        escape(panel),
+        escape(claim_text),
+        escape(found),
+        escape(because)
     )
 }
 

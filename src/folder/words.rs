@@ -100,6 +100,18 @@ fn texts(key: &str, value: &Value) -> Result<Vec<String>, String> {
     }
 }
 
+/// A later word replaces an earlier one; parameters (`set`) add up.
+fn add(flags: &mut Vec<Flag>, flag: Flag) {
+    match flags.iter_mut().find(|f| f.name == flag.name) {
+        Some(old) if REPEATED.contains(&flag.name.as_str()) => {
+            old.values.extend(flag.values);
+            old.place = flag.place;
+        }
+        Some(old) => *old = flag,
+        None => flags.push(flag),
+    }
+}
+
 impl Said {
     /// The words of a question over those that hold for all (`defaults`, of the file `common`): a later word replaces an earlier one, and
     /// parameters (`set`) add up.
@@ -116,17 +128,22 @@ impl Said {
         let layers = defaults.iter().map(|w| (*w, common)).chain(std::iter::once((words.get_ref(), origin)));
         for (layer, origin) in layers {
             for flag in layer.flags(origin)? {
-                match flags.iter_mut().find(|f| f.name == flag.name) {
-                    Some(old) if REPEATED.contains(&flag.name.as_str()) => {
-                        old.values.extend(flag.values);
-                        old.place = flag.place;
-                    }
-                    Some(old) => *old = flag,
-                    None => flags.push(flag),
-                }
+                add(&mut flags, flag);
             }
         }
         Ok(Self { origin: origin.clone(), place: words.span(), flags })
+    }
+
+    /// The question with some words of the same file replaced.
+    ///
+    /// # Errors
+    /// As [`Said::new`].
+    pub fn over(mut self, words: Option<&Words>) -> Result<Self, FolderError> {
+        let origin = self.origin.clone();
+        for flag in words.map_or(Ok(Vec::new()), |words| words.flags(&origin))? {
+            add(&mut self.flags, flag);
+        }
+        Ok(self)
     }
 
     /// The same question from another start.

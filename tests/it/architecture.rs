@@ -180,7 +180,7 @@ fn the_rules_see_what_they_rule() {
     // Tests that stand in files of their own are left out.
     assert!(root().join("crates/render/src/tests.rs").is_file());
     assert!(all.iter().all(|s| s.name != "crates/render/src/tests.rs"));
-    assert!(all.iter().any(|s| s.name == "figures/fig7/figure.rs"));
+    assert!(all.iter().any(|s| s.name == "figures/fig4/figure.rs"));
     let manifest = "[dependencies]\ntwofold-num.workspace = true\nlibm = \"1\"\n[dev-dependencies]\nclap = \"1\"\n";
     assert_eq!(dependencies(manifest), ["libm", "twofold-num"].map(str::to_owned).into());
     assert!(dependencies(&self::manifest("system")).contains("twofold-num"));

@@ -89,7 +89,7 @@ fn what_remains_without_the_singularity() {
 fn the_controls_are_the_runs_of_fig_7_with_one_change() {
     let census = rows("figures/census/fig7.csv");
     let paper =
-        figures::fig7::figure().pictures.into_iter().find(|p| p.reading == Some(Reading::Reconstructed)).unwrap();
+        figures::named("fig7").pictures.into_iter().find(|p| p.reading == Some(Reading::Reconstructed)).unwrap();
     for (name, system, switch) in [
         (SHIFTED, shifted(), SwitchSpec::tanh(1e-3)),
         (WIDE, Reading::Reconstructed.caricature().into(), SwitchSpec::tanh(0.1)),
@@ -123,7 +123,7 @@ fn no_orbit_comes_near_the_moved_two_fold() {
         system,
         t_end: 500.0,
         observe: Observation::Path { chord: 1e-3 },
-        ..figures::fig7::figure().pictures.remove(1).panels.remove(2).run
+        ..figures::named("fig7").pictures.remove(1).panels.remove(2).run
     };
     let Data::Path(samples) = simulate(&run, &()).unwrap().data else { panic!("a path was asked for") };
     let closest = samples.iter().map(|s| (SVector::from(s.x) - fold).norm()).fold(f64::INFINITY, f64::min);

@@ -12,7 +12,7 @@ use twofold::paper::{Alterations, Figure};
 use twofold::record::{Hash, Manifest};
 
 fn manifest(figure: &Figure) -> Manifest {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("figures").join(&*figure.id).join("expected.json");
+    let path = figures::reference_file(&Path::new(env!("CARGO_MANIFEST_DIR")).join("figures"), &figure.id);
     let text = fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}; make one with bless", path.display()));
     Manifest::parse(&text, &figure.id).unwrap()
 }

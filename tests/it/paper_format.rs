@@ -115,9 +115,9 @@ fn typed(key: &Key) -> Value {
         "f64" => json!({ "type": "number" }),
         "u64" | "u32" | "u16" | "usize" => json!({ "type": "integer", "minimum": 0 }),
         "bool" => json!({ "type": "boolean" }),
-        "Vec<String>" => json!({ "type": "array", "items": { "type": "string" } }),
+        "Vec<String>" | "Vec<Spanned<String>>" => json!({ "type": "array", "items": { "type": "string" } }),
         "[f64; 2]" => json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 }),
-        "Draw" => json!({ "enum": ["series", "plane", "space", "section", "columns"] }),
+        "Draw" => json!({ "enum": ["series", "plane", "space", "section", "columns", "halves", "surface"] }),
         "Words" if ["orbit", "lyapunov", "rests"].contains(&key.name.as_str()) => question(&key.name),
         "Words" => question("run"),
         "Vec<Spanned<PanelFile>>" => json!({ "type": "array", "minItems": 1, "items": object("PanelFile") }),
@@ -125,6 +125,17 @@ fn typed(key: &Key) -> Value {
         "BTreeMap<Spanned<String>, ReadingFile>" => {
             json!({ "type": "object", "additionalProperties": object("ReadingFile") })
         }
+        "BTreeMap<Spanned<String>, Spanned<Words>>" => {
+            json!({ "type": "object", "additionalProperties": question("run") })
+        }
+        "PanelClaim" => json!({ "oneOf": [
+            { "enum": ["less-organised-than-next", "differs-from-next"] },
+            { "type": "object", "required": ["section"], "additionalProperties": false, "properties": { "section": { "oneOf": [
+                { "enum": ["periodic", "chaos", "partly-washed-out"] },
+                { "type": "object", "required": ["period"], "additionalProperties": false,
+                  "properties": { "period": { "type": "integer", "minimum": 1 } } },
+            ] } } },
+        ] }),
         "PointsFile" => object("PointsFile"),
         "OddsFile" => object("OddsFile"),
         other => panic!("{}: no schema for {other}", key.name),

@@ -31,7 +31,14 @@ fn golden_embedded_references_are_the_files() {
     for figure in figures::all() {
         assert_eq!(
             figures::reference(&figure.id),
-            Some(text(&format!("figures/{}/expected.json", figure.id)).as_str())
+            Some(
+                fs::read_to_string(figures::reference_file(
+                    &Path::new(env!("CARGO_MANIFEST_DIR")).join("figures"),
+                    &figure.id
+                ))
+                .unwrap()
+                .as_str()
+            )
         );
     }
 }

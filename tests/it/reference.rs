@@ -175,7 +175,8 @@ pub fn keys(text: &str, of: &str) -> Vec<Key> {
             let of_type = rest.trim().trim_end_matches(',').to_owned();
             needed &= !of_type.starts_with("Option<");
             assert!(!about.is_empty(), "{of}: {name} has no documentation");
-            let name = renamed.take().unwrap_or_else(|| name.trim_start_matches("pub ").to_owned());
+            let name =
+                renamed.take().unwrap_or_else(|| name.trim_start_matches("pub ").trim_start_matches("r#").to_owned());
             keys.push(Key { name, needed, about: cell(&about), of: of_type });
             (about, needed) = (String::new(), true);
         }

@@ -161,7 +161,7 @@ fn verdict_notes(picture: &Picture, verdicts: &[PanelVerdict]) -> Result<Vec<Vec
             format!("this run {}", if verdict.agrees { "agrees" } else { "differs" }),
         ];
         if let Some(repeats) = &panel.repeats {
-            let Support { support, runs } = (repeats.count)(repeats.panel, repeats.reading)?;
+            let Support { support, runs } = (repeats.count)(&repeats.panel, repeats.reading)?;
             notes.push(format!("{support} of {runs} runs agree"));
         }
         Ok(notes)

@@ -2,7 +2,7 @@
 //!
 //! A [`Figure`] is a list of pictures, a picture a list of panels, a panel a question ([`RunSpec`]). The way of every
 //! figure is the same: questions -> [`pipeline`] (asked of an [`Executor`](twofold_job::Executor) side by side, each computed once) -> answers
-//! -> [`drawing`] -> bytes -> files. The figures themselves stand in `figures/NAME/figure.rs`: every number of the
+//! -> [`drawing`] -> bytes -> files. The figures themselves stand in a paper's folder or in `figures/NAME/figure.rs`: every number of the
 //! paper's caption, and nothing else.
 //!
 #![forbid(unsafe_code)]
@@ -99,15 +99,18 @@ pub struct Panel {
     pub repeats: Option<Repeats>,
 }
 
+/// Counts the runs that repeat a panel of this name in a reading.
+pub type Count = fn(&str, Reading) -> Result<Support, JobError>;
+
 /// The runs that repeat a panel, counted when the panel is drawn.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Repeats {
     /// The panel, "7(i)".
-    pub panel: &'static str,
+    pub panel: String,
     /// The reading.
     pub reading: Reading,
     /// Counts the runs.
-    pub count: fn(&str, Reading) -> Result<Support, JobError>,
+    pub count: Count,
 }
 
 /// How many of the runs that repeat a panel support what the paper says of it.

@@ -52,7 +52,7 @@ impl Question for Drawn<'_> {
         let Picture { name, reading, title, caption, view, panels, alterations } = self.0;
         let asked: Vec<_> = parts(self.0).into_iter().map(|(part, q)| (part, question_hash(&*q))).collect();
         let said: Vec<_> =
-            panels.iter().map(|p| (&p.title, &p.claim, p.repeats.map(|r| (r.panel, r.reading)))).collect();
+            panels.iter().map(|p| (&p.title, &p.claim, p.repeats.as_ref().map(|r| (&r.panel, r.reading)))).collect();
         let view = match view {
             // Which function draws: how far it lies from another one, since a program is loaded now here, now there.
             View::Study(study) => {
@@ -140,7 +140,7 @@ mod tests {
     /// What panels of runs say is part of what is asked.
     #[test]
     fn another_run_title_claim_or_view_is_another_picture() {
-        let picture = figures::fig7::figure().pictures.remove(0);
+        let picture = figures::fig4::figure().pictures.remove(0);
         let asked = |p: &Picture| key(&Drawn(p));
         let changes: [&dyn Fn(&mut Picture); 6] = [
             &|p| p.panels[1].title.push('.'),

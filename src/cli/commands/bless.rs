@@ -74,7 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let mut changed: Vec<(String, String)> = Vec::new();
     for figure in &figures {
         let folder = arguments.expected.join(&*figure.id);
-        let path = folder.join("expected.json");
+        let path = figures::reference_file(&arguments.expected, &figure.id);
         let before = record::files::read_text(&path)
             .ok()
             .and_then(|text| Manifest::parse(&text, &path.display().to_string()).ok());
@@ -124,7 +124,7 @@ fn write_table(expected: &Path) -> Result<(), CliError> {
     let manifests: Vec<Manifest> = figures::all()
         .iter()
         .filter_map(|f| {
-            let path = expected.join(&*f.id).join("expected.json");
+            let path = figures::reference_file(expected, &f.id);
             Manifest::parse(&record::files::read_text(&path).ok()?, &path.display().to_string()).ok()
         })
         .collect();

@@ -108,7 +108,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         .map(|figure| match &given {
             Some(manifest) => Ok(manifest.clone()),
             None => match &arguments.expected {
-                Some(folder) => manifest_of(&figure.id, &folder.join(&*figure.id).join("expected.json")),
+                Some(folder) => manifest_of(&figure.id, &figures::reference_file(folder, &figure.id)),
                 None => embedded(&figure.id),
             },
         })

@@ -6,8 +6,9 @@ use serde::Serialize;
 
 use crate::cli::speak::{harmless, print_json};
 use crate::cli::{CliError, Exit, print};
+use crate::paper::figures::references_in;
 use crate::paper::pipeline::pixel_hash;
-use crate::record::{self, Hash, Manifest, PictureEntry, read_tree};
+use crate::record::{self, Hash, Manifest, PictureEntry};
 use crate::render::{Format, Provenance, ProvenanceError, decode_png, read_provenance};
 
 /// Print the provenance inside a PNG, SVG or PDF file and say whether twofold made it and nobody changed it.
@@ -91,7 +92,7 @@ fn manifests(folder: &Path) -> Result<Vec<Manifest>, CliError> {
         return Ok(Vec::new());
     }
     let mut all = Vec::new();
-    for file in read_tree(folder, &|path| path.ends_with("/expected.json"))?.files {
+    for file in references_in(folder)?.into_iter().filter(|f| f.path.ends_with("/expected.json")) {
         let name = folder.join(&file.path).display().to_string();
         all.push(Manifest::parse(&String::from_utf8_lossy(&file.bytes), &name)?);
     }

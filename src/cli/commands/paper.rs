@@ -10,6 +10,7 @@ use crate::cli::{CliError, Exit, in_pool, print};
 use crate::folder::Folder;
 use crate::folder::make::{State, begin, outcome};
 use crate::job::{Executor, Store};
+use crate::paper::verdict::PanelVerdict;
 
 /// Make, check, report or bless a paper: a folder of systems, figures and claims (docs/papers.md).
 ///
@@ -105,15 +106,21 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         .claims
         .iter()
         .map(|s| match &s.verdict {
-            Ok(v) => json!({ "claim": v.claim, "outcome": outcome(v), "found": v.found, "odds": v.odds, "decided": v.decided, "rule_after_data": v.rule_after_data }),
+            Ok(v) => json!({ "claim": v.claim, "outcome": outcome(v.agrees), "found": v.found, "odds": v.odds, "decided": v.decided, "rule_after_data": v.rule_after_data }),
             Err(why) => json!({ "claim": s.claim.id, "outcome": "failed", "found": why.to_string() }),
         })
+        .chain(made.panels().map(|v| {
+            let claim = format!("{}/{}", v.picture, v.panel);
+            json!({ "claim": claim, "outcome": outcome(v.agrees), "found": v.found, "because": v.because })
+        }))
         .collect();
     let lines = || {
-        made.claims.iter().map(|s| match &s.verdict {
-            Ok(v) => format!("{}: {}: {}", v.claim, outcome(v), v.found),
+        let claims = made.claims.iter().map(|s| match &s.verdict {
+            Ok(v) => format!("{}: {}: {}", v.claim, outcome(v.agrees), v.found),
             Err(why) => format!("{}: cannot be scored: {why}", s.claim.id),
-        })
+        });
+        let panel = |v: &PanelVerdict| format!("{}/{}: {}: {}", v.picture, v.panel, outcome(v.agrees), v.found);
+        claims.chain(made.panels().map(panel))
     };
     match what {
         What::Make | What::Report => {

@@ -7,7 +7,7 @@ use serde_json::json;
 use crate::cli::speak::print_json;
 use crate::cli::{CliError, Exit, in_pool, print};
 use crate::paper::{Figure, figures};
-use crate::record::{self, FileBytes, read_tree, visit_tree};
+use crate::record::{self, FileBytes, visit_tree};
 use crate::report::{Links, MadeFile, Program, Report, archive, assemble, names, page};
 
 const FINDINGS: &str =
@@ -104,7 +104,7 @@ pub fn references(given: Option<&Path>) -> Result<Vec<FileBytes>, CliError> {
     if !folder.exists() {
         return Ok(Vec::new());
     }
-    Ok(read_tree(folder, &|path| path.ends_with(".json") || path.ends_with(".png"))?.files)
+    Ok(figures::references_in(folder)?)
 }
 
 fn stands_in(page: &Path, folder: &Path) -> bool {

@@ -1,0 +1,51 @@
+"""A paper's folder in Python gives what ``twofold paper`` says of it."""
+
+import json
+import subprocess
+
+import numpy as np
+import pytest
+
+import twofold
+
+
+@pytest.fixture
+def folder(program, tmp_path):
+    place = tmp_path / "paper"
+    subprocess.run([program, "paper", "new", str(place)], check=True, capture_output=True)
+    return place
+
+
+def test_claims_are_the_commands(program, folder):
+    said = subprocess.run([program, "paper", "make", str(folder), "--quiet", "--json"], check=True, capture_output=True)
+    commands = {claim["claim"]: claim for claim in json.loads(said.stdout)["claims"]}
+    paper = twofold.Paper(folder)
+    claims = paper.claims()
+    assert {claim.id for claim in claims} == set(commands)
+    for claim in claims:
+        assert claim.agrees == (commands[claim.id]["outcome"] == "agrees")
+        assert claim.found == commands[claim.id]["found"]
+    assert [claim.agrees for claim in twofold.Paper(folder, keep=False).claims(threads=2)] == [c.agrees for c in claims]
+
+
+def test_answers_are_arrays(folder):
+    paper = twofold.Paper(folder, keep=False)
+    assert [figure.id for figure in paper.figures] == ["fig1"] and "cycle" in paper.names
+    cycle = paper.answer("cycle")
+    assert cycle.facts["period"] == pytest.approx(2 * np.log(3), abs=1e-9)
+    run = paper.answer("fig1/a")
+    table = next(iter(run.tables.values()))
+    assert table["t"].dtype == np.float64 and np.all(np.diff(table["t"]) >= 0)
+    assert not (folder / "out").exists()
+
+
+def test_what_is_wrong_is_said_with_its_place(folder):
+    with pytest.raises(twofold.SpecError, match="no panel or measure 'fig9/a'"):
+        twofold.Paper(folder).answer("fig9/a")
+    file = folder / "paper.toml"
+    file.write_text(file.read_text().replace("title =", "titel ="))
+    with pytest.raises(twofold.DefinitionError, match="titel") as caught:
+        twofold.Paper(folder)
+    assert caught.value.line == 3
+    with pytest.raises(twofold.DefinitionError, match="paper.toml"):
+        twofold.Paper(folder.parent)

@@ -1,0 +1,112 @@
+//! Every figure of Jeffrey (2013), and the project's own about it, with the committed references.
+//!
+//! What the paper computed stands in `papers/jeffrey-2013`, as anybody's paper does ([`crate::folder`]); sketches and studies, which are more than
+//! runs, are Rust beside their data in `figures/`.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use crate::folder::{Embedded, Folder};
+use crate::paper::{Count, Figure};
+use crate::record::{FileBytes, FileError, read_tree};
+
+pub use twofold_jeffrey_2013::{audit, census, data, delay, fig1, fig3, fig4};
+
+/// Where the paper stands in the sources.
+pub const FOLDER: &str = "papers/jeffrey-2013";
+
+macro_rules! files {
+    ($($file:literal)*) => {
+        &[$(($file, include_str!(concat!("../../papers/jeffrey-2013/", $file)))),*]
+    };
+}
+
+/// The paper's folder, so that an installed program can make and check its figures anywhere.
+pub const FILES: Embedded = files! {
+    "paper.toml"
+    "figures/fig2.toml" "figures/fig5.toml" "figures/fig6.toml" "figures/fig7.toml" "figures/fig8.toml" "figures/fig9.toml"
+    "expected/fig2.json" "expected/fig5.json" "expected/fig6.json" "expected/fig7.json" "expected/fig8.json" "expected/fig9.json"
+};
+
+fn folder() -> &'static Folder {
+    static OWN: OnceLock<Folder> = OnceLock::new();
+    OWN.get_or_init(|| Folder::embedded(FOLDER, FILES).expect("the embedded folder is well formed: a test reads it"))
+}
+
+/// Every figure, in the paper's order, then the project's own.
+pub fn all() -> Vec<Figure> {
+    let mut all = twofold_jeffrey_2013::all();
+    all.extend(folder().figures.iter().cloned());
+    // The paper's figures are numbered, those of the project are not: its list's order stays.
+    all.sort_by_key(|f| if f.id.starts_with("fig") { (0, f.id.clone()) } else { (1, "".into()) });
+    all
+}
+
+/// A figure by its name.
+///
+/// # Panics
+///
+/// If there is none: names are written by programmers.
+pub fn named(id: &str) -> Figure {
+    all().into_iter().find(|f| f.id == id).unwrap_or_else(|| panic!("there is no figure {id}"))
+}
+
+/// The committed manifest of a figure, as text.
+pub fn reference(id: &str) -> Option<&'static str> {
+    let file = format!("expected/{id}.json");
+    FILES.iter().find(|f| f.0 == file).map(|f| f.1).or_else(|| twofold_jeffrey_2013::reference(id))
+}
+
+/// Where the references in `expected` (a checkout's `figures`, or a folder of the same form) keep that of a figure: NAME/expected.json there, or in
+/// the paper's folder if it is one of its own.
+pub fn reference_file(expected: &Path, id: &str) -> PathBuf {
+    let own = expected.join("..").join(FOLDER).join(format!("expected/{id}.json"));
+    if own.exists() { own } else { expected.join(id).join("expected.json") }
+}
+
+/// The references and pictures in `expected`, each reference as NAME/expected.json.
+///
+/// # Errors
+/// If a file cannot be read.
+pub fn references_in(expected: &Path) -> Result<Vec<FileBytes>, FileError> {
+    let mut files = read_tree(expected, &|path| path.ends_with(".json") || path.ends_with(".png"))?.files;
+    let own = expected.join("..").join(FOLDER).join("expected");
+    if own.exists() {
+        for FileBytes { path, bytes } in
+            read_tree(&own, &|path| path.starts_with("fig") && path.ends_with(".json"))?.files
+        {
+            files.push(FileBytes { path: format!("{}/expected.json", path.trim_end_matches(".json")), bytes });
+        }
+    }
+    Ok(files)
+}
+
+/// Counts the committed runs of a study that repeat a panel.
+pub fn counts(study: &str) -> Option<Count> {
+    match study {
+        "census" => Some(census::support),
+        "audit" => Some(audit::support),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The folder on disk is the one that is embedded, file by file.
+    #[test]
+    fn the_embedded_folder_is_the_one_in_the_sources() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join(FOLDER);
+        let files = read_tree(&root, &|path| !path.starts_with("out/")).unwrap().files;
+        let known = |path: &str| FILES.iter().find(|f| f.0 == path).map(|f| f.1.as_bytes());
+        let ours =
+            |path: &str| path == "paper.toml" || path.starts_with("figures/") || path.starts_with("expected/fig");
+        for file in files.iter().filter(|f| ours(&f.path)) {
+            assert!(known(&file.path) == Some(file.bytes.as_slice()), "{} is not embedded", file.path);
+        }
+        assert_eq!(FILES.len(), files.iter().filter(|f| ours(&f.path)).count());
+        let read = Folder::read(&root).unwrap();
+        assert_eq!(format!("{:?}", read.figures), format!("{:?}", folder().figures));
+    }
+}
