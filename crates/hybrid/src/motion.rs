@@ -86,6 +86,8 @@ pub struct Options {
     pub t_end: f64,
     /// The initial state; without one the file's.
     pub start: Option<Vec<f64>>,
+    /// The initial mode.
+    pub mode: usize,
     /// Relative tolerance of a step.
     pub rtol: f64,
     /// Absolute tolerance; without one each state is measured by its own size in the run so far.
@@ -110,6 +112,7 @@ impl Default for Options {
             t_start: 0.0,
             t_end: 100.0,
             start: None,
+            mode: 0,
             rtol: 1e-10,
             atol: None,
             max_step: f64::INFINITY,
@@ -168,6 +171,8 @@ pub struct Outcome {
     pub t: f64,
     /// The state then.
     pub x: Vec<f64>,
+    /// The mode then.
+    pub mode: usize,
     /// Accepted steps.
     pub steps: u64,
     /// Switches met.
@@ -502,6 +507,10 @@ impl<'a> Follower<'a> {
                 "the initial state is {x:?}; give {n} finite numbers, one for each of {states}"
             )));
         }
+        let modes = model.definition().modes().len();
+        if options.mode >= modes.max(1) {
+            return Err(HybridError::Start(format!("there is no mode number {}: there are {modes}", options.mode)));
+        }
         let (t0, t1) = (options.t_start, options.t_end);
         if !(t0.is_finite() && t1.is_finite() && t1 > t0) {
             return Err(HybridError::Bad(format!(
@@ -522,7 +531,7 @@ impl<'a> Follower<'a> {
         event_of.extend((0..events.len()).filter(|i| matches!(events[*i].when, When::Zero(..))).map(Some));
         event_of.resize(equation.watched.len(), None);
         let config = Configuration {
-            mode: 0,
+            mode: options.mode,
             sides: vec![1.0; equation.guards.len()],
             pieces: equation.tables.iter().map(|t| t.piece(t0)).collect(),
         };
@@ -559,7 +568,15 @@ impl<'a> Follower<'a> {
             room: Vec::new(),
             samples: Default::default(),
             reached: None,
-            outcome: Outcome { ending: Ending::Finished, t: t0, x: x.clone(), steps: 0, switches: 0, events: 0 },
+            outcome: Outcome {
+                ending: Ending::Finished,
+                t: t0,
+                x: x.clone(),
+                mode: options.mode,
+                steps: 0,
+                switches: 0,
+                events: 0,
+            },
             config,
             x,
             equation,
@@ -581,6 +598,7 @@ impl<'a> Follower<'a> {
         self.outcome.ending = ending;
         self.outcome.t = self.t;
         self.outcome.x = self.x.clone();
+        self.outcome.mode = self.config.mode;
         Ok((self.outcome.clone(), self))
     }
 

@@ -713,13 +713,22 @@ fn turns_that_shorten_without_end_are_named() {
     assert!((t - 8.0).abs() <= error + 1e-9, "{t} {error}");
 }
 
-/// The reset leaves the expression at zero and rising, in a mode in which the event does not fire.
+/// An event that leaves its expression alone is passed like a section.
+#[test]
+fn crossings_can_be_counted() {
+    let text = "states = ['x', 'v', 'n']\nstart = [0.5, 0, 0]\nf = ['v', '-x', '0']\n\
+        [[event]]\nwhen = 'x'\ndirection = 'down'\nset = { n = 'n + 1' }";
+    assert_eq!(end(text, 20.0)[2], 3.0);
+    assert_eq!(end(&text.replace("'down'", "'up'"), 20.0)[2], 3.0);
+}
+
+/// The reset leaves the expression at zero, at rest and pressed upwards, in a mode in which the event does not fire.
 #[test]
 fn an_event_of_the_other_mode_does_not_fire_again() {
-    let text = "states = ['x', 'v']\nstart = [-1, 1]\n[modes.a]\nf = ['v', '0']\n[modes.b]\nf = ['v', '0']\n\
-        [[event]]\nfrom = 'a'\nwhen = 'x'\ndirection = 'up'\nmode = 'b'\nset = { v = '2*v' }";
-    let x = end(text, 3.0);
-    near(x[0], 4.0, 1e-12);
+    let text = "states = ['x', 'v']\nstart = [-1, 1]\n[modes.a]\nf = ['v', '1']\n[modes.b]\nf = ['v', '1']\n\
+        [[event]]\nfrom = 'a'\nwhen = 'x'\ndirection = 'up'\nmode = 'b'\nset = { v = 0 }";
+    let met = 3.0_f64.sqrt() - 1.0;
+    near(end(text, 3.0)[0], (3.0 - met) * (3.0 - met) / 2.0, 1e-9);
 }
 
 #[test]
@@ -756,9 +765,14 @@ fn an_orbit_closes_on_a_section_through_the_origin() {
          [[event]]\nfrom = 'up'\nwhen = 'x - 0.1'\ndirection = 'up'\nmode = 'down'\n\
          [[event]]\nfrom = 'down'\nwhen = 'x + 0.1'\ndirection = 'down'\nmode = 'up'",
     );
-    let section = crate::motion::Record::Section(twofold_system::Expression::parse_general("x", &["x"]).unwrap());
-    let options = Options { record: section, t_end: 50.0, ..Options::default() };
-    let found = crate::motion::tangent::closed_orbit(&relay, &options, &crate::motion::tangent::Return::Crossings(1));
-    let period = 2.0 * (1.1_f64 / 0.9).ln();
-    assert!((found.unwrap().period - period).abs() < 1e-9);
+    // Rising or falling, the first mode or the other.
+    for section in ["x", "0 - x"] {
+        let section =
+            crate::motion::Record::Section(twofold_system::Expression::parse_general(section, &["x"]).unwrap());
+        let options = Options { record: section, t_end: 50.0, ..Options::default() };
+        let found =
+            crate::motion::tangent::closed_orbit(&relay, &options, &crate::motion::tangent::Return::Crossings(1));
+        let period = 2.0 * (1.1_f64 / 0.9).ln();
+        assert!((found.unwrap().period - period).abs() < 1e-9);
+    }
 }

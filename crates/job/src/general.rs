@@ -255,7 +255,7 @@ impl Question for GeneralOrbit {
             if end.ending == Ending::Interrupted {
                 return Err(JobError::Interrupted);
             }
-            options.start = Some(end.x);
+            (options.start, options.mode) = (Some(end.x), end.mode);
         }
         let found = closed_orbit(model, &options, &self.after)?;
         Ok(Answer::of_tables(Vec::new())
@@ -416,6 +416,19 @@ mod tests {
         let expected = 4.0 * (1.0 - half) * half / (1.0 - half * half);
         assert!((point[0] - expected).abs() < 1e-9, "{point:?} {expected}");
         assert!((multipliers[0][0] - half * half).abs() < 1e-8, "{multipliers:?}");
+    }
+
+    /// Settling ends in the second mode, from which the first one would not come back.
+    #[test]
+    fn an_orbit_is_searched_in_the_mode_in_which_settling_ends() {
+        let text = "states = ['x']\nstart = [0]\n[modes.a]\nf = ['1']\n[modes.b]\nf = ['1']\n\
+            [[event]]\nfrom = 'a'\nwhen = 'x - 1'\ndirection = 'up'\nmode = 'b'\n\
+            [[event]]\nfrom = 'b'\nwhen = 'x - 2'\ndirection = 'up'\nmode = 'a'\nset = { x = 0 }";
+        let mut run = run(text, 10.0);
+        run.options.record = Record::Section(twofold_system::Expression::parse_general("x - 0.5", &["x"]).unwrap());
+        let question = GeneralOrbit { run, settle: 1.5, after: Return::Crossings(1) };
+        let period: f64 = Executor::quiet().ask(&question).unwrap().fact("period").unwrap();
+        assert!((period - 2.0).abs() < 1e-9, "{period}");
     }
 
     #[test]

@@ -213,14 +213,19 @@ impl Follower<'_> {
             for i in &watched {
                 let Some(event) = self.event_of[*i] else { continue };
                 let When::Zero(_, direction) = definition.events()[event].when else { continue };
-                // Back into the surface at once: infinitely many in no time.
+                // Pressed back into the surface at once: infinitely many in no time. What passes through with a speed does not come back.
                 let into = match direction {
                     Direction::Down => self.watch_side[*i] < 0.0,
                     Direction::Up => self.watch_side[*i] > 0.0,
                     Direction::Both => false,
                 };
                 let asked = definition.events()[event].from.is_none_or(|mode| mode == self.config.mode);
-                if into && asked && fired.contains(&event) && !definition.events()[event].set.is_empty() {
+                if into
+                    && asked
+                    && fired.contains(&event)
+                    && !definition.events()[event].set.is_empty()
+                    && self.rests_on_watched(*i)
+                {
                     zeno = Some((event, self.t, 4.0 * f64::EPSILON * self.t.abs()));
                 }
             }

@@ -469,6 +469,14 @@ impl Follower<'_> {
         self.watch_side[i] = rates.direction(place);
     }
 
+    /// Whether a watched expression has no speed at the present point.
+    pub(super) fn rests_on_watched(&mut self, i: usize) -> bool {
+        let config = self.config.clone();
+        let (compiled, rates) = self.rates(&config);
+        let place = compiled.active.len() + i;
+        rates.first[place].abs() <= 1e-11 * rates.terms[place]
+    }
+
     /// The values of guards and watched expressions at the present point.
     pub(super) fn watched_values(&mut self) -> Vec<f64> {
         let mut values = vec![0.0; self.compiled.outputs];

@@ -470,6 +470,7 @@ pub struct ClosedOrbit {
 /// As [`follow`](super::follow); also if there is no return, or the iteration does not settle.
 pub fn closed_orbit(model: &Model, options: &Options, after: &Return) -> Result<ClosedOrbit, HybridError> {
     explicit(options)?;
+    let mut options = options.clone();
     let n = model.coordinates().len();
     let mut x = match &options.start {
         Some(x) => x.clone(),
@@ -477,11 +478,17 @@ pub fn closed_orbit(model: &Model, options: &Options, after: &Return) -> Result<
     };
     if let Return::Crossings(_) = after {
         // The search begins on the section.
-        x = turn(model, options, &Return::Crossings(1), &x, false)?.end;
+        let first = turn(model, &options, &Return::Crossings(1), &x, false)?;
+        (x, options.mode) = (first.end, first.mode);
     }
     let mut best = f64::INFINITY;
     for _ in 0..30 {
-        let Turn { time, end, mut matrix, section, size } = turn(model, options, after, &x, true)?;
+        let Turn { time, end, mode, mut matrix, section, size } = turn(model, &options, after, &x, true)?;
+        // The same state in another mode is another point.
+        if mode != options.mode {
+            (x, options.mode) = (end, mode);
+            continue;
+        }
         // On a section neighbours come back at other times: what is along the field goes.
         if let Some((gradient, field)) = &section {
             let speed: f64 = gradient.iter().zip(field).map(|(g, f)| g * f).sum();
@@ -520,6 +527,7 @@ pub fn closed_orbit(model: &Model, options: &Options, after: &Return) -> Result<
 struct Turn {
     time: f64,
     end: Vec<f64>,
+    mode: usize,
     /// Derivative of the end by the start, row by row.
     matrix: Vec<f64>,
     /// Of a section its gradient and the field there.
@@ -583,5 +591,5 @@ fn turn(model: &Model, options: &Options, after: &Return, x: &[f64], on_section:
         }
     };
     let size = follower.size.iter().fold(0.0_f64, |most, s| most.max(*s));
-    Ok(Turn { time: outcome.t - settings.t_start, end: outcome.x, matrix, section, size })
+    Ok(Turn { time: outcome.t - settings.t_start, end: outcome.x, mode: outcome.mode, matrix, section, size })
 }
