@@ -201,6 +201,10 @@ struct PanelFile {
     /// Dots instead of a line.
     #[serde(default)]
     dots: bool,
+    /// Titles of the two axes of columns [default: the columns' names].
+    labels: Option<Spanned<[String; 2]>>,
+    /// What the legend calls the vertical columns [default: their names].
+    names: Option<Spanned<Vec<String>>>,
     /// Numbers of the paper to be drawn over it.
     points: Option<Spanned<PointsFile>>,
 }
@@ -602,8 +606,20 @@ impl Folder {
                 let help = "give of = \"MEASURE\", x = \"COLUMN\" and y = [\"COLUMN\"]";
                 return Err(wrong(drawn.draw.span(), "columns of which table?".into(), help));
             };
+            let names = panel.names.as_ref().map(|n| n.get_ref().clone()).unwrap_or_default();
+            if let Some(given) = panel.names.as_ref().filter(|n| n.get_ref().len() != panel.y.len()) {
+                let why = format!("{} names for {} columns", names.len(), panel.y.len());
+                return Err(wrong(given.span(), why, "give one for each of y"));
+            }
             let source = self.source(origin, of)?;
-            let columns = Columns { table: panel.table.clone(), x: x.clone(), y: panel.y.clone(), dots: panel.dots };
+            let columns = Columns {
+                table: panel.table.clone(),
+                x: x.clone(),
+                y: panel.y.clone(),
+                dots: panel.dots,
+                labels: panel.labels.as_ref().map(|l| l.get_ref().clone()),
+                names,
+            };
             return Ok(Plot {
                 label: panel.label.get_ref().clone(),
                 title: panel.title.clone(),
@@ -612,12 +628,14 @@ impl Folder {
                 points,
             });
         }
-        if let Some(of) = &panel.of {
-            return Err(wrong(
-                of.span(),
-                "`of` has an effect on draw = \"columns\" alone".into(),
-                "give run = { ... }",
-            ));
+        let idle = [
+            ("of", panel.of.as_ref().map(Spanned::span)),
+            ("labels", panel.labels.as_ref().map(Spanned::span)),
+            ("names", panel.names.as_ref().map(Spanned::span)),
+        ];
+        if let Some((key, Some(at))) = idle.into_iter().find(|(_, at)| at.is_some()) {
+            let help = if key == "of" { "give run = { ... }" } else { "leave it out" };
+            return Err(wrong(at, format!("`{key}` has an effect on draw = \"columns\" alone"), help));
         }
         let Some(said) = said else {
             return Err(wrong(place, "the panel shows no run".into(), "give run = { system = \"...\", ... }"));

@@ -68,6 +68,10 @@ pub struct Columns {
     pub y: Vec<String>,
     /// Dots instead of a line.
     pub dots: bool,
+    /// Titles of the axes as plain text, instead of the columns' names.
+    pub labels: Option<[String; 2]>,
+    /// What the legend calls the vertical columns, as plain text, instead of their names.
+    pub names: Vec<String>,
 }
 
 /// Numbers read off a paper.
@@ -137,6 +141,10 @@ impl Plots {
         let mut whole = Sheet::new(width, self.columns, "");
         for (plot, answer) in self.plots.iter().zip(answers) {
             let part = plot.sheet(answer).map_err(|why| (plot.label.clone(), why))?;
+            let time = match part.panels.last().map(|p| &p.content) {
+                Some(Content::Plane(plane)) => plane.x.title.clone(),
+                _ => String::new(),
+            };
             let label =
                 if self.plots.len() > 1 { format!("({})", markup::literal(&plot.label)) } else { String::new() };
             for (k, mut panel) in part.panels.into_iter().enumerate() {
@@ -145,11 +153,15 @@ impl Plots {
                 }
                 if let Content::Plane(plane) = &mut panel.content {
                     plane.aspect = plane.aspect.or(Some(part.panel_aspect));
+                    // States of a series that stand side by side do not share their axis.
+                    if self.columns > 1 && plane.x.title.is_empty() {
+                        plane.x.title.clone_from(&time);
+                    }
                 }
                 whole.panels.push(panel);
             }
             for entry in part.legend {
-                if !whole.legend.iter().any(|e| e.text == entry.text) {
+                if !whole.legend.contains(&entry) {
                     whole.legend.push(entry);
                 }
             }
@@ -189,11 +201,13 @@ impl Columns {
         };
         let x = column(table, &self.x)?;
         let ys = self.y.iter().map(|name| column(table, name)).collect::<Result<Vec<_>, _>>()?;
-        let named = |name: &str| markup::name(name);
-        let title = if self.y.len() == 1 { named(&self.y[0]) } else { String::new() };
+        let [horizontal, vertical] = match &self.labels {
+            Some(labels) => labels.each_ref().map(|label| markup::literal(label)),
+            None => [markup::name(&self.x), if self.y.len() == 1 { markup::name(&self.y[0]) } else { String::new() }],
+        };
         let mut panel = PlanePanel::new(
-            Axis::covering(named(&self.x), x.iter().copied()),
-            Axis::covering(title, ys.iter().flat_map(|y| y.iter().copied())),
+            Axis::covering(horizontal, x.iter().copied()),
+            Axis::covering(vertical, ys.iter().flat_map(|y| y.iter().copied())),
         );
         let mut legend = Vec::new();
         for (k, y) in ys.iter().enumerate() {
@@ -209,7 +223,8 @@ impl Columns {
                 LegendKey::Line(line)
             };
             if ys.len() > 1 {
-                legend.push(LegendEntry::new(key, named(&self.y[k])));
+                let name = self.names.get(k).map_or_else(|| markup::name(&self.y[k]), |name| markup::literal(name));
+                legend.push(LegendEntry::new(key, name));
             }
         }
         let mut sheet = Sheet::new(ColumnWidth::Single, 1, "").panel_aspect(0.75).panel("", "", panel);
@@ -277,6 +292,8 @@ mod tests {
                 x: "t".into(),
                 y: vec!["x".into(), "v".into()],
                 dots: true,
+                labels: Some(["time (s)".into(), "both".into()]),
+                names: vec!["height".into(), "speed".into()],
             }),
             points: None,
             ..run.clone()
@@ -286,8 +303,29 @@ mod tests {
         let sheet = plots.sheet(&[answer.clone(), answer]).unwrap();
         assert_eq!(sheet.panels.len(), 2);
         assert_eq!(sheet.panels[0].label, "(a)");
+        let Content::Plane(plane) = &sheet.panels[1].content else { panic!("a plane") };
+        assert_eq!((plane.x.title.as_str(), plane.y.title.as_str()), ("time (s)", "both"));
+        assert!(sheet.legend.iter().any(|e| e.text == "speed"));
         assert!(sheet.legend.iter().any(|e| e.text == "of the paper") && sheet.legend.len() >= 3);
         twofold_render::render(&sheet).unwrap();
+    }
+
+    #[test]
+    fn each_state_of_a_series_has_the_time_below_it_when_they_stand_side_by_side() {
+        let ball = ball();
+        let look = Look { kind: plot::Kind::Series, axes: vec![0, 1], camera: None, title: None };
+        let series = Plot { drawing: Drawing::Run(ball.clone().into(), look), points: None, ..plane(&ball) };
+        let answer = Executor::quiet().ask(&*series.question).unwrap();
+        let titles = |columns| {
+            let sheet = Plots { columns, plots: vec![series.clone()] }.sheet(std::slice::from_ref(&answer)).unwrap();
+            let title = |p: &twofold_render::sheet::Panel| match &p.content {
+                Content::Plane(plane) => plane.x.title.clone(),
+                _ => "no plane".into(),
+            };
+            sheet.panels.iter().map(title).collect::<Vec<_>>()
+        };
+        assert_eq!(titles(1), ["", "*t*"]);
+        assert_eq!(titles(2), ["*t*", "*t*"]);
     }
 
     #[test]

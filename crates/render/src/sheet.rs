@@ -360,7 +360,7 @@ impl<P> Note<P> {
 }
 
 /// A line of a legend.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LegendEntry {
     /// Sample.
     pub key: LegendKey,
@@ -376,7 +376,7 @@ impl LegendEntry {
 }
 
 /// The sample of a legend entry.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LegendKey {
     /// A piece of line.
     Line(LineStyle),
