@@ -366,7 +366,7 @@ const EFFECTS: [Effect; 43] = {
         when(
             "--exit",
             |f| f.exit.is_some(),
-            |f, c| f.filippov() && c.is_a_run(),
+            |f, c| f.filippov() && (c.is_a_run() || c == Use::Exponent),
             "smoothed and hysteretic motion leaves repelling sliding by itself, and a closed orbit has no repelling sliding; leave it out, or use --switch filippov",
         ),
         when(
@@ -449,9 +449,9 @@ enum Misuse {
     #[error("a closed orbit is looked for through a plane: give one by --section, such as {example}=0")]
     NoPlane { example: String },
     #[error(
-        "no tangent flow is followed through crossings of a discontinuity, and there is none where the future is a set: give --switch smoothed, with a small --eps"
+        "--exit \"{0}\": an exponent belongs to one motion; give at-once:plus or at-once:minus, or leave it out where nothing has to be chosen"
     )]
-    NoTangentFlow,
+    ExitOfExponent(String),
     #[error("--switch delayed needs its delay: give one by --delay, such as --delay 0.001")]
     NoDelay,
     #[error("--switch relay needs its band: give half its width by --band, such as --band 0.001")]
@@ -632,9 +632,12 @@ impl RunFlags {
                 band: self.band.ok_or(Misuse::NoBand)?,
                 inside: self.inside.map(Into::into).unwrap_or_default(),
             },
-            Switch::Filippov if command == Use::Exponent => return Err(Misuse::NoTangentFlow),
             Switch::Filippov => {
                 let exit = self.exit_rule()?;
+                let plain = matches!(exit, ExitRule::AtOnce { .. } | ExitRule::Undecided);
+                if command == Use::Exponent && !plain {
+                    return Err(Misuse::ExitOfExponent(self.exit.clone().unwrap_or_default()));
+                }
                 let funnel = (exit == ExitRule::All).then_some(FunnelSpec {
                     shortest: self.funnel_shortest.unwrap_or(0.05),
                     longest: self.funnel_longest.unwrap_or(2.0),
@@ -938,7 +941,10 @@ mod tests {
                             let other = ["--kick-every", "--exit", "delayed", "relay"];
                             !kind.contains(&"--section") || kind.iter().any(|k| other.contains(k))
                         }
-                        Use::Exponent => kind.iter().any(|k| ["filippov", "--section", "--every"].contains(k)),
+                        Use::Exponent => {
+                            let other = ["all", "--section", "--every"];
+                            kind.contains(&"--exit") || kind.iter().any(|k| other.contains(k))
+                        }
                     };
                     assert!(fine, "{command:?} {kind:?}");
                     continue;

@@ -247,14 +247,51 @@ fn orbits_and_exponents_say_what_is_wrong() {
     assert!(code == 3 && (err.contains("many futures") || err.contains("did not return")), "{err}");
     let exponent =
         |more: &[&str], expected: &[&str]| refused(at, &[&["lyapunov", "--quiet"][..], more].concat(), 2, expected);
-    exponent(&["--switch", "filippov"], &["no tangent flow", "--switch smoothed"]);
+    exponent(&["--switch", "filippov", "--exit", "all"], &["--exit \"all\"", "one motion"]);
     exponent(&["--section", "y=0"], &["--section has no effect"]);
+    let caricature = ["lyapunov", "--quiet", "--switch", "filippov"];
+    refused(at, &caricature, 3, &["slides on x = 0 into a two-fold", "--t-end"]);
     exponent(&["--t-end", "10", "--transient", "10"], &["--transient is 10"]);
     let out = good(at, &["lyapunov", "--quiet", "--system", "relay-third-order", "--t-end", "300", "--format", "json"]);
     let json: serde_json::Value = serde_json::from_slice(&out).unwrap();
     // On a closed orbit the largest exponent is that along it, zero.
     let exponent = json["facts"]["exponent"]["value"].as_f64().unwrap();
     assert!(exponent.abs() < 1e-2, "{exponent}");
+}
+
+/// One system in both forms: foci that unwind above y = 0 and wind up below (both exponents are the mean of their rates, -0.1), and a block on a belt, whose
+/// sticking takes one direction away.
+#[test]
+fn exponents_of_filippov_motion_are_those_of_the_same_system_with_signs() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let exponents = |name: &str, text: &str, more: &[&str]| -> Vec<[Option<f64>; 2]> {
+        fs::write(at.join(name), text).unwrap();
+        let run = ["lyapunov", "--quiet", "--system", name, "--t-end", "700", "--transient", "100", "--format", "json"];
+        let json: serde_json::Value = serde_json::from_slice(&good(at, &[&run[..], more].concat())).unwrap();
+        let list = json["facts"]["exponents"].as_array().unwrap();
+        list.iter().map(|e| ["value", "half_width"].map(|key| e[key].as_f64())).collect()
+    };
+    let head = "states = ['x', 'y']\nstart = [1, 0.5]\n";
+    let foci = "h = 'y'\nplus = ['0.1*x - y', 'x + 0.1*y']\nminus = ['-0.3*x - y', 'x - 0.3*y']\n";
+    let foci_signs = "f = ['-y + x*(0.2*sign(y) - 0.1)', 'x + y*(0.2*sign(y) - 0.1)']\n";
+    let belt = "h = 'y - c'\nplus = ['y', '-x - 0.4']\nminus = ['y', '-x + 0.4']\n[parameters]\nc = 1\n";
+    let belt_signs = "f = ['y', '-x - 0.4*sign(y - c)']\n[parameters]\nc = 0.5\n";
+    for (surfaces, signs, set, expected) in
+        [(foci, foci_signs, &[][..], Some(-0.1)), (belt, belt_signs, &["--set", "c=0.5"][..], None)]
+    {
+        let surfaces = exponents("h.toml", &format!("{head}{surfaces}"), &[&["--switch", "filippov"], set].concat());
+        let signs = exponents("f.toml", &format!("{head}{signs}"), &[]);
+        assert_eq!((surfaces.len(), signs.len()), (2, 2));
+        for (i, ([one, half], [other, _])) in surfaces.iter().zip(&signs).enumerate() {
+            assert_eq!(one.is_some(), other.is_some(), "{i}");
+            let (Some(one), Some(half)) = (one, half) else { continue };
+            assert!((one - other.unwrap()).abs() < 1e-7, "{one} {other:?}");
+            let known = expected.unwrap_or(0.0);
+            assert!((one - known).abs() <= half.max(1e-7), "{one} +- {half}: {known}");
+        }
+        assert_eq!(surfaces[1][0].is_none(), expected.is_none());
+    }
 }
 
 #[test]

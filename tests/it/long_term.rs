@@ -136,6 +136,35 @@ fn known() -> Vec<Known> {
     all
 }
 
+/// Exponents through switches: each interval of general systems covers what is known.
+#[test]
+fn intervals_of_exponents_through_switches_cover() {
+    let mut missed = Vec::new();
+    let mut tried = 0;
+    let mut check = |name: String, h: &str, fields: [&str; 2], t: f64, expected: f64| {
+        let command = format!("lyapunov --switch filippov --start 1,0.5 --t-end {t}");
+        let [value, half] = interval(EXPONENT, &printed("x, y", h, fields, "", &command));
+        // The growth swings about its line by as much as the fields' rates differ, which all systems here do by 2 or less.
+        assert!(half < 10.0 / t, "{name}: {value} +- {half} is too wide");
+        tried += 1;
+        if (value - expected).abs() > half + 5e-7 {
+            missed.push(format!("{name} until {t}: {value} +- {half}, not {expected}"));
+        }
+    };
+    for t in [150.0, 222.0, 300.0, 431.0] {
+        // Foci whose rates change on y = 0: the mean of the two.
+        for (a, b) in [(0.1, -0.3), (0.02, 0.04), (-0.01, -0.2), (0.3, -0.3), (0.05, -0.06), (-0.15, 0.1)] {
+            let fields = [a, b].map(|r: f64| format!("{r}*x - y, x + {r}*y"));
+            check(format!("foci {a} {b}"), "y", [&fields[0], &fields[1]], t, 0.5 * (a + b));
+        }
+        check("shear".into(), "x + 1e9", ["y, 0"; 2], t, 0.0);
+        check("bounce".into(), "x", ["y, -1", "y, 1"], t, 0.0);
+        check("stick-slip".into(), "y - 0.5", ["y, -x - 0.4", "y, -x + 0.4"], t, 0.0);
+        check("sliding node".into(), "x", ["-1, -0.2*y", "1, -0.2*y"], t, -0.2);
+    }
+    assert!(tried >= 40 && missed.len() * 20 <= tried, "{tried} {missed:#?}");
+}
+
 /// 95 % intervals and error bounds: at least so many of all are to cover.
 #[test]
 fn printed_intervals_cover_what_is_known() {

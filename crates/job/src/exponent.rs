@@ -116,7 +116,12 @@ impl LargestExponent {
                 Field::hysteretic(&self.system, eps, eps_prime, relaxation)
             }
             (SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. }, _) => return self.of_late_switch(watch),
-            (SwitchSpec::Filippov { .. }, _) => return Err("a set-valued motion has no tangent flow".into()),
+            (SwitchSpec::Filippov { .. }, _) => {
+                return Err(
+                    "the largest exponent alone has no tangent flow across a jump; ask for all (twofold lyapunov)"
+                        .into(),
+                );
+            }
         };
         let tangent = field.variational(1);
         match field.dimension() {
@@ -372,7 +377,7 @@ mod tests {
         assert!(said(few).contains("1 numbers, the system 2 states"));
         let exit = ExitRule::AtOnce { side: Side::Plus };
         let filippov = question(cases::decays(2), SwitchSpec::Filippov { exit, funnel: None }, 9.0);
-        assert!(said(filippov).contains("no tangent flow"));
+        assert!(said(filippov).contains("ask for all"));
         assert!(said(question(cases::decays(10), SwitchSpec::tanh(1e-2), 9.0)).contains("not for 10"));
         assert!(said(question(cases::decays(9), hysteretic(), 9.0)).contains("not for 10"));
         assert!(said(question(cases::decays(9), SwitchSpec::relay(0.1), 9.0)).contains("not for 9"));

@@ -7,8 +7,9 @@ use twofold_hybrid::motion::tangent::{Return, closed_orbit, exponents};
 use twofold_hybrid::motion::{Exit, Record};
 use twofold_hybrid::rests::{Place, rests};
 use twofold_hybrid::selection::Intersection;
-use twofold_hybrid::{Ending, Equation, HybridError, Model, Options, Point, follow, follow_watched};
+use twofold_hybrid::{Definition, Ending, Equation, HybridError, Model, Options, Point, follow, follow_watched};
 use twofold_integrate::Watch;
+use twofold_system::System;
 
 use super::answer::{Answer, Stop};
 use super::executor::Executor;
@@ -22,6 +23,21 @@ pub struct GeneralRun {
     pub model: Model,
     /// How it is followed.
     pub options: Options,
+}
+
+/// A system with one switching surface (h, f+, f-) as a general one.
+///
+/// # Errors
+/// If it has two surfaces.
+pub fn model_of(system: &System) -> Result<Model, JobError> {
+    if system.definition().second().is_some() {
+        let why = "exponents of Filippov motion are computed for one switching function h; write two with sign(...) in f = [...]";
+        return Err(HybridError::Bad(why.into()).into());
+    }
+    let text = serde_json::to_string(&system.canonical()).unwrap_or_default();
+    let name = if system.name().is_empty() { "the system" } else { system.name() };
+    let definition = Definition::from_json(&text, name).map_err(|e| HybridError::Bad(e.to_string()))?;
+    Ok(Model::new(definition))
 }
 
 /// Rows are handed on in parts of so many.
@@ -395,7 +411,6 @@ impl Question for GeneralRests {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use twofold_hybrid::Definition;
 
     fn run(text: &str, t_end: f64) -> GeneralRun {
         let model = Model::new(Definition::from_toml(text, "f").unwrap());

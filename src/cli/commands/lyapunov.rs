@@ -10,9 +10,13 @@ use crate::cli::flags::{RunFlags, Use};
 use crate::cli::general;
 use crate::cli::progress::Progress;
 use crate::cli::speak::{Delivery, deliver, try_delivery};
-use crate::cli::{CliError, Exit};
+use crate::cli::{self, CliError};
+use crate::hybrid::Options;
+use crate::hybrid::motion::Exit;
 use crate::integrate::StepCap;
-use crate::job::general::{GeneralExponents, GeneralRun, MeanRate};
+use crate::integrate::filippov::{ExitRule, Side};
+use crate::job::general::{GeneralExponents, GeneralRun, MeanRate, model_of};
+use crate::job::spec::SwitchSpec;
 use crate::job::{AnyQuestion, Executor, JobError, LargestExponent, Question, Stop, encode};
 use crate::num::elementary::log10;
 
@@ -25,6 +29,7 @@ use crate::num::elementary::log10;
 #[command(after_help = "Examples:\n  \
     twofold lyapunov --system chua --t-end 5000\n  \
     twofold lyapunov --reading reconstructed --switch hysteretic --t-end 2000 --format json\n  \
+    twofold lyapunov --system stick-slip --switch filippov\n  \
     twofold lyapunov --system my.toml --set gain=2 --transient 500")]
 pub struct Arguments {
     #[command(flatten)]
@@ -53,10 +58,38 @@ impl Arguments {
     /// # Errors
     /// If a flag has no effect, or a value is wrong.
     pub fn question(&self) -> Result<AnyQuestion, CliError> {
-        Ok(match general::run_of(&self.flags)? {
-            Some(run) => Arc::new(self.of_general(run)?),
+        Ok(match self.all_exponents()? {
+            Some(question) => Arc::new(question),
             None => Arc::new(self.of_surfaces()?),
         })
+    }
+
+    /// What is asked of a motion that is followed from switch to switch: a general system, or Filippov's motion.
+    fn all_exponents(&self) -> Result<Option<GeneralExponents>, CliError> {
+        if let Some(run) = general::run_of(&self.flags)? {
+            return Ok(Some(self.of_general(run)?));
+        }
+        let spec = self.flags.spec(Use::Exponent)?;
+        let SwitchSpec::Filippov { exit, .. } = spec.switch else { return Ok(None) };
+        let exit = match exit {
+            ExitRule::AtOnce { side: Side::Plus } => Exit::Plus,
+            ExitRule::AtOnce { side: Side::Minus } => Exit::Minus,
+            _ => Exit::Undecided,
+        };
+        // The tolerances of general systems, whose states have sizes of their own, unless others are given.
+        let (defaults, whole) = (Options::default(), self.flags.spec.as_ref().map(|_| spec.method.tolerance));
+        let options = Options {
+            t_end: spec.t_end,
+            start: Some(spec.start),
+            rtol: whole.map(|t| t.rtol).or(self.flags.rtol).unwrap_or(defaults.rtol),
+            atol: whole.map(|t| t.atol).or(self.flags.atol),
+            max_step: if let StepCap::Absolute(h) = spec.method.step_cap { h } else { defaults.max_step },
+            max_steps: spec.method.max_steps,
+            exit,
+            ..defaults
+        };
+        let run = GeneralRun { model: model_of(&spec.system)?, options };
+        Ok(Some(self.averaged(run)?))
     }
 
     /// What is asked of a system with h, plus and minus.
@@ -88,6 +121,10 @@ impl Arguments {
         if self.flags.t_end.is_none() {
             run.options.t_end = run.options.t_start + 10_000.0;
         }
+        self.averaged(run)
+    }
+
+    fn averaged(&self, run: GeneralRun) -> Result<GeneralExponents, CliError> {
         let length = run.options.t_end - run.options.t_start;
         let transient = self.transient.unwrap_or(0.1 * length);
         if !(transient >= 0.0 && transient < length) {
@@ -99,9 +136,9 @@ impl Arguments {
     }
 }
 
-pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
-    if let Some(run) = general::run_of(&arguments.flags)? {
-        return of_general(arguments, &arguments.of_general(run)?);
+pub fn run(arguments: &Arguments) -> Result<cli::Exit, CliError> {
+    if let Some(question) = arguments.all_exponents()? {
+        return of_general(arguments, &question);
     }
     let question = arguments.of_surfaces()?;
     let transient = question.settings.transient;
@@ -145,15 +182,15 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             let until = transient + found.duration;
             Err(CliError::Stopped { said: format!("interrupted: the mean is over t = {transient} to {until}"), exit })
         }
-        _ => Ok(Exit::Fine),
+        _ => Ok(cli::Exit::Fine),
     }
 }
 
 /// Most exponents of a general system that are computed.
 const MOST_EXPONENTS: usize = 12;
 
-/// The exponents of a general system, by saltation matrices through its switches and resets.
-fn of_general(arguments: &Arguments, question: &GeneralExponents) -> Result<Exit, CliError> {
+/// The exponents of a motion with switches, by saltation matrices through its switches and resets.
+fn of_general(arguments: &Arguments, question: &GeneralExponents) -> Result<cli::Exit, CliError> {
     let out = arguments.delivery.out.as_deref();
     let format = ending::format(out, arguments.format, Format::Text)?;
     try_delivery(out)?;
@@ -182,5 +219,5 @@ fn of_general(arguments: &Arguments, question: &GeneralExponents) -> Result<Exit
         }
     };
     deliver(out, &bytes)?;
-    Ok(Exit::Fine)
+    Ok(cli::Exit::Fine)
 }

@@ -336,16 +336,7 @@ impl Follower<'_> {
             }
         }
         let Some((left, place, guard)) = nearest else { return Ok(false) };
-        let gradient: Vec<f64> = (0..n)
-            .map(|i| {
-                let mut unit = vec![0.0; n];
-                unit[i] = 1.0;
-                let mut still = self.variables.clone();
-                still[n] = t;
-                let with_time = Self::along(&self.compiled, &still, &unit)[place];
-                with_time - Self::along(&self.compiled, &still, &vec![0.0; n])[place]
-            })
-            .collect();
+        let gradient = self.gradient(t, place);
         for i in 0..n {
             self.x[i] += left * field[i];
         }
@@ -360,6 +351,41 @@ impl Follower<'_> {
         zero.push(guard);
         self.settle(&zero)?;
         Ok(true)
+    }
+
+    /// The gradient of a watched expression in the states, at those that the variables hold.
+    fn gradient(&self, t: f64, place: usize) -> Vec<f64> {
+        let n = self.n;
+        let mut still = self.variables.clone();
+        still[n] = t;
+        let along = |direction: &[f64]| Self::along(&self.compiled, &still, direction)[place];
+        let in_time = along(&vec![0.0; n]);
+        let mut unit = vec![0.0; n];
+        (0..n)
+            .map(|i| {
+                unit[i] = 1.0;
+                let rate = along(&unit) - in_time;
+                unit[i] = 0.0;
+                rate
+            })
+            .collect()
+    }
+
+    /// The surface slid upon, if both fields are tangent to it there: a two-fold, where the sliding motion ends.
+    fn two_fold(&mut self, t: f64, x: &[f64]) -> Option<String> {
+        let [guard] = self.sliding[..] else { return None };
+        let place = self.compiled.place(guard)?;
+        let mut negative = vec![0.0; self.n];
+        self.compiled.field.evaluate(&self.variables, &mut negative);
+        let (below, added) = self.sliding_equations(t, x, &negative);
+        let norm = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let tangent = 1e-9 * norm(&self.gradient(t, place)) * norm(&negative);
+        (below[0].abs() <= tangent && (below[0] + added[0]).abs() <= tangent).then(|| {
+            format!(
+                "the motion slides on {} into a two-fold, where both fields are tangent to the surface and sliding is not defined",
+                self.names(&[guard])
+            )
+        })
     }
 
     pub(super) fn left_domain(&mut self, t: f64, x: &[f64]) -> HybridError {
@@ -382,7 +408,8 @@ impl Follower<'_> {
                 ahead *= 4.0;
             }
         }
-        let what = what.unwrap_or_else(|| {
+        self.variables[..self.n].copy_from_slice(x);
+        let what = what.or_else(|| self.two_fold(t, x)).unwrap_or_else(|| {
             "steps become too short to move: a singularity, or a solution that grows without bound".into()
         });
         HybridError::Domain { t, x: x.to_vec(), what }

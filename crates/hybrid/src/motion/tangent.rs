@@ -12,6 +12,7 @@ use crate::Model;
 use crate::step::{A, C, E, Step};
 use twofold_num::Dual;
 use twofold_num::elementary::{ln, rough_pow};
+use twofold_num::fit::line;
 use twofold_num::linear::{eigenvalues, solve_any};
 use twofold_system::Expression;
 
@@ -339,7 +340,8 @@ fn explicit(options: &Options) -> Result<(), HybridError> {
 pub struct Exponents {
     /// The exponents, largest first, per unit time; minus infinity for directions that sliding takes away.
     pub values: Vec<f64>,
-    /// Half the width of a 95 % interval of each, from the scatter of twenty parts of the run.
+    /// Half the width of a 95 % interval of each: the scatter of twenty parts of the run, or how far the growth swings about its line if that is more (in
+    /// regular motion parts are alike, and the mean over no whole number of periods is off); what growth like a power of time adds; and the method's errors.
     pub errors: Vec<f64>,
     /// From when to when the mean was taken.
     pub times: (f64, f64),
@@ -377,6 +379,9 @@ pub fn exponents(model: &Model, options: &Options, transient: f64, count: usize)
         end: options.t_end,
         from: (transient == 0.0).then_some(begin),
         sums: vec![vec![0.0; PARTS]; count.min(n)],
+        samples: vec![],
+        every: 1,
+        steps: 0,
     });
     let (outcome, follower) = follower.run_whole(&mut |_| true)?;
     if outcome.ending != Ending::Finished {
@@ -387,16 +392,17 @@ pub fn exponents(model: &Model, options: &Options, transient: f64, count: usize)
     }
     let growth = follower.growth.ok_or_else(|| HybridError::Bad("there is no mean".into()))?;
     let part = (options.t_end - begin) / PARTS as f64;
-    let mut values = Vec::new();
-    let mut errors = Vec::new();
-    for sums in &growth.sums {
+    let mut found = Vec::new();
+    for (k, sums) in growth.sums.iter().enumerate() {
         let rates: Vec<f64> = sums.iter().map(|s| s / part).collect();
         let from = growth.from.unwrap_or(begin);
         let mean = sums.iter().sum::<f64>() / (options.t_end - from);
-        let variance = rates.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>() / (PARTS - 1) as f64;
-        values.push(mean);
-        errors.push(if mean.is_finite() { STUDENT * (variance / PARTS as f64).sqrt() } else { 0.0 });
+        let half_width = if mean.is_finite() { growth.half_width(k, mean, &rates, part, options) } else { 0.0 };
+        found.push((mean, half_width));
     }
+    // Sliding takes away the direction that it takes away, whichever vector that is.
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let (values, errors) = found.into_iter().unzip();
     Ok(Exponents { values, errors, times: (begin, options.t_end) })
 }
 
@@ -407,6 +413,49 @@ pub(super) struct Growth {
     end: f64,
     from: Option<f64>,
     sums: Vec<Vec<f64>>,
+    /// Times with the logarithms of the growth until then, after so many steps each.
+    samples: Vec<(f64, Vec<f64>)>,
+    every: u64,
+    steps: u64,
+}
+
+/// Most samples of the growth that are kept.
+const MOST_SAMPLES: usize = 4096;
+
+impl Growth {
+    /// Half of the interval about the mean of the vector `k`.
+    fn half_width(&self, k: usize, mean: f64, rates: &[f64], part: f64, options: &Options) -> f64 {
+        let (length, parts) = (self.end - self.begin, PARTS as f64);
+        let variance = rates.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>() / (parts - 1.0);
+        let scatter = STUDENT * (variance / parts).sqrt();
+        let residuals = self.samples.iter().map(|(t, sums)| sums[k] - mean * (t - self.begin));
+        let [low, high] = residuals.fold([0.0_f64; 2], |[low, high], r| [low.min(r), high.max(r)]);
+        // ln |v| = mean t + power ln t: the parts' rates against the means of 1/t.
+        let points = rates.iter().enumerate().filter_map(|(i, rate)| {
+            let from = self.begin - options.t_start + part * i as f64;
+            (from > 0.0).then(|| (ln((from + part) / from) / part, *rate))
+        });
+        let fitted = line(&points.collect::<Vec<_>>()).filter(|l| l.slope.abs() > l.slope_error);
+        let slow = fitted.map_or(0.0, |l| (mean - l.intercept).abs());
+        let method = TANGENT_TOLERANCE.max(options.rtol) * self.steps as f64 / length;
+        scatter.max((high - low) / length) + slow + method
+    }
+
+    /// Keeps a sample, and of too many every other one.
+    fn sample(&mut self, t: f64) {
+        self.steps += 1;
+        if self.steps.is_multiple_of(self.every) {
+            self.samples.push((t, self.sums.iter().map(|sums| sums.iter().sum()).collect()));
+        }
+        if self.samples.len() > MOST_SAMPLES {
+            let mut even = false;
+            self.samples.retain(|_| {
+                even = !even;
+                even
+            });
+            self.every *= 2;
+        }
+    }
 }
 
 impl Follower<'_> {
@@ -434,6 +483,9 @@ impl Follower<'_> {
             } else {
                 y.iter_mut().for_each(|v| *v /= size);
             }
+        }
+        if growth.from.is_some() {
+            growth.sample(t);
         }
         // The mean begins with the first step that ends after the transient.
         if t >= growth.begin {
