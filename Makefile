@@ -7,7 +7,7 @@ PROOFS  := printed-cycle coexistence saddles inner-law sensitivity contraction c
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help figures gallery report check bless test elementary rigor-test census capture proofs browser-test lint bench bench-peers torture ci clean bench-keep bench-cost
+.PHONY: help figures gallery report check bless papers test elementary rigor-test census capture proofs browser-test lint bench bench-peers torture ci clean bench-keep bench-cost
 
 help: ## this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -29,6 +29,11 @@ check: ## recompute and compare with figures/figN/expected.json; exit 1 on a dif
 
 bless: ## make today's figures the reference: make bless REASON="why"
 	@$(RUN) --bin twofold -- bless --reason "$(REASON)"
+
+papers: ## make and check every paper under papers/
+	@for p in papers/*/paper.toml; do \
+		$(RUN) --bin twofold -- paper report --quiet "$$(dirname "$$p")" && $(RUN) --bin twofold -- paper check --quiet "$$(dirname "$$p")" || exit 1; \
+	done
 
 test: ## all tests, in the debug profile
 	@$(CARGO) test --locked

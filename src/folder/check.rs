@@ -140,6 +140,8 @@ enum Take {
 enum Check {
     /// A number is the paper's.
     Value { read: Read, equals: f64, within: f64 },
+    /// A number of one answer over that of another one is the paper's: an exponent, from two values of a parameter.
+    Ratio { read: Read, other: Read, equals: f64, within: f64 },
     /// A number is less or greater than another one, or than another answer's.
     Order { read: Read, less: bool, than: Option<f64>, other: Option<Read> },
     /// The later half of a section repeats itself after so many crossings, and after no fewer.
@@ -153,8 +155,9 @@ enum Check {
 }
 
 /// Kinds of checks, and the keys that each takes beside `of`.
-const KINDS: [(&str, &[&str]); 6] = [
+const KINDS: [(&str, &[&str]); 7] = [
     ("value", &["read", "column", "table", "take", "equals", "within"]),
+    ("ratio", &["read", "column", "table", "take", "equals", "within", "and", "and-read"]),
     ("order", &["read", "column", "table", "take", "relation", "than", "and", "and-read"]),
     ("period", &["is", "within"]),
     ("chaos", &[]),
@@ -256,6 +259,17 @@ impl Claim {
                 equals: number(&c.equals, "`equals`")?,
                 within: tolerance(None)?,
             },
+            "ratio" => {
+                if c.and.is_none() {
+                    return Err(missing("`and`, the panel or measure that it is divided by"));
+                }
+                let read = reading(origin, &place, &c)?;
+                let other = match &c.and_read {
+                    Some(path) => Read::Fact { path: path.get_ref().clone(), modulus: false },
+                    None => read.clone(),
+                };
+                Check::Ratio { read, other, equals: number(&c.equals, "`equals`")?, within: tolerance(None)? }
+            }
             "order" => {
                 let less = match c.relation.as_ref().map(|r| (r.get_ref().as_str(), r.span())) {
                     Some(("less" | "<", _)) => true,
@@ -336,6 +350,7 @@ impl Claim {
     pub fn kind(&self) -> &'static str {
         match &self.check {
             Check::Value { .. } => "value",
+            Check::Ratio { .. } => "ratio",
             Check::Order { .. } => "order",
             Check::Period { .. } => "period",
             Check::Chaos => "chaos",
@@ -542,6 +557,18 @@ impl Check {
                 let found = read.of(first)?;
                 let off = (found - equals).abs();
                 Ok((off <= *within, format!("{} ({equals} in the paper, {} off)", short(found), short(off))))
+            }
+            Check::Ratio { read, other, equals, within } => {
+                let (over, under) = (read.of(first)?, other.of(answers.last().unwrap_or(first))?);
+                let off = (over / under - equals).abs();
+                let said = format!(
+                    "{} / {} = {} ({equals} in the paper, {} off)",
+                    short(over),
+                    short(under),
+                    short(over / under),
+                    short(off)
+                );
+                Ok((off <= *within, said))
             }
             Check::Order { read, less, than, other } => {
                 let value = read.of(first)?;

@@ -116,6 +116,7 @@ fn typed(key: &Key) -> Value {
         "u64" | "u32" | "u16" | "usize" => json!({ "type": "integer", "minimum": 0 }),
         "bool" => json!({ "type": "boolean" }),
         "Vec<String>" | "Vec<Spanned<String>>" => json!({ "type": "array", "items": { "type": "string" } }),
+        "[String; 2]" => json!({ "type": "array", "items": { "type": "string" }, "minItems": 2, "maxItems": 2 }),
         "[f64; 2]" => json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 }),
         "Draw" => json!({ "enum": ["series", "plane", "space", "section", "columns", "halves", "surface"] }),
         "Words" if ["orbit", "lyapunov", "rests"].contains(&key.name.as_str()) => question(&key.name),

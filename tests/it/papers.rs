@@ -107,6 +107,25 @@ fn a_claim_that_does_not_hold_differs() {
     assert!(code == 3 && said.contains("what fails is not blessed"), "{said}");
 }
 
+/// The ratio of a number at two values of a parameter: with it the exponent of a law is scored.
+#[test]
+fn a_ratio_is_of_two_measures() {
+    let place = small();
+    let root = place.path().join("p");
+    // Periods are 2 ln((1 + w)/(1 - w)): ln(11/9)/ln 3 is their ratio at w = 0.1 and 0.5.
+    let ratio = "0.18265833864413814";
+    let from = "check = \"order\"\nof = \"narrow-cycle\"\nand = \"cycle\"\nread = \"period\"\nrelation = \"less\"";
+    let to = format!(
+        "check = \"ratio\"\nof = \"narrow-cycle\"\nand = \"cycle\"\nread = \"period\"\nequals = {ratio}\nwithin = 1e-6"
+    );
+    change(&root, "claims.toml", from, &to);
+    let (code, out, said) = paper(&["make", "--quiet"], &root);
+    assert!(code == 0 && out.contains("2 of 2 claims agree"), "{out}{said}");
+    change(&root, "claims.toml", ratio, "0.5");
+    let (_, out, _) = paper(&["make", "--quiet"], &root);
+    assert!(out.contains("narrower-is-faster: differs") && out.contains("0.5 in the paper"), "{out}");
+}
+
 /// The share of starts in which a check holds.
 #[test]
 fn a_check_has_odds_from_other_starts() {
@@ -132,11 +151,39 @@ fn a_check_has_odds_from_other_starts() {
     assert_eq!(found["outcome"], "differs", "{found}");
 }
 
+/// The papers that ship give the pictures and outcomes that are kept with them.
+#[test]
+fn papers_that_ship_are_reproduced() {
+    let papers = Path::new(env!("CARGO_MANIFEST_DIR")).join("papers");
+    let mut checked = 0;
+    for entry in fs::read_dir(papers).unwrap() {
+        let root = entry.unwrap().path();
+        // Figures of the first paper are the golden ones: their runs are long.
+        if !root.join("paper.toml").is_file() || root.ends_with("jeffrey-2013") {
+            continue;
+        }
+        // Made in a copy: a test leaves the repository as it is.
+        let place = tempfile::tempdir().unwrap();
+        let copy = place.path().join("p");
+        for part in ["", "systems", "figures", "data", "expected"] {
+            let Ok(files) = fs::read_dir(root.join(part)) else { continue };
+            fs::create_dir_all(copy.join(part)).unwrap();
+            for file in files.map(|f| f.unwrap().path()).filter(|f| f.is_file()) {
+                fs::copy(&file, copy.join(part).join(file.file_name().unwrap())).unwrap();
+            }
+        }
+        let (code, out, error) = paper(&["check", "--fresh", "--quiet"], &copy);
+        assert_eq!(code, 0, "{}: {out}{error}", root.display());
+        checked += 1;
+    }
+    assert!(checked > 0, "no paper in papers/");
+}
+
 /// Bad input: what is wrong, where, what to do; exit code 2 and nothing written.
 #[test]
 fn what_is_wrong_in_a_folder_is_said_with_its_place() {
     let reading = "[readings.a]\nabout = \"\"\nextends = \"b\"\n[readings.b]\nabout = \"\"\nextends = \"a\"\n[run]";
-    let cases: [(&str, &str, &str, &[&str]); 19] = [
+    let cases: [(&str, &str, &str, &[&str]); 22] = [
         (
             "paper.toml",
             "rtol = 1e-9",
@@ -170,6 +217,19 @@ fn what_is_wrong_in_a_folder_is_said_with_its_place() {
         ("claims.toml", "read = \"period\"", "", &["the claim reads nothing", "claims.toml:2:1"]),
         ("claims.toml", "check = \"value\"", "check = \"valeu\"", &["no check `valeu`", "did you mean `value`?"]),
         ("claims.toml", "within = 1e-6", "within = 1e-6\nsame = true", &["`same` has no effect on a check of value"]),
+        ("claims.toml", "check = \"value\"", "check = \"ratio\"", &["a check of ratio needs `and`", "claims.toml:2:1"]),
+        (
+            "figures/fig1.toml",
+            "draw = \"series\"",
+            "labels = [\"t\", \"x\"]\ndraw = \"series\"",
+            &["`labels` has an effect on draw = \"columns\" alone"],
+        ),
+        (
+            "figures/fig1.toml",
+            "[[panel]]\nlabel = \"b\"",
+            "[[panel]]\nlabel = \"c\"\ndraw = \"columns\"\nof = \"fig1/a\"\nx = \"t\"\ny = [\"x\"]\nnames = []\n[[panel]]\nlabel = \"b\"",
+            &["0 names for 1 columns", "fig1.toml"],
+        ),
         (
             "measures.toml",
             "orbit = {",
