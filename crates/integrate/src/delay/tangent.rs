@@ -6,7 +6,7 @@
 //!
 //! Under the smooth rule v' = (phi Df+ + (1 - phi) Df-) v + (f+ - f-) phi' dh v(t - delay): orbit and vector are followed together by the method of
 //! steps. The disturbed state is v during one delay, on the dense output of the steps; its length is read at the present and at
-//! [`NODES`] Chebyshev points of the delay (Farmer 1982, Physica D 4, 366-393; Breda & Van Vleck 2014, Numer. Math. 126, 225-257).
+//! [`NODES`] Chebyshev points of the delay (Farmer 1982, Physica D 4, 366-393; Breda & Van Vleck 2014, Numerische Mathematik 126, 225-257).
 
 use std::f64::consts::PI;
 
