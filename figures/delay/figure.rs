@@ -304,7 +304,7 @@ fn exit_panels(exits: &Table) -> (PlanePanel, PlanePanel, String) {
     );
     let mut distribution = PlanePanel::new(
         Axis::linear("*y*/*δ* at the exit", -20.0, 14.0),
-        Axis::linear("share of phases below", 0.0, 1.02),
+        Axis::linear("share of phases below", 0.0, 1.19),
     );
     for (delay, colour) in DELAYS {
         let points = of("sharp", delay);
