@@ -1,6 +1,5 @@
 //! The command line that every figure's binary shares.
 
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -94,8 +93,8 @@ impl StoreFlags {
 
 /// The definition of a figure's flags, with its own name, description and examples.
 fn command(figure: &Figure) -> clap::Command {
-    // A binary's figure has a name of its own; clap takes no other.
-    let Cow::Borrowed(id) = figure.id else { return Arguments::command() };
+    // Clap keeps names for as long as the program runs, and a program has one figure.
+    let id: &'static str = Box::leak(figure.id.to_string().into_boxed_str());
     let caption = figure.pictures.first().map_or("", |p| p.caption.as_str());
     let about = format!("{id}: {}. Written as PNG, SVG and PDF, with its numbers as CSV.", figure.title);
     let mut examples = format!("Examples:\n  {id} --out pictures\n  {id} --json --quiet");
