@@ -382,7 +382,7 @@ impl Follower<'_> {
         let tangent = 1e-9 * norm(&self.gradient(t, place)) * norm(&negative);
         (below[0].abs() <= tangent && (below[0] + added[0]).abs() <= tangent).then(|| {
             format!(
-                "the motion slides on {} into a two-fold, where both fields are tangent to the surface and sliding is not defined",
+                "the motion slides on {} into a two-fold, where both fields are tangent to the surface and sliding is not defined: what follows is not unique. End the run before that time (--t-end), start elsewhere (--start), or smooth the switch",
                 self.names(&[guard])
             )
         })
@@ -409,7 +409,12 @@ impl Follower<'_> {
             }
         }
         self.variables[..self.n].copy_from_slice(x);
-        let what = what.or_else(|| self.two_fold(t, x)).unwrap_or_else(|| {
+        if what.is_none()
+            && let Some(why) = self.two_fold(t, x)
+        {
+            return HybridError::Stuck { t, x: x.to_vec(), why };
+        }
+        let what = what.unwrap_or_else(|| {
             "steps become too short to move: a singularity, or a solution that grows without bound".into()
         });
         HybridError::Domain { t, x: x.to_vec(), what }
