@@ -9,11 +9,17 @@ import twofold
 
 
 @pytest.fixture(scope="session")
-def command():
-    """The command line's program, and a function that runs it."""
+def program():
+    """The command line's program."""
     program = os.environ.get("TWOFOLD_PROGRAM")
     if not program:
         pytest.skip("TWOFOLD_PROGRAM does not name the program `twofold`, with which answers are compared")
+    return program
+
+
+@pytest.fixture(scope="session")
+def command(program):
+    """A function that runs it."""
 
     def run(*arguments, stdin=None):
         done = subprocess.run([program, *arguments], input=stdin, capture_output=True, timeout=300)

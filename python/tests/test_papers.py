@@ -40,7 +40,7 @@ def test_answers_are_arrays(folder):
 
 
 def test_what_is_wrong_is_said_with_its_place(folder):
-    with pytest.raises(twofold.SpecError, match="no panel or measure 'fig9/a'"):
+    with pytest.raises(twofold.SpecError, match='no panel or measure "fig9/a"'):
         twofold.Paper(folder).answer("fig9/a")
     file = folder / "paper.toml"
     file.write_text(file.read_text().replace("title =", "titel ="))

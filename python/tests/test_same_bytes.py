@@ -35,8 +35,12 @@ RUNS = {
         dict(switch="delayed", delay=0.02, eps=0.01, transition="erf", method="radau5"),
     ),
     "relay": (
-        ["--t-end", "30", "--switch", "relay", "--band", "0.3", "--inside", "minus", "--section", "y=0"],
-        dict(switch="relay", band=0.3, inside="minus", plane="y=0"),
+        ["--t-end", "30", "--switch", "relay", "--band", "0.3", "--inside", "minus"],
+        dict(switch="relay", band=0.3, inside="minus"),
+    ),
+    "relay-section": (
+        ["--t-end", "60", "--switch", "relay", "--band", "0.01", "--section", "y=0"],
+        dict(switch="relay", band=0.01, plane="y=0"),
     ),
     "perturbed": (["--t-end", "30", "--method", "dopri5", "--sigma", "0.1"], dict(sigma=0.1)),
     "arctan": (["--t-end", "30", "--method", "dopri5", "--transition", "arctan"], dict(transition="arctan")),

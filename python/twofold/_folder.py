@@ -51,7 +51,7 @@ class Claim:
 class PaperAnswer:
     """The answer to a panel or measure: ``answer.facts``, ``answer.tables["path"]["x"]``."""
 
-    def __init__(self, raw: Dict[str, Any]) -> None:
+    def __init__(self, raw: "_native._FolderAnswer") -> None:
         self.hash: str = raw["hash"]
         """Digest of the numbers, the same on any machine."""
         self.facts: Dict[str, Any] = json.loads(raw["facts"])
@@ -98,7 +98,10 @@ class Paper:
             return PaperAnswer(_native.paper_answer(self._folder, name, self._keep, show))
 
     def claims(self, threads: int = 0, progress: Progress = False) -> List[Claim]:
-        """Every claim with its outcome, in the file's order; ``threads`` = 0 is one per core and changes no byte."""
+        """Every claim of claims.toml with its outcome, in the file's order; ``threads`` = 0 is one per core and changes no byte.
+
+        What panels say of themselves (``says``) is scored by ``twofold paper`` alone.
+        """
         with Shown(progress) as show:
             verdicts = json.loads(_native.paper_claims(self._folder, threads, self._keep, show))
         found = []

@@ -11,6 +11,9 @@ __all__ = [
     "run",
     "sweep",
     "written",
+    "paper",
+    "paper_answer",
+    "paper_claims",
     "panels",
     "verdict_table",
     "Definition",
@@ -37,6 +40,11 @@ class _Answer(TypedDict):
     facts: str
     statistics: str
     stop: str
+    tables: Dict[str, Dict[str, _Column]]
+
+class _FolderAnswer(TypedDict):
+    hash: str
+    facts: str
     tables: Dict[str, Dict[str, _Column]]
 
 @final
@@ -82,7 +90,7 @@ def sweep(
 ) -> Tuple[Dict[str, _Column], bytes]: ...
 def fates(text: str, starts: Sequence[Sequence[float]], threads: int, show: _Show = None) -> List[str]: ...
 def paper(folder: str) -> str: ...
-def paper_answer(folder: str, name: str, keep: bool, show: _Show = None) -> _Answer: ...
+def paper_answer(folder: str, name: str, keep: bool, show: _Show = None) -> _FolderAnswer: ...
 def paper_claims(folder: str, threads: int, keep: bool, show: _Show = None) -> str: ...
 def panels() -> str: ...
 def verdict_table() -> str: ...
