@@ -122,6 +122,15 @@ capture-rest: ## what the study of methods leaves out for its cost: Radau IIA in
 	@$(CARGO) build --release --locked --bin twofold
 	@$(SWEEP) $(CAPTURE) 2015 --method radau5 $(RECONSTRUCTED) $(STARTS) --random 200 --out $(K)/radau5-reconstructed.csv
 
+.PHONY: resolved
+D := figures/resolved
+RESOLVED := --t-end 2e5 $(READINGS) $(STARTS) --random 100 --rtol 1e-13 --atol 1e-13 --random-seed
+resolved: ## the census by methods that resolve the layer, by the rules in figures/resolved (an hour on one core; a stopped call goes on)
+	@$(CARGO) build --release --locked --bin twofold
+	@$(SWEEP) $(RESOLVED) 2017 --method taylor $(INTERVALS) --out $(D)/taylor7.csv
+	@$(SWEEP) $(RESOLVED) 2018 --method taylor $(SIGMAS) --out $(D)/taylor8.csv
+	@$(SWEEP) $(RESOLVED) 2019 --method layered $(INTERVALS) --out $(D)/layered7.csv
+
 .PHONY: delay-data
 delay-data: ## the data of figures/delay: passages, and a hundred runs of each rule to compare (a quarter of an hour; a stopped call goes on)
 	@$(CARGO) build --release --locked --quiet --example delay_growth --example delay_runs
