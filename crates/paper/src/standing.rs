@@ -143,10 +143,10 @@ mod tests {
         let picture = figures::fig4::figure().pictures.remove(0);
         let asked = |p: &Picture| key(&Drawn(p));
         let changes: [&dyn Fn(&mut Picture); 6] = [
-            &|p| p.panels[1].title.push('.'),
-            &|p| p.panels[1].label.push('.'),
-            &|p| p.panels[1].claim = None,
-            &|p| p.panels[1].run.t_end += 1.0,
+            &|p| p.panels[0].title.push('.'),
+            &|p| p.panels[0].label.push('.'),
+            &|p| p.panels[0].claim = None,
+            &|p| p.panels[0].run.t_end += 1.0,
             &|p| p.view = View::Section { horizontal: 2, vertical: 0 },
             &|p| drop(p.panels.pop()),
         ];
