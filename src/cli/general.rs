@@ -3,14 +3,17 @@
 use std::path::Path;
 
 use super::CliError;
-use super::flags::RunFlags;
+use super::flags::{RunFlags, Use};
 use crate::hybrid::definition::is_general;
 use crate::hybrid::model::ModelError;
 use crate::hybrid::motion::{Exit as Side, Method, Record};
 use crate::hybrid::selection::Intersection as Rule;
 use crate::hybrid::{Definition, HybridError, Model, Options};
+use crate::integrate::StepCap;
+use crate::integrate::filippov::{self, ExitRule};
 use crate::job::JobError;
-use crate::job::general::GeneralRun;
+use crate::job::general::{GeneralRun, model_of};
+use crate::job::spec::SwitchSpec;
 use crate::record::files::read_text;
 use crate::system::diagnostic::nearest;
 use crate::system::{Expression, library};
@@ -198,6 +201,33 @@ pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
         intersection: flags.intersection.as_deref().map_or(Ok(Rule::Undecided), |text| intersection(text, &model))?,
     };
     Ok(Some(GeneralRun { model, options }))
+}
+
+/// Filippov's motion of a system with h, plus and minus, if the flags ask for it, as the run of a general one.
+///
+/// # Errors
+/// If a flag has no effect, or a value is wrong.
+pub fn filippov_run(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
+    let spec = flags.spec(Use::Exponent)?;
+    let SwitchSpec::Filippov { exit, .. } = spec.switch else { return Ok(None) };
+    let exit = match exit {
+        ExitRule::AtOnce { side: filippov::Side::Plus } => Side::Plus,
+        ExitRule::AtOnce { side: filippov::Side::Minus } => Side::Minus,
+        _ => Side::Undecided,
+    };
+    // The tolerances of general systems, whose states have sizes of their own, unless others are given.
+    let (defaults, whole) = (Options::default(), flags.spec.as_ref().map(|_| spec.method.tolerance));
+    let options = Options {
+        t_end: spec.t_end,
+        start: Some(spec.start),
+        rtol: whole.map(|t| t.rtol).or(flags.rtol).unwrap_or(defaults.rtol),
+        atol: whole.map(|t| t.atol).or(flags.atol),
+        max_step: if let StepCap::Absolute(h) = spec.method.step_cap { h } else { defaults.max_step },
+        max_steps: spec.method.max_steps,
+        exit,
+        ..defaults
+    };
+    Ok(Some(GeneralRun { model: model_of(&spec.system)?, options }))
 }
 
 /// Reads "bilinear", "hull-least-norm" or "order:x,v - belt".

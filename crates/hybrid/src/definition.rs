@@ -361,10 +361,10 @@ fn item(place: &Place, i: usize) -> Place {
 }
 
 /// What is wrong with a document, and where.
-struct Problem {
+pub(crate) struct Problem {
     place: Place,
     within: Option<(String, Range<usize>)>,
-    message: String,
+    pub(crate) message: String,
     help: Option<String>,
 }
 
@@ -494,7 +494,7 @@ impl Definition {
         &self.axes
     }
 
-    fn from_document(document: Document) -> Result<Self, Problem> {
+    pub(crate) fn from_document(document: Document) -> Result<Self, Problem> {
         let d = &document;
         let sound = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         if d.name.len() > 64 || !d.name.chars().all(sound) {

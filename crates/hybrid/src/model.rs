@@ -10,7 +10,7 @@ use twofold_system::diagnostic::nearest;
 use twofold_system::expression::General;
 
 use crate::data::{BadTable, Table};
-use crate::definition::Definition;
+use crate::definition::{Definition, Document};
 
 /// A general system, ready to be followed once its tables have their data.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,6 +70,17 @@ impl Model {
         let Some((_, entry)) = entry else { return Err(ModelError::NoData(name.into())) };
         self.tables.insert(name.into(), Table::read(entry, csv)?);
         Ok(self)
+    }
+
+    /// Whether a parameter has a value that is not its definition's.
+    pub(crate) fn is_given(&self, name: &str) -> bool {
+        self.given.contains_key(name)
+    }
+
+    /// Another definition with the same data for its tables, or what is wrong with it.
+    pub(crate) fn redefined(&self, document: Document) -> Result<Self, String> {
+        let definition = Arc::new(Definition::from_document(document).map_err(|problem| problem.message)?);
+        Ok(Self { definition, given: BTreeMap::new(), tables: self.tables.clone() })
     }
 
     /// What the system is.

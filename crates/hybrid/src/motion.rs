@@ -7,6 +7,7 @@
 mod clock;
 mod meeting;
 mod search;
+pub mod sensitivity;
 mod settling;
 mod sliding;
 pub mod tangent;

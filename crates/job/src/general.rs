@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use twofold_analyse::path::MOST_POINTS;
+use twofold_hybrid::motion::sensitivity::sensitivities;
 use twofold_hybrid::motion::tangent::{Return, closed_orbit, exponents};
 use twofold_hybrid::motion::{Exit, Record};
 use twofold_hybrid::rests::{Place, rests};
@@ -332,6 +333,48 @@ impl Question for GeneralExponents {
             .with_fact("from", &found.times.0)
             .with_fact("to", &found.times.1)
             .with_fact("exponents", &list))
+    }
+}
+
+/// How the state at the end of a run changes with the start and with parameters.
+#[derive(Clone, Debug)]
+pub struct GeneralSensitivities {
+    /// System, start, times and method.
+    pub run: GeneralRun,
+    /// The parameters.
+    pub by: Vec<String>,
+}
+
+impl Question for GeneralSensitivities {
+    fn kind(&self) -> &'static str {
+        "general-sensitivities"
+    }
+
+    fn json(&self) -> Value {
+        let mut json = self.run.json();
+        json["by"] = json!(self.by);
+        json
+    }
+
+    fn cost(&self) -> f64 {
+        self.run.cost() * (self.run.model.coordinates().len() + self.by.len()) as f64
+    }
+
+    /// The table `sensitivities` has a row a state: its name, its `value` at the end and its derivatives by each component of the start (`start.x`) and by each
+    /// parameter (`params.p`). Fact: `t`, when the run ended.
+    fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        let by: Vec<&str> = self.by.iter().map(String::as_str).collect();
+        let found = sensitivities(&self.run.model, &self.run.options, &by)?;
+        let states = self.run.model.coordinates();
+        let names = states.iter().map(|s| format!("start.{s}")).chain(by.iter().map(|p| format!("params.{p}")));
+        let mut columns = vec![Column::words("state"), Column::numbers("value")];
+        columns.extend(names.map(|name| Column::numbers(&name)));
+        let mut table = Table::new("sensitivities", columns);
+        for (i, state) in states.iter().enumerate() {
+            let row = [found.x[i]].into_iter().chain(found.by_start[i].iter().chain(&found.by_parameter[i]).copied());
+            table.push(std::iter::once(Entry::Word((*state).to_owned())).chain(row.map(Entry::Number)));
+        }
+        Ok(Answer::of_tables(vec![table]).with_fact("t", &found.t))
     }
 }
 

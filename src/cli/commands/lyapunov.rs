@@ -11,12 +11,8 @@ use crate::cli::general;
 use crate::cli::progress::Progress;
 use crate::cli::speak::{Delivery, deliver, try_delivery};
 use crate::cli::{self, CliError};
-use crate::hybrid::Options;
-use crate::hybrid::motion::Exit;
 use crate::integrate::StepCap;
-use crate::integrate::filippov::{ExitRule, Side};
-use crate::job::general::{GeneralExponents, GeneralRun, MeanRate, model_of};
-use crate::job::spec::SwitchSpec;
+use crate::job::general::{GeneralExponents, GeneralRun, MeanRate};
 use crate::job::{AnyQuestion, Executor, JobError, LargestExponent, Question, Stop, encode};
 use crate::num::elementary::log10;
 
@@ -69,26 +65,7 @@ impl Arguments {
         if let Some(run) = general::run_of(&self.flags)? {
             return Ok(Some(self.of_general(run)?));
         }
-        let spec = self.flags.spec(Use::Exponent)?;
-        let SwitchSpec::Filippov { exit, .. } = spec.switch else { return Ok(None) };
-        let exit = match exit {
-            ExitRule::AtOnce { side: Side::Plus } => Exit::Plus,
-            ExitRule::AtOnce { side: Side::Minus } => Exit::Minus,
-            _ => Exit::Undecided,
-        };
-        // The tolerances of general systems, whose states have sizes of their own, unless others are given.
-        let (defaults, whole) = (Options::default(), self.flags.spec.as_ref().map(|_| spec.method.tolerance));
-        let options = Options {
-            t_end: spec.t_end,
-            start: Some(spec.start),
-            rtol: whole.map(|t| t.rtol).or(self.flags.rtol).unwrap_or(defaults.rtol),
-            atol: whole.map(|t| t.atol).or(self.flags.atol),
-            max_step: if let StepCap::Absolute(h) = spec.method.step_cap { h } else { defaults.max_step },
-            max_steps: spec.method.max_steps,
-            exit,
-            ..defaults
-        };
-        let run = GeneralRun { model: model_of(&spec.system)?, options };
+        let Some(run) = general::filippov_run(&self.flags)? else { return Ok(None) };
         Ok(Some(self.averaged(run)?))
     }
 

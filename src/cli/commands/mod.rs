@@ -15,7 +15,8 @@ mod published;
 mod report;
 pub(crate) mod rests;
 mod run;
-mod scan;
+pub(crate) mod scan;
+pub(crate) mod sensitivities;
 mod store;
 mod sweep;
 mod verify;
@@ -44,6 +45,7 @@ enum Command {
     Lyapunov(Box<lyapunov::Arguments>),
     Rests(rests::Arguments),
     Scan(Box<scan::Arguments>),
+    Sensitivities(Box<sensitivities::Arguments>),
     New(new::Arguments),
     Figure(Box<figure::Arguments>),
     Sweep(Box<sweep::Arguments>),
@@ -78,6 +80,7 @@ pub fn main() -> ExitCode {
         Command::Lyapunov(arguments) => lyapunov::run(&arguments),
         Command::Rests(arguments) => rests::run(&arguments),
         Command::Scan(arguments) => scan::run(&arguments),
+        Command::Sensitivities(arguments) => sensitivities::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
         Command::Figure(arguments) => figure::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),

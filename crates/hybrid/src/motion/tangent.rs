@@ -167,6 +167,64 @@ impl Follower<'_> {
         out.iter().map(|d| d.partials[0]).collect()
     }
 
+    /// Begins to carry these vectors. Of a motion that begins in sliding they lose what is normal to the surfaces at once: a neighbour off a surface
+    /// comes back to it in a time that is proportional to its distance, whichever side it is on.
+    pub(super) fn begin_tangents(&mut self, mut vectors: Vec<Vec<f64>>) -> Result<(), HybridError> {
+        let (n, k) = (self.n, self.sliding.len());
+        if k > 0 {
+            let (t, x) = (self.t, self.x.clone());
+            self.variables[..n].copy_from_slice(&x);
+            self.variables[n] = t;
+            let mut field0 = vec![0.0; n];
+            self.compiled.field.evaluate(&self.variables, &mut field0);
+            let place = |follower: &Self, guard: usize| follower.compiled.place(guard);
+            let compiled = self.compiled.clone();
+            let at_rest = Self::along(&compiled, &self.variables, &vec![0.0; n]);
+            let separate = self.separate.clone();
+            let (jumps, field1) = match separate {
+                Some(_) => {
+                    let (_, jumps, field1) = self.separate_weights(t, &x, &field0);
+                    (jumps, field1)
+                }
+                None => (Vec::new(), Vec::new()),
+            };
+            let matrix = if separate.is_some() { Vec::new() } else { self.sliding_equations(t, &x, &field0).1 };
+            let others: Vec<Vec<f64>> =
+                if separate.is_some() { Vec::new() } else { (0..k).map(|c| self.positive_field(c, t, &x)).collect() };
+            self.variables[..n].copy_from_slice(&x);
+            self.variables[n] = t;
+            for y in &mut vectors {
+                let moved = Self::along(&compiled, &self.variables, y);
+                let off: Vec<f64> = self
+                    .sliding
+                    .iter()
+                    .map(|g| place(self, *g).map_or(f64::NAN, |p| -(moved[p] - at_rest[p])))
+                    .collect();
+                match &separate {
+                    Some(owners) => {
+                        for (i, owner) in owners.iter().enumerate() {
+                            if let Some(p) = owner {
+                                y[i] += off[*p] / jumps[*p] * (field1[i] - field0[i]);
+                            }
+                        }
+                    }
+                    None => {
+                        let Some(weights) = solve_any(&matrix, &off, 0.0) else {
+                            return Err(self.no_tangents("motion begins where sliding is not defined"));
+                        };
+                        for (weight, other) in weights.iter().zip(&others) {
+                            for i in 0..n {
+                                y[i] += weight * (other[i] - field0[i]);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        self.tangents = Some(Tangents { vectors, reset: None });
+        Ok(())
+    }
+
     /// What is needed of the moment before something is met.
     pub(super) fn before(&mut self, met: &[Sought]) -> Result<Option<Before>, HybridError> {
         if self.tangents.is_none() {
@@ -322,7 +380,7 @@ fn solve_duals(mut a: Vec<D>, mut b: Vec<D>) -> Vec<D> {
 }
 
 /// Tangent vectors are carried by the stages of explicit steps.
-fn explicit(options: &Options) -> Result<(), HybridError> {
+pub(super) fn explicit(options: &Options) -> Result<(), HybridError> {
     if options.intersection != crate::selection::Intersection::Undecided {
         let why = "tangent vectors are not carried through mixtures that a rule chooses; leave --intersection out";
         return Err(HybridError::Bad(why.into()));
@@ -373,7 +431,7 @@ pub fn exponents(model: &Model, options: &Options, transient: f64, count: usize)
         v[i] = 1.0;
         v
     };
-    follower.tangents = Some(Tangents { vectors: (0..count.min(n)).map(unit).collect(), reset: None });
+    follower.begin_tangents((0..count.min(n)).map(unit).collect())?;
     follower.growth = Some(Growth {
         begin,
         end: options.t_end,
@@ -609,7 +667,7 @@ fn turn(model: &Model, options: &Options, after: &Return, x: &[f64], on_section:
         v[j] = 1.0;
         v
     };
-    follower.tangents = Some(Tangents { vectors: (0..n).map(unit).collect(), reset: None });
+    follower.begin_tangents((0..n).map(unit).collect())?;
     let mut crossings = 0;
     let (outcome, mut follower) = follower.run_whole(&mut |point| {
         crossings += usize::from(point.direction.is_some_and(|d| d > 0.0));

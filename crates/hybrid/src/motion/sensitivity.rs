@@ -1,0 +1,249 @@
+//! How the state at the end of a run changes with the start and with parameters.
+//!
+//! Parameters become states that do not move, so that one set of tangent vectors, with the same saltation matrices, carries both (Galán, Feehery & Barton
+//! 1999, Applied Numerical Mathematics 31, 17, derive the jumps of parametric sensitivities in this way). Everything that happens at a switch or reset is in them: that it comes
+//! earlier or later, and that the reset itself depends on the parameter.
+
+use super::tangent::explicit;
+use super::{Ending, Follower, HybridError, Options, Record};
+use crate::Model;
+use crate::definition::{Constant, ParameterEntry};
+use twofold_num::Decimal;
+use twofold_system::document::{About, StateEntry};
+
+/// The derivatives of the state at the end of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sensitivities {
+    /// When the run ended.
+    pub t: f64,
+    /// The state then.
+    pub x: Vec<f64>,
+    /// A row a state: its derivatives by the components of the start.
+    pub by_start: Vec<Vec<f64>>,
+    /// A row a state: its derivatives by the parameters, in the order in which they were asked for. The start is held fixed.
+    pub by_parameter: Vec<Vec<f64>>,
+}
+
+/// The derivatives of the state at `options.t_end` by the start and by these parameters.
+///
+/// # Errors
+/// As [`follow`](super::follow); also where there is no derivative: at a grazing, at two surfaces at once, at rest after accumulated impacts, if an event ends
+/// the run, and for a parameter that sets the times of events.
+pub fn sensitivities(model: &Model, options: &Options, parameters: &[&str]) -> Result<Sensitivities, HybridError> {
+    explicit(options)?;
+    let n = model.coordinates().len();
+    let (model, values) = with_states(model, parameters)?;
+    let start = match &options.start {
+        Some(start) => start.clone(),
+        None => {
+            model.1.clone().ok_or_else(|| HybridError::Start("the file has no start: give one (--start)".into()))?
+        }
+    };
+    let whole: Vec<f64> = start.into_iter().chain(values).collect();
+    let settings =
+        Options { start: Some(whole.clone()), record: Record::Times { every: f64::INFINITY }, ..options.clone() };
+    let mut follower = Follower::new(&model.0, &settings)?;
+    let unit = |i: usize| {
+        let mut v = vec![0.0; whole.len()];
+        v[i] = 1.0;
+        v
+    };
+    follower.begin_tangents((0..whole.len()).map(unit).collect())?;
+    let (outcome, follower) = follower.run_whole(&mut |_| true)?;
+    if outcome.ending != Ending::Finished {
+        let why = format!("the run ends at t = {}, before --t-end: give a time before it", outcome.t);
+        return Err(HybridError::Stuck { t: outcome.t, x: outcome.x, why });
+    }
+    let vectors = follower.tangents.map_or_else(Vec::new, |t| t.vectors);
+    let rows = |columns: &[Vec<f64>]| (0..n).map(|i| columns.iter().map(|c| c[i]).collect()).collect();
+    Ok(Sensitivities {
+        t: outcome.t,
+        x: outcome.x[..n].to_vec(),
+        by_start: rows(&vectors[..n]),
+        by_parameter: rows(&vectors[n..]),
+    })
+}
+
+/// The model and the start that its file gives.
+type Extended = (Model, Option<Vec<f64>>);
+
+/// The model with these parameters as states that do not move, and their values. What depends on them becomes a term.
+fn with_states(model: &Model, parameters: &[&str]) -> Result<(Extended, Vec<f64>), HybridError> {
+    let bad = |why: String| HybridError::Bad(why);
+    let values = model.values().map_err(|e| bad(e.to_string()))?;
+    let known: Vec<&str> = model.definition().parameters().iter().map(|p| p.name.as_str()).collect();
+    for (i, name) in parameters.iter().enumerate() {
+        if !known.contains(name) {
+            return Err(bad(format!("there is no parameter `{name}`; the system has {}", known.join(", "))));
+        }
+        if parameters[..i].contains(name) {
+            return Err(bad(format!("the parameter `{name}` is named twice")));
+        }
+    }
+    let start = model.start().map_err(|e| bad(e.to_string()))?;
+    let mut document = model.definition().document().clone();
+    document.start = None;
+    let zero = || Constant::Number(0.0);
+    let names: Vec<String> = parameters.iter().map(|p| (*p).to_owned()).collect();
+    document.states.extend(names.iter().map(|name| StateEntry { name: name.clone(), about: About::default() }));
+    let fields = [&mut document.f, &mut document.plus, &mut document.minus].into_iter().flatten();
+    for field in fields.chain(document.modes.0.iter_mut().map(|(_, mode)| &mut mode.f)) {
+        field.extend(names.iter().map(|_| zero()));
+    }
+    // A parameter that is given by others moves with them, unless it has a value of its own.
+    let mut moving = names.clone();
+    let mut kept = Vec::new();
+    for (name, entry) in std::mem::take(&mut document.parameters.0) {
+        let value = match &entry {
+            ParameterEntry::Plain(value) | ParameterEntry::Table { value, .. } => value.clone(),
+        };
+        let parameter = model.definition().parameters().iter().find(|p| p.name == name);
+        let depends = !model.is_given(&name)
+            && parameter.is_some_and(|p| p.value.names().iter().any(|n| moving.iter().any(|m| m == n)));
+        if names.contains(&name) {
+            continue;
+        }
+        if depends {
+            moving.push(name.clone());
+            document.terms.0.push((name, value));
+        } else {
+            // Its value, whatever it was made from.
+            let value = Constant::Text(Decimal::from(values[&name]).to_string());
+            kept.push((name, ParameterEntry::Plain(value)));
+        }
+    }
+    document.parameters.0 = kept;
+    let extended = model.redefined(document).map_err(|why| {
+        bad(format!(
+            "no derivative by {}: {why} (a parameter that sets the times of events has none)",
+            names.join(", ")
+        ))
+    })?;
+    Ok(((extended, start), names.iter().map(|n| values[n]).collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Definition;
+    use crate::motion::follow;
+
+    fn model(text: &str) -> Model {
+        Model::new(Definition::from_toml(text, "test.toml").unwrap())
+    }
+
+    fn at(t_end: f64) -> Options {
+        Options { t_end, ..Options::default() }
+    }
+
+    const BALL: &str = r#"
+        states = ["x", "v"]
+        start = [1, 0]
+        f = ["v", "-g"]
+        [parameters]
+        g = 2
+        r = 0.5
+        twice = "2*r"
+        [[event]]
+        when = "x"
+        direction = "down"
+        set = { v = "-0.5*twice*v" }
+    "#;
+
+    #[test]
+    fn a_ball_after_one_impact() {
+        // It lands at t1 = sqrt(2 h/g) = 1 and leaves at r g t1.
+        let found = sensitivities(&model(BALL), &at(1.5), &["r", "g"]).unwrap();
+        let (g, r, t1, s) = (2.0, 0.5, 1.0, 0.5);
+        let earlier = 1.0 / (g * t1); // of the landing, by the height
+        let speed = r * g * t1 - g * s;
+        let by_height = [r * g * earlier * s - speed * earlier, r * g * earlier + g * earlier];
+        let t1_by_g = -0.5 * t1 / g;
+        let by_r = [g * t1 * s, g * t1];
+        let by_g =
+            [r * (t1 + g * t1_by_g) * s - 0.5 * s * s - speed * t1_by_g, r * (t1 + g * t1_by_g) - s + g * t1_by_g];
+        for i in 0..2 {
+            let of = [found.by_start[i][0], found.by_parameter[i][0], found.by_parameter[i][1]];
+            for (a, b) in of.into_iter().zip([by_height[i], by_r[i], by_g[i]]) {
+                assert!((a - b).abs() < 1e-8, "{of:?}: {b}");
+            }
+        }
+    }
+
+    /// Dry friction on a belt: sliding, its end, and a drive; against central differences.
+    #[test]
+    fn through_sliding_as_by_finite_differences() {
+        let text = r#"
+            states = ["x", "v"]
+            start = [0.5, 0]
+            f = ["v", "-x - friction*sign(v - belt) + 0.3*cos(1.3*t)"]
+            [parameters]
+            belt = 0.3
+            friction = 1
+        "#;
+        let end = |x: f64, friction: f64| {
+            let m = model(text).with("friction", friction).unwrap();
+            let options = Options { start: Some(vec![x, 0.0]), rtol: 1e-12, ..at(17.0) };
+            follow(&m, &options, &mut |_| true).unwrap().x
+        };
+        let found = sensitivities(&model(text), &Options { rtol: 1e-12, ..at(17.0) }, &["friction"]).unwrap();
+        let d = 1e-4;
+        let by_x: Vec<f64> =
+            end(0.5 + d, 1.0).iter().zip(end(0.5 - d, 1.0)).map(|(a, b)| (a - b) / (2.0 * d)).collect();
+        let by_f: Vec<f64> =
+            end(0.5, 1.0 + d).iter().zip(end(0.5, 1.0 - d)).map(|(a, b)| (a - b) / (2.0 * d)).collect();
+        assert!(by_f.iter().any(|v| v.abs() > 1e-3));
+        for i in 0..2 {
+            assert!((found.by_start[i][0] - by_x[i]).abs() < 1e-5, "{:?} {by_x:?}", found.by_start);
+            assert!((found.by_parameter[i][0] - by_f[i]).abs() < 1e-5, "{:?} {by_f:?}", found.by_parameter);
+        }
+    }
+
+    /// Two blocks that hold independently, each at its own belt: what is normal to both surfaces goes, what is along them stays.
+    #[test]
+    fn a_start_in_sliding_is_projected_to_the_surfaces() {
+        let text = r#"
+            states = ["x", "y", "z"]
+            start = [0, 0.5, 1]
+            f = ["c - 2*sign(x)", "-3*sign(y - p)", "x + y"]
+            [parameters]
+            c = 0.5
+            p = 0.5
+        "#;
+        let found = sensitivities(&model(text), &at(2.0), &["p", "c"]).unwrap();
+        for (i, want) in [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]].iter().enumerate() {
+            assert!(found.by_start[i].iter().zip(want).all(|(a, b)| (a - b).abs() < 1e-12), "{:?}", found.by_start);
+        }
+        assert_eq!(found.by_parameter, [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]);
+        // One surface that is not a coordinate's: the same for both of its sides.
+        let oblique = "states = ['x', 'y']\nstart = [1, -1]\nf = ['1 - 2*sign(x + y)', '-sign(x + y)']";
+        let found = sensitivities(&model(oblique), &at(1.0), &[]).unwrap();
+        let back = |side: f64| {
+            let options = Options { start: Some(vec![1.0 + side, -1.0]), ..at(1.0) };
+            follow(&model(oblique), &options, &mut |_| true).unwrap().x
+        };
+        for side in [1e-3, -1e-3] {
+            let (moved, x) = (back(side), back(0.0));
+            for i in 0..2 {
+                assert!((found.by_start[i][0] - (moved[i] - x[i]) / side).abs() < 1e-9, "{:?}", found.by_start);
+            }
+        }
+    }
+
+    #[test]
+    fn what_has_no_derivative_is_said() {
+        let says = |text: &str, options: &Options, by: &[&str], expected: &str| {
+            let error = sensitivities(&model(text), options, by).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        };
+        says(BALL, &at(1.5), &["q"], "no parameter `q`; the system has g, r, twice");
+        says(BALL, &at(1.5), &["g", "g"], "named twice");
+        let timed =
+            "states = ['x']\nstart = [1]\nf = ['-x']\n[parameters]\np = 1\n[[event]]\nevery = 'p'\nset = { x = '2*x' }";
+        says(timed, &at(1.5), &["p"], "a parameter that sets the times of events has none");
+        let stops = "states = ['x']\nstart = [1]\nf = ['-1']\n[[event]]\nwhen = 'x'\nstop = true";
+        says(stops, &at(3.0), &[], "before --t-end: give a time before it");
+        let corner = "states = ['x', 'y']\nstart = [-1, -1]\nf = ['1 + 0.5*sign(x)', '1 + 0.5*sign(y)']";
+        says(corner, &at(3.0), &[], "two surfaces are met at one moment");
+    }
+}
