@@ -58,6 +58,7 @@ pub mod record;
 pub mod recording;
 pub mod rest;
 pub mod run;
+pub mod scan;
 mod shortest;
 pub mod simulate;
 pub mod spec;

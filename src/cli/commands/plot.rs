@@ -224,13 +224,7 @@ fn draw_general(arguments: &Arguments, mut run: GeneralRun, format: Format) -> R
     try_delivery(Some(&arguments.out))?;
     let progress = Progress::new(arguments.quiet);
     let answer = Executor::new(None, &progress).ask(&run)?;
-    let mut small_print = vec![format!(
-        "*t* = {} … {}, event-driven, {}, rtol {}",
-        number(run.options.t_start),
-        number(run.options.t_end),
-        run.options.method.name(),
-        number(run.options.rtol)
-    )];
+    let mut small_print = vec![general_small_print(&run)];
     if answer.stop == Stop::Interrupted {
         small_print.push("an interrupted run: this is what was computed until then".into());
     }
@@ -245,6 +239,13 @@ fn draw_general(arguments: &Arguments, mut run: GeneralRun, format: Format) -> R
     sheet.searchable_svg = arguments.searchable;
     write(&sheet, &arguments.out, format)?;
     Ok(Exit::Fine)
+}
+
+/// The run of a general system in words.
+pub(super) fn general_small_print(run: &GeneralRun) -> String {
+    let o = &run.options;
+    let (from, to, rtol) = (number(o.t_start), number(o.t_end), number(o.rtol));
+    format!("*t* = {from} … {to}, event-driven, {}, rtol {rtol}", o.method.name())
 }
 
 /// The run in words. The system's title, which stands above the picture, is not said again.

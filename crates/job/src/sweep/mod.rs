@@ -42,6 +42,7 @@ mod rows;
 use serde::{Deserialize, Serialize};
 
 pub use axis::{Axis, AxisError, Coordinate, FORMS, Values};
+pub(crate) use outcome::word_of;
 pub use outcome::{Ending, Outcome, OutcomeQuestion};
 pub use rows::{Row, Rows, RowsError};
 
@@ -155,6 +156,19 @@ impl std::str::FromStr for Shard {
     }
 }
 
+/// The settings of a row, axis by axis, the last axis running fastest; random axes by a draw from [0, 1) each.
+pub(crate) fn grid(over: &[Axis], row: u64, draws: &[f64]) -> Vec<Entry> {
+    let mut rest = row % over.iter().map(Axis::count).product::<u64>();
+    let one = |(axis, u): (&Axis, &f64)| {
+        let i = rest % axis.count();
+        rest /= axis.count();
+        axis.value(i, *u)
+    };
+    let mut settings: Vec<Entry> = over.iter().zip(draws).rev().map(one).collect();
+    settings.reverse();
+    settings
+}
+
 impl Sweep {
     /// The sweep of `run` over these axes.
     ///
@@ -235,24 +249,11 @@ impl Sweep {
 
     /// The settings of a row, axis by axis.
     pub fn settings(&self, row: u64) -> Vec<Entry> {
-        let mut rest = row % self.cells();
         let mut random = RandomStream::new(self.random.map_or(0, |r| r.seed) ^ DRAWS, row);
         // Drawn in the order of the axes, whatever the grid.
         let draws: Vec<f64> =
             self.over.iter().map(|axis| if axis.is_random() { random.uniform() } else { 0.0 }).collect();
-        let mut settings: Vec<Entry> = self
-            .over
-            .iter()
-            .zip(draws)
-            .rev()
-            .map(|(axis, u)| {
-                let i = rest % axis.count();
-                rest /= axis.count();
-                axis.value(i, u)
-            })
-            .collect();
-        settings.reverse();
-        settings
+        grid(&self.over, row, &draws)
     }
 
     /// The question of a row.

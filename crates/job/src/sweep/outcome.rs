@@ -69,19 +69,19 @@ impl Ending {
         let place = cycle.map_or(Vec::new(), |c| c.points.iter().take(c.period).map(|p| p.u.to_vec()).collect());
         Ok(Self { outcome: Outcome::of(evidence, answer)?, place })
     }
+}
 
-    /// Whether this is where the other run ends, too: places count as one that are within `near` of each other.
-    pub fn is_like(&self, other: &Self, near: f64) -> bool {
-        let (a, b) = (&self.place, &other.place);
-        let n = a.len();
-        let alike = |i: usize, j: usize| {
-            let square = a[i].iter().zip(&b[j]).map(|(x, y)| (x - y) * (x - y)).sum::<f64>();
-            square <= near * near
-        };
-        // The same turn may be cut at another crossing.
-        self.outcome.word == other.outcome.word
-            && n == b.len()
-            && (n == 0 || (0..n).any(|s| (0..n).all(|i| alike(i, (i + s) % n))))
+/// A verdict as an outcome's word.
+pub(crate) fn word_of(verdict: &Verdict) -> String {
+    match verdict {
+        Verdict::Spiralling(c) if c.approach.is_some_and(|r| r.per_time < 0.0) => {
+            format!("leaving-period-{}", c.period)
+        }
+        Verdict::Periodic(c) | Verdict::Spiralling(c) => format!("period-{}", c.period),
+        Verdict::QuasiPeriodic(_) => "quasi-periodic".to_owned(),
+        Verdict::Chaotic { .. } => "irregular".to_owned(),
+        Verdict::Noisy { around: Some(c), .. } => format!("noisy-around-period-{}", c.period),
+        other => other.name().to_owned(),
     }
 }
 
@@ -93,18 +93,8 @@ impl Outcome {
     fn of(evidence: &Evidence, answer: &Answer) -> Result<Self, JobError> {
         let cycle = evidence.verdict.cycle();
         let approach = cycle.and_then(|c| c.approach);
-        let word = match &evidence.verdict {
-            Verdict::Spiralling(c) if approach.is_some_and(|r| r.per_time < 0.0) => {
-                format!("leaving-period-{}", c.period)
-            }
-            Verdict::Periodic(c) | Verdict::Spiralling(c) => format!("period-{}", c.period),
-            Verdict::QuasiPeriodic(_) => "quasi-periodic".to_owned(),
-            Verdict::Chaotic { .. } => "irregular".to_owned(),
-            Verdict::Noisy { around: Some(c), .. } => format!("noisy-around-period-{}", c.period),
-            other => other.name().to_owned(),
-        };
         Ok(Self {
-            word,
+            word: word_of(&evidence.verdict),
             period: cycle.map_or(0, |c| c.period as u64),
             captured_at: cycle.map(|c| c.captured_at),
             settled_at: cycle.and_then(|c| c.settled_at),

@@ -1,5 +1,6 @@
 //! Pictures of scans: an orbit diagram over one parameter, a map of endings over two.
 
+use twofold_job::scan::Basin;
 use twofold_num::elementary::{pow, sqrt};
 use twofold_render::markup;
 use twofold_render::sheet::{Axis, Colour, ColumnWidth, DotStyle, LegendEntry, LegendKey, PlanePanel, Sheet, range_of};
@@ -50,25 +51,26 @@ impl Scanned {
     }
 }
 
-/// An orbit diagram: the late passages of each run above its parameter's value.
-pub fn diagram(title: &str, over: &Scanned, ordinate: &str, points: Vec<[f64; 2]>) -> Sheet {
+/// An orbit diagram: the late passages of each run above its parameter's value. Of two series with names the first lies behind the second.
+pub fn diagram(title: &str, over: &Scanned, ordinate: &str, series: Vec<(&str, Vec<[f64; 2]>)>) -> Sheet {
     let x = over.covered();
-    let y = Axis::covering(ordinate, points.iter().map(|p| p[1]));
-    let panel = PlanePanel::new(x, y).dots(points, DotStyle { density: false, ..DotStyle::late() });
-    Sheet::new(ColumnWidth::Wide, 1, "orbit diagram")
-        .title(markup::literal(title))
-        .panel_aspect(0.55)
-        .panel("", "", panel)
-}
-
-/// An ending's place in the legend, and where it occurs (row, column).
-pub struct Basin {
-    /// Its name as plain text.
-    pub name: String,
-    /// Whether it is an attractor; else it is drawn in grey.
-    pub attracts: bool,
-    /// Its cells, as (column, row).
-    pub cells: Vec<(usize, usize)>,
+    let y = Axis::covering(ordinate, series.iter().flat_map(|(_, points)| points).map(|p| p[1]));
+    let mut panel = PlanePanel::new(x, y);
+    let mut sheet = Sheet::new(ColumnWidth::Wide, 1, "orbit diagram").title(markup::literal(title)).panel_aspect(0.55);
+    // Where both lie on each other the first is seen around the second.
+    let looks = if series.len() == 1 {
+        [(style::INK, None); 2]
+    } else {
+        [(style::SERIES[0], Some(2.2)), (style::INK, Some(1.0))]
+    };
+    for ((name, points), (colour, diameter)) in series.into_iter().zip(looks) {
+        let dots = DotStyle { colour, diameter, density: false };
+        panel = panel.dots(points, dots);
+        if !name.is_empty() {
+            sheet = sheet.legend(LegendEntry::new(LegendKey::Dots(dots), name));
+        }
+    }
+    sheet.panel("", "", panel)
 }
 
 /// A map of endings over a grid of two settings.
@@ -142,7 +144,7 @@ mod tests {
     #[test]
     fn a_diagram_shows_all_that_was_scanned() {
         let x = |over: &Scanned| {
-            let sheet = diagram("", over, "", vec![[10.0, 1.0], [10.0, 2.0]]);
+            let sheet = diagram("", over, "", vec![("", vec![[10.0, 1.0], [10.0, 2.0]])]);
             let Content::Plane(panel) = &sheet.panels[0].content else { panic!("no plane") };
             panel.x.clone()
         };

@@ -1,0 +1,578 @@
+//! Scans: the late crossings of a run for each value of one setting, or what it ends on over a grid of two.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use twofold_analyse::attractor::{self, SectionPoint, Thresholds};
+use twofold_hybrid::motion::Record;
+use twofold_hybrid::{Ending as Outcome, HybridError, Options, follow_watched};
+use twofold_integrate::Watch;
+use twofold_system::Expression;
+
+use super::executor::{Executor, JobWatch, Progress};
+use super::general::GeneralRun;
+use super::question::JobError;
+use super::run::Run;
+use super::sweep::{self, Axis, Coordinate, Sweep};
+use super::table::{Column, Entry, Table};
+use super::{Answer, Stop};
+
+/// What is varied.
+#[derive(Clone, Debug)]
+pub enum Subject {
+    /// A system with h, plus and minus.
+    Surfaces(Box<Sweep>),
+    /// A general system; its record is a section, or its states at the multiples of a time.
+    General(Box<GeneralRun>, Vec<Axis>),
+}
+
+/// Each run begins where that of the neighbouring value ended, so that an attractor is followed for as long as it attracts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Follow {
+    /// From the lowest value to the highest.
+    Up,
+    /// From the highest to the lowest.
+    Down,
+    /// Both, one after the other: where they differ, two attractors stand side by side.
+    Both,
+}
+
+/// A scan.
+#[derive(Clone, Debug)]
+pub struct Scan {
+    subject: Subject,
+    follow: Option<Follow>,
+    alike: f64,
+}
+
+/// An ending and where it occurs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Basin {
+    /// Its name as plain text.
+    pub name: String,
+    /// Whether it is an attractor.
+    pub attracts: bool,
+    /// Its cells, as (column, row).
+    pub cells: Vec<(usize, usize)>,
+}
+
+/// What a scan found.
+#[derive(Debug)]
+pub struct Scanned {
+    /// Over one setting `passages`, a row a crossing; over two `endings`, a row a run.
+    pub table: Table,
+    /// Over two settings: the endings in the order of their first occurrence.
+    pub basins: Vec<Basin>,
+    /// Finished runs: fewer than [`Scan::runs`] if the scan was stopped.
+    pub finished: u64,
+    /// Those that failed.
+    pub failed: u64,
+    /// Why the first of them did.
+    pub first_error: Option<JobError>,
+}
+
+/// Most runs of a scan: their rows are kept in memory.
+pub const MOST_RUNS: u64 = 1_000_000;
+
+/// What a run ends on, and where that is.
+#[derive(Clone, Debug, PartialEq)]
+struct Landing {
+    word: String,
+    place: Vec<Vec<f64>>,
+}
+
+/// What is kept of a run.
+struct Found {
+    settings: Vec<Entry>,
+    /// Late crossings: time and state.
+    late: Vec<(f64, Vec<f64>)>,
+    /// Over two settings.
+    landing: Option<Landing>,
+    /// Where the run ended: state and mode.
+    end: Option<(Vec<f64>, usize)>,
+}
+
+type Cell = Option<(Vec<Entry>, Result<Found, JobError>)>;
+
+/// Stops single runs when the scan is to stop.
+struct Asked<'a> {
+    watch: &'a dyn Watch,
+    finished: &'a AtomicU64,
+}
+
+impl Watch for Asked<'_> {
+    fn reached(&self, _: f64) -> bool {
+        self.watch.reached(self.finished.load(Ordering::Relaxed) as f64)
+    }
+}
+
+impl JobWatch for Asked<'_> {
+    fn done(self: Box<Self>, _: &str) {}
+}
+
+impl Progress for Asked<'_> {
+    fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn JobWatch + 'a> {
+        Box::new(Asked { ..*self })
+    }
+}
+
+impl Landing {
+    /// Whether this is where the other run ends, too: places count as one that are within `near` of each other.
+    fn is_like(&self, other: &Self, near: f64) -> bool {
+        let (a, b) = (&self.place, &other.place);
+        let n = a.len();
+        let alike = |i: usize, j: usize| {
+            let square = a[i].iter().zip(&b[j]).map(|(x, y)| (x - y) * (x - y)).sum::<f64>();
+            square <= near * near
+        };
+        // The same turn may be cut at another crossing.
+        self.word == other.word && n == b.len() && (n == 0 || (0..n).any(|s| (0..n).all(|i| alike(i, (i + s) % n))))
+    }
+}
+
+impl Scan {
+    /// A scan over the axes of `subject`; `alike`: attractors this near, as a share of the largest number in any start or attractor, are one.
+    ///
+    /// # Errors
+    /// What does not go together, in words.
+    pub fn new(subject: Subject, follow: Option<Follow>, alike: f64) -> Result<Self, String> {
+        let scan = Self { subject, follow, alike };
+        let axes = scan.axes();
+        if axes.iter().any(Axis::is_random) {
+            return Err(
+                "FROM..TO without a count is drawn at random, which `twofold sweep` does; give FROM..TO:COUNT".into()
+            );
+        }
+        if let Subject::General(run, axes) = &scan.subject {
+            for (i, axis) in axes.iter().enumerate() {
+                axis.validate().map_err(|e| e.to_string())?;
+                if axes[..i].iter().any(|other| other.coordinate == axis.coordinate) {
+                    return Err(format!("{} is given twice", axis.coordinate));
+                }
+                apply(run, &axis.coordinate, &axis.value(0, 0.5)).map(drop)?;
+            }
+        }
+        if follow.is_some() {
+            if axes.len() != 1 {
+                return Err("an attractor is followed along one setting; give --over once".into());
+            }
+            if matches!(axes[0].coordinate, Coordinate::Start(_) | Coordinate::Shift(_)) {
+                return Err(
+                    "what is followed begins where the run before ended; vary something other than the start".into()
+                );
+            }
+            if !matches!(axes[0].value(0, 0.5), Entry::Number(_) | Entry::Integer(_)) {
+                return Err("an attractor is followed along numbers".into());
+            }
+        }
+        let runs = scan.cells().saturating_mul(if follow == Some(Follow::Both) { 2 } else { 1 });
+        if runs > MOST_RUNS {
+            return Err(format!("{runs} runs; give at most {MOST_RUNS}, or use `twofold sweep`"));
+        }
+        Ok(scan)
+    }
+
+    /// What is varied.
+    pub fn axes(&self) -> &[Axis] {
+        match &self.subject {
+            Subject::Surfaces(sweep) => sweep.axes(),
+            Subject::General(_, axes) => axes,
+        }
+    }
+
+    /// Over one setting, each value once.
+    fn cells(&self) -> u64 {
+        self.axes().iter().map(Axis::count).product()
+    }
+
+    /// How many runs there are.
+    pub fn runs(&self) -> u64 {
+        self.cells() * if self.follow == Some(Follow::Both) { 2 } else { 1 }
+    }
+
+    /// Whether two settings vary.
+    pub fn is_map(&self) -> bool {
+        self.axes().len() == 2
+    }
+
+    /// Which way attractors are followed.
+    pub fn follow(&self) -> Option<Follow> {
+        self.follow
+    }
+
+    /// The states' names.
+    pub fn states(&self) -> Vec<&str> {
+        match &self.subject {
+            Subject::Surfaces(sweep) => sweep.run().system.coordinates(),
+            Subject::General(run, _) => run.model.coordinates(),
+        }
+    }
+
+    /// What a file of this scan says about itself.
+    pub fn about(&self) -> Value {
+        let run = match &self.subject {
+            Subject::Surfaces(sweep) => json!(sweep.run()),
+            Subject::General(run, _) => run.json(),
+        };
+        let mut about =
+            json!({ "kind": "scan", "run": run, "over": self.axes(), "alike": self.is_map().then_some(self.alike) });
+        if let Some(follow) = self.follow {
+            about["follow"] = json!(follow);
+        }
+        about
+    }
+
+    /// Makes the runs, side by side on the current pool as far as none begins where another ends. `watch` is told how many are finished and says
+    /// whether to go on.
+    pub fn compute(&self, watch: &dyn Watch) -> Scanned {
+        let finished = AtomicU64::new(0);
+        let asked = Asked { watch, finished: &finished };
+        let count = |found: &Cell| {
+            if found.is_some() {
+                finished.fetch_add(1, Ordering::Relaxed);
+                asked.reached(0.0);
+            }
+        };
+        let cells: Vec<(Option<&str>, Cell)> = match self.follow {
+            None => (0..self.cells())
+                .into_par_iter()
+                .map(|row| {
+                    let cell = self.cell(row, None, &asked);
+                    count(&cell);
+                    (None, cell)
+                })
+                .collect(),
+            Some(follow) => {
+                let mut up: Vec<u64> = (0..self.cells()).collect();
+                up.sort_by(|a, b| self.settings(*a)[0].value().total_cmp(&self.settings(*b)[0].value()));
+                let down: Vec<u64> = up.iter().rev().copied().collect();
+                let along = |rows: &[u64], word: &'static str| {
+                    let mut before = None;
+                    let mut cells = Vec::with_capacity(rows.len());
+                    for row in rows {
+                        let cell = self.cell(*row, before.as_ref(), &asked);
+                        count(&cell);
+                        // A run that fails, or is ended by an event, hands nothing on: the next one begins at the start.
+                        before = cell.as_ref().and_then(|(_, found)| found.as_ref().ok()?.end.clone());
+                        let stopped = cell.is_none();
+                        cells.push((Some(word), cell));
+                        if stopped {
+                            break;
+                        }
+                    }
+                    cells
+                };
+                match follow {
+                    Follow::Up => along(&up, "up"),
+                    Follow::Down => along(&down, "down"),
+                    Follow::Both => {
+                        let (mut all, down) = rayon::join(|| along(&up, "up"), || along(&down, "down"));
+                        all.extend(down);
+                        all
+                    }
+                }
+            }
+        };
+        let errors = || cells.iter().filter_map(|(_, c)| c.as_ref()?.1.as_ref().err());
+        let (failed, first_error) = (errors().count() as u64, errors().next().cloned());
+        let (table, basins) = if self.is_map() { self.endings(&cells) } else { (self.passages(&cells), Vec::new()) };
+        Scanned { table, basins, finished: finished.into_inner(), failed, first_error }
+    }
+
+    fn settings(&self, row: u64) -> Vec<Entry> {
+        match &self.subject {
+            Subject::Surfaces(sweep) => sweep.settings(row),
+            Subject::General(_, axes) => sweep::grid(axes, row, &vec![0.0; axes.len()]),
+        }
+    }
+
+    /// One run, or nothing if it was stopped.
+    fn cell(&self, row: u64, from: Option<&(Vec<f64>, usize)>, asked: &Asked<'_>) -> Cell {
+        let settings = self.settings(row);
+        let found = match &self.subject {
+            Subject::Surfaces(sweep) => self.of_surfaces(sweep, row, from, asked),
+            Subject::General(run, axes) => self.of_general(run, axes, &settings, from, asked),
+        };
+        match found {
+            Err(JobError::Interrupted) => None,
+            found => Some((settings.clone(), found.map(|found| Found { settings, ..found }))),
+        }
+    }
+
+    fn of_surfaces(
+        &self,
+        sweep: &Sweep,
+        row: u64,
+        from: Option<&(Vec<f64>, usize)>,
+        asked: &Asked<'_>,
+    ) -> Result<Found, JobError> {
+        let mut question = sweep.question(row).map_err(JobError::Other)?;
+        let none = Found { settings: Vec::new(), late: Vec::new(), landing: None, end: None };
+        let executor = Executor::new(None, asked);
+        if self.is_map() {
+            let ending = question.ending(&executor, asked)?;
+            return Ok(Found { landing: Some(Landing { word: ending.outcome.word, place: ending.place }), ..none });
+        }
+        let run = &mut question.0.run;
+        if let Some((state, _)) = from {
+            // A hysteretic switch has a state of its own behind the system's.
+            run.start = state[..run.start.len()].to_vec();
+        }
+        let answer = executor.ask(&Run(run.clone()))?;
+        if answer.stop == Stop::Interrupted {
+            return Err(JobError::Interrupted);
+        }
+        let late = late(run.t_end, &run.system.coordinates(), &answer)
+            .ok_or_else(|| JobError::Other("no section was recorded".into()))?;
+        let end = self.follow.map(|_| answer.fact("state")).transpose()?.map(|state| (state, 0));
+        Ok(Found { late, end, ..none })
+    }
+
+    fn of_general(
+        &self,
+        run: &GeneralRun,
+        axes: &[Axis],
+        settings: &[Entry],
+        from: Option<&(Vec<f64>, usize)>,
+        asked: &Asked<'_>,
+    ) -> Result<Found, JobError> {
+        let mut run = run.clone();
+        // A shift is added to a start, so it comes after it.
+        let is_shift = |axis: &Axis| matches!(axis.coordinate, Coordinate::Shift(_));
+        let pairs = || axes.iter().zip(settings);
+        for (axis, value) in pairs().filter(|p| !is_shift(p.0)).chain(pairs().filter(|p| is_shift(p.0))) {
+            run = apply(&run, &axis.coordinate, value).map_err(JobError::Other)?;
+        }
+        run.model.values().map_err(|e| JobError::Other(e.to_string()))?;
+        if let Some((state, mode)) = from {
+            (run.options.start, run.options.mode) = (Some(state.clone()), *mode);
+        }
+        let options = &run.options;
+        let middle = 0.5 * (options.t_start + options.t_end);
+        let strobed = matches!(options.record, Record::Times { .. });
+        let plane = plane(&run);
+        let (mut late, mut section) = (Vec::new(), Vec::new());
+        let mut observe = |point: &twofold_hybrid::Point<'_>| {
+            let upward = strobed || point.direction > Some(0.0);
+            if self.is_map() {
+                let u = plane.map(|i| i.map_or(0.0, |i| point.x[i]));
+                section.push(SectionPoint { t: point.t, u, upward });
+            } else if upward && point.t > middle {
+                late.push((point.t, point.x.to_vec()));
+            }
+            true
+        };
+        let outcome = follow_watched(&run.model, options, &mut observe, &|t| asked.reached(t))?;
+        if outcome.ending == Outcome::Interrupted {
+            return Err(JobError::Interrupted);
+        }
+        let landing = match &outcome.ending {
+            _ if !self.is_map() => None,
+            Outcome::Stopped(event) => Some(Landing { word: format!("stopped by {event}"), place: Vec::new() }),
+            Outcome::Zeno { event, .. } => Some(Landing { word: format!("{event} accumulates"), place: Vec::new() }),
+            _ => Some(match rests_at(&run, &outcome.x, outcome.mode, asked)? {
+                Some(place) => Landing { word: "rest".into(), place: vec![place] },
+                None => settles_on(&section, options, strobed),
+            }),
+        };
+        let end = (outcome.ending == Outcome::Finished).then_some((outcome.x, outcome.mode));
+        Ok(Found { settings: Vec::new(), late, landing, end })
+    }
+
+    /// Columns of the settings.
+    fn columns(&self) -> Vec<Column> {
+        let column = |axis: &Axis| {
+            let name = axis.coordinate.to_string();
+            match axis.value(0, 0.5) {
+                Entry::Number(_) => Column::numbers(&name),
+                Entry::Integer(_) => Column::integers(&name),
+                Entry::Word(_) => Column::words(&name),
+            }
+        };
+        self.axes().iter().map(column).collect()
+    }
+
+    fn passages(&self, cells: &[(Option<&str>, Cell)]) -> Table {
+        let mut columns = self.columns();
+        columns.extend(self.follow.map(|_| Column::words("follow")));
+        columns.push(Column::numbers("t"));
+        columns.extend(self.states().iter().map(|n| Column::numbers(n)));
+        let mut table = Table::new("passages", columns);
+        for (word, cell) in cells {
+            let Some((_, Ok(found))) = cell else { continue };
+            for (t, x) in &found.late {
+                let follow = word.map(|w| Entry::Word(w.to_owned()));
+                let numbers = [*t].into_iter().chain(x.iter().copied()).map(Entry::Number);
+                table.push(found.settings.iter().cloned().chain(follow).chain(numbers));
+            }
+        }
+        table
+    }
+
+    /// A row per run, and the endings in order of their first occurrence.
+    fn endings(&self, cells: &[(Option<&str>, Cell)]) -> (Table, Vec<Basin>) {
+        let mut columns = self.columns();
+        columns.extend([Column::words("ending"), Column::integers("number"), Column::words("reason")]);
+        let mut table = Table::new("endings", columns);
+        let mut known: Vec<(Landing, Basin)> = Vec::new();
+        let mut failed = Basin { name: "failed".into(), attracts: false, cells: Vec::new() };
+        let cells: Vec<&(Vec<Entry>, Result<Found, JobError>)> = cells.iter().filter_map(|(_, c)| c.as_ref()).collect();
+        let landing = |cell: &(Vec<Entry>, Result<Found, JobError>)| cell.1.as_ref().ok()?.landing.clone();
+        let places = cells.iter().filter_map(|c| landing(c)).flat_map(|l| l.place.into_iter().flatten());
+        let given = cells
+            .iter()
+            .flat_map(|c| self.axes().iter().zip(&c.0))
+            .filter_map(|(axis, entry)| matches!(axis.coordinate, Coordinate::Start(_)).then(|| entry.value()));
+        let start = match &self.subject {
+            Subject::Surfaces(sweep) => sweep.run().start.clone(),
+            Subject::General(run, _) => {
+                run.options.start.clone().or_else(|| run.model.start().ok().flatten()).unwrap_or_default()
+            }
+        };
+        let near = self.alike * places.chain(start.into_iter().chain(given)).fold(0.0_f64, |a, x| a.max(x.abs()));
+        let height = self.axes().get(1).map_or(1, Axis::count).max(1) as usize;
+        for (row, cell) in cells.iter().enumerate() {
+            let at = (row / height, row % height);
+            let (word, number, reason) = match (&cell.1, landing(cell)) {
+                (Ok(_), Some(landing)) => {
+                    let index = known.iter().position(|(e, _)| e.is_like(&landing, near)).unwrap_or_else(|| {
+                        let attracts = !landing.place.is_empty();
+                        let basin = Basin { name: landing.word.clone(), attracts, cells: Vec::new() };
+                        known.push((landing.clone(), basin));
+                        known.len() - 1
+                    });
+                    known[index].1.cells.push(at);
+                    (landing.word, index as i64 + 1, String::new())
+                }
+                (Ok(_), None) => continue,
+                (Err(error), _) => {
+                    failed.cells.push(at);
+                    ("failed".to_owned(), 0, error.to_string())
+                }
+            };
+            let more = [Entry::Word(word), Entry::Integer(number), Entry::Word(reason)];
+            table.push(cell.0.iter().cloned().chain(more));
+        }
+        let words: Vec<String> = known.iter().map(|(landing, _)| landing.word.clone()).collect();
+        let mut basins: Vec<Basin> = known.into_iter().map(|(_, basin)| basin).collect();
+        // Two attractors may have one word; the rows tell them apart by their numbers.
+        for (i, basin) in basins.iter_mut().enumerate() {
+            if words.iter().filter(|word| **word == words[i]).count() > 1 {
+                basin.name = format!("{}, no. {}", words[i], i + 1);
+            }
+        }
+        if !failed.cells.is_empty() {
+            basins.push(failed);
+        }
+        (table, basins)
+    }
+}
+
+/// Upward crossings of the late half.
+fn late(t_end: f64, states: &[&str], answer: &Answer) -> Option<Vec<(f64, Vec<f64>)>> {
+    let section = answer.table("section")?;
+    let columns: Vec<&[f64]> = states.iter().map(|n| section.numbers(n)).collect();
+    let t = section.numbers("t");
+    let upward = section.words("direction").enumerate().filter(|(row, w)| *w == "up" && t[*row] > 0.5 * t_end);
+    Some(upward.map(|(row, _)| (t[row], columns.iter().map(|c| c[row]).collect())).collect())
+}
+
+/// The run with this value, or why it would have no effect.
+fn apply(run: &GeneralRun, coordinate: &Coordinate, value: &Entry) -> Result<GeneralRun, String> {
+    let number = value.value();
+    let mut run = run.clone();
+    let states = run.model.coordinates();
+    let component = |name: &str| {
+        let place = states.iter().position(|s| *s == name);
+        place.ok_or_else(|| format!("the system has no state {name}; it has {}", states.join(", ")))
+    };
+    let start = |run: &GeneralRun| -> Result<Vec<f64>, String> {
+        let given =
+            run.options.start.clone().map_or_else(|| run.model.start().map_err(|e| e.to_string()), |s| Ok(Some(s)));
+        given?.ok_or_else(|| "the file has no start; give --start".to_owned())
+    };
+    match coordinate {
+        Coordinate::Parameter(name) => run.model = run.model.with(name, number).map_err(|e| e.to_string())?,
+        Coordinate::Start(name) | Coordinate::Shift(name) => {
+            let i = component(name)?;
+            let mut x = start(&run)?;
+            x[i] = if matches!(coordinate, Coordinate::Start(_)) { number } else { x[i] + number };
+            run.options.start = Some(x);
+        }
+        Coordinate::Rtol => run.options.rtol = number,
+        Coordinate::Atol => run.options.atol = Some(number),
+        Coordinate::Tolerance => (run.options.rtol, run.options.atol) = (number, Some(number)),
+        Coordinate::MaxStep => run.options.max_step = number,
+        Coordinate::TEnd => run.options.t_end = number,
+        other => {
+            return Err(format!(
+                "{other} belongs to systems with h, plus and minus; of a general system vary params.NAME, start.NAME, shift.NAME, rtol, atol, tolerance, max-step or t-end"
+            ));
+        }
+    }
+    Ok(run)
+}
+
+/// The two states in which crossings are compared: the first that the section does not fix.
+fn plane(run: &GeneralRun) -> [Option<usize>; 2] {
+    let names = run.model.coordinates();
+    let fixed = match &run.options.record {
+        Record::Section(Expression::Sub(a, b)) => names.iter().position(|n| {
+            [(a, b), (b, a)]
+                .iter()
+                .any(|(one, other)| one.to_string() == *n && matches!(***other, Expression::Number(_)))
+        }),
+        _ => None,
+    };
+    let mut free = (0..names.len()).filter(|i| Some(*i) != fixed);
+    [free.next(), free.next()]
+}
+
+/// The state at the end, if the motion rests there: over a further twentieth of the run it moves by less than 1e-6 of the size of its states.
+fn rests_at(run: &GeneralRun, x: &[f64], mode: usize, asked: &Asked<'_>) -> Result<Option<Vec<f64>>, JobError> {
+    if run.model.depends_on_time() {
+        return Ok(None);
+    }
+    let Options { t_start, t_end, .. } = run.options;
+    let more = Options {
+        t_start: t_end,
+        t_end: t_end + 0.05 * (t_end - t_start),
+        start: Some(x.to_vec()),
+        mode,
+        record: Record::Times { every: f64::INFINITY },
+        ..run.options.clone()
+    };
+    let size = run.options.start.iter().flatten().chain(x).fold(0.0_f64, |a, v| a.max(v.abs()));
+    let mut moved = 0.0_f64;
+    let mut observe = |point: &twofold_hybrid::Point<'_>| {
+        moved = point.x.iter().zip(x).fold(moved, |a, (p, q)| a.max((p - q).abs()));
+        true
+    };
+    match follow_watched(&run.model, &more, &mut observe, &|t| asked.reached(t)) {
+        Ok(outcome) if outcome.ending == Outcome::Interrupted => Err(JobError::Interrupted),
+        Ok(outcome) => {
+            let moved = outcome.x.iter().zip(x).fold(moved, |a, (p, q)| a.max((p - q).abs()));
+            Ok((outcome.ending == Outcome::Finished && moved <= 1e-6 * size.max(f64::MIN_POSITIVE)).then(|| x.to_vec()))
+        }
+        Err(HybridError::Equation(e)) => Err(HybridError::Equation(e).into()),
+        // Where motion cannot go on it does not rest.
+        Err(_) => Ok(None),
+    }
+}
+
+/// What the section of a run says.
+fn settles_on(section: &[SectionPoint], options: &Options, strobed: bool) -> Landing {
+    let question = attractor::Question {
+        t_end: (!strobed).then_some(options.t_end),
+        shown_from: 0.5 * (options.t_start + options.t_end),
+        ..attractor::Question::default()
+    };
+    let evidence = attractor::classify(section, &question, &Thresholds::default());
+    let word = sweep::word_of(&evidence.verdict);
+    let place =
+        evidence.verdict.cycle().map_or(Vec::new(), |c| c.points.iter().take(c.period).map(|p| p.u.to_vec()).collect());
+    Landing { word, place }
+}
