@@ -8,12 +8,16 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use rayon::prelude::*;
 use serde_json::{Value, json};
+use twofold::cli::CliError;
+use twofold::cli::asked::{Asked, asked};
+use twofold::integrate::Watch;
 use twofold::integrate::filippov::ExitRule;
 use twofold::job::question::question_hash;
 use twofold::job::spec::{RunSpec, SwitchSpec};
 use twofold::job::sweep::{Axis, Draws, Outcome, OutcomeQuestion, Rows, Shard, Sweep};
 use twofold::job::table::Cells;
 use twofold::job::{Answer, Classification, Executor, JobError, Question, Run, Stop, Table, encode};
+use twofold::record::Hash;
 
 use crate::errors;
 use crate::supervise::{Work, supervise};
@@ -72,6 +76,69 @@ pub fn arrays(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
         }
     }
     Ok(columns)
+}
+
+/// An answer: facts as JSON, tables as arrays.
+pub fn handed<'py>(py: Python<'py>, hash: &str, facts: &Value, tables: Vec<Table>) -> PyResult<Bound<'py, PyDict>> {
+    let result = PyDict::new(py);
+    result.set_item("hash", hash)?;
+    result.set_item("facts", facts.to_string())?;
+    let named = PyDict::new(py);
+    for table in tables {
+        let name = table.name.clone();
+        named.set_item(name, arrays(py, table)?)?;
+    }
+    result.set_item("tables", named)?;
+    Ok(result)
+}
+
+/// What a command with these flags computes.
+#[pyfunction]
+#[pyo3(signature = (command, flags, threads, show=None))]
+pub fn ask<'py>(
+    py: Python<'py>,
+    command: &str,
+    flags: Vec<String>,
+    threads: usize,
+    show: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let wrong = |e: CliError| errors::SpecError::new_err((e.to_string(), "flags"));
+    let (hash, facts, tables) = match asked(command, flags).map_err(wrong)? {
+        Asked::Question(question) => supervise(py, show, move |work| {
+            let answer = Executor::new(None, work).ask(&*question)?;
+            if answer.stop == Stop::Interrupted {
+                return Err(JobError::Interrupted);
+            }
+            Ok((answer.hash(), json!(answer.facts), answer.tables.clone()))
+        })?,
+        Asked::Scan(scan) => supervise(py, show, move |work| {
+            let runs = scan.runs();
+            work.says(&format!("{runs} runs"));
+            work.finished(0, 1);
+            let found = pool(threads)?.install(|| scan.compute(&Counted { work, runs }));
+            if found.finished < runs {
+                return Err(JobError::Interrupted);
+            }
+            let first = found.first_error.map(|e| e.to_string());
+            let facts = json!({ "runs": runs, "failed": found.failed, "first_error": first });
+            let hash = Hash::of(&encode::bits(std::slice::from_ref(&found.table)));
+            Ok((hash, facts, vec![found.table]))
+        })?,
+    };
+    handed(py, hash.as_str(), &facts, tables)
+}
+
+/// Counts the finished runs of a scan.
+struct Counted<'a> {
+    work: &'a Work,
+    runs: u64,
+}
+
+impl Watch for Counted<'_> {
+    fn reached(&self, finished: f64) -> bool {
+        self.work.finished(finished as usize, self.runs as usize);
+        !self.work.stopped()
+    }
 }
 
 /// A run as the bytes that `twofold run` writes: `format` is "csv" or "json".

@@ -8,7 +8,7 @@ use serde_json::json;
 use twofold::folder::{Folder, FolderError};
 use twofold::job::{Executor, JobError, Store};
 
-use crate::answers::{arrays, pool};
+use crate::answers::{handed, pool};
 use crate::errors;
 use crate::supervise::{Work, supervise};
 
@@ -69,16 +69,7 @@ pub fn paper_answer<'py>(
         let hash = answer.hash();
         Ok((answer, hash))
     })?;
-    let result = PyDict::new(py);
-    result.set_item("hash", hash.as_str())?;
-    result.set_item("facts", json!(answer.facts).to_string())?;
-    let tables = PyDict::new(py);
-    for table in answer.tables.clone() {
-        let name = table.name.clone();
-        tables.set_item(name, arrays(py, table)?)?;
-    }
-    result.set_item("tables", tables)?;
-    Ok(result)
+    handed(py, hash.as_str(), &json!(answer.facts), answer.tables.clone())
 }
 
 /// What the claims come to, as a JSON list.

@@ -10,6 +10,12 @@ transition, a hysteretic one, or the discontinuous system itself in Filippov's s
 :func:`funnel`                  the futures of a point whose future is a set
 :func:`classify`                what a run settles on
 :func:`sweep`                   what runs from many starts settle on, side by side
+:func:`follow`                  a general system's motion: events, modes, tables, several surfaces
+:func:`orbit`                   a closed orbit and its Floquet multipliers
+:func:`lyapunov`                Lyapunov exponents with their intervals
+:func:`rests`                   equilibria and pseudo-equilibria
+:func:`scan`                    an orbit diagram over one setting, or a map of endings over two
+:func:`sensitivities`           derivatives of a run's end by its start and parameters
 :func:`spec`, :func:`run_spec`  a run as data, as ``twofold run --spec`` reads it
 :func:`panels`                  the panels of the paper's figures, as runs with their hashes
 :func:`verdicts`                whether the paper's claims hold
@@ -27,8 +33,9 @@ True
 
 from . import errors
 from ._native import NUMERICS as _NUMERICS, VERSION as __version__
-from ._folder import Claim, Figure, Paper, PaperAnswer
+from ._folder import Answer, Claim, Figure, Paper
 from ._paper import Panel, Verdict, panels, verdict_table, verdicts
+from ._questions import follow, lyapunov, orbit, rests, scan, sensitivities
 from ._runs import (
     Classification,
     Funnel,
@@ -54,6 +61,7 @@ numerics: str = _NUMERICS
 """Digest of the sources that numbers depend on: equal digests give equal bits."""
 
 __all__ = [
+    "Answer",
     "Claim",
     "Classification",
     "ComputationError",
@@ -64,7 +72,6 @@ __all__ = [
     "InternalError",
     "Panel",
     "Paper",
-    "PaperAnswer",
     "ParameterError",
     "Section",
     "Solution",
@@ -78,11 +85,17 @@ __all__ = [
     "builtin_systems",
     "classify",
     "errors",
+    "follow",
     "funnel",
+    "lyapunov",
     "numerics",
+    "orbit",
     "panels",
+    "rests",
     "run_spec",
+    "scan",
     "section",
+    "sensitivities",
     "shifted",
     "solve",
     "spec",

@@ -11,7 +11,7 @@ from . import _native
 from ._progress import Shown
 from ._runs import Progress, Table
 
-__all__ = ["Claim", "Figure", "Paper", "PaperAnswer"]
+__all__ = ["Claim", "Figure", "Paper", "Answer"]
 
 
 @dataclass(frozen=True)
@@ -48,10 +48,10 @@ class Claim:
     """Repeated runs in which it holds, and all of them; None if nothing is repeated."""
 
 
-class PaperAnswer:
+class Answer:
     """The answer to a panel or measure: ``answer.facts``, ``answer.tables["path"]["x"]``."""
 
-    def __init__(self, raw: "_native._FolderAnswer") -> None:
+    def __init__(self, raw: "_native._PlainAnswer") -> None:
         self.hash: str = raw["hash"]
         """Digest of the numbers, the same on any machine."""
         self.facts: Dict[str, Any] = json.loads(raw["facts"])
@@ -60,7 +60,7 @@ class PaperAnswer:
         """Tables by name, their columns NumPy arrays."""
 
     def __repr__(self) -> str:
-        return f"<twofold.PaperAnswer: facts {', '.join(self.facts)}; tables {', '.join(self.tables)}>"
+        return f"<twofold.Answer: facts {', '.join(self.facts)}; tables {', '.join(self.tables)}>"
 
 
 class Paper:
@@ -89,13 +89,13 @@ class Paper:
         """Panels ("fig3/a", in a reading "fig3/a@printed") and measures, for :meth:`answer`."""
         self._claims: Dict[str, Dict[str, Any]] = {claim["id"]: claim for claim in said["claims"]}
 
-    def answer(self, name: str, progress: Progress = False) -> PaperAnswer:
+    def answer(self, name: str, progress: Progress = False) -> Answer:
         """What a panel or measure asks, computed or taken from the folder's store.
 
         :raises SpecError: if there is none of this name.
         """
         with Shown(progress) as show:
-            return PaperAnswer(_native.paper_answer(self._folder, name, self._keep, show))
+            return Answer(_native.paper_answer(self._folder, name, self._keep, show))
 
     def claims(self, threads: int = 0, progress: Progress = False) -> List[Claim]:
         """Every claim of claims.toml with its outcome, in the file's order; ``threads`` = 0 is one per core and changes no byte.

@@ -15,6 +15,7 @@
 //! # Ok::<(), CliError>(())
 //! ```
 
+pub mod asked;
 pub mod commands;
 pub mod ending;
 pub mod exit;

@@ -11,9 +11,9 @@ use toml::{Spanned, Value};
 
 use super::FolderError;
 use crate::cli::CliError;
+use crate::cli::asked;
 use crate::cli::commands::{lyapunov, orbit, rests};
 use crate::cli::flags::{RunFlags, Use};
-use crate::cli::general;
 use crate::job::AnyQuestion;
 use crate::paper::plots::Recorded;
 use crate::system::diagnostic::nearest;
@@ -209,8 +209,7 @@ impl Said {
     }
 
     fn parsed<T: clap::Args>(&self, root: &Path) -> Result<T, FolderError> {
-        let command = T::augment_args(clap::Command::new("twofold").no_binary_name(true).disable_help_flag(true));
-        let known: Vec<String> = command.get_arguments().filter_map(|a| a.get_long().map(str::to_owned)).collect();
+        let known = asked::known::<T>();
         for Flag { name: key, .. } in &self.flags {
             if !known.contains(key) && !NOT_ASKED.contains(&key.as_str()) {
                 let known: Vec<&str> = known.iter().map(String::as_str).filter(|k| !NOT_ASKED.contains(k)).collect();
@@ -218,13 +217,7 @@ impl Said {
                 return Err(self.wrong(Some(key), format!("unknown key `{key}`"), help));
             }
         }
-        let read = command.try_get_matches_from(self.arguments(root)?).and_then(|m| T::from_arg_matches(&m));
-        read.map_err(|error| {
-            let text = error.to_string();
-            let first = text.lines().next().unwrap_or_default();
-            let said = first.trim_start_matches("error: ").to_owned();
-            self.wrong(self.named_in(&said).as_deref(), said, None)
-        })
+        asked::parsed(self.arguments(root)?).map_err(|said| self.wrong(self.named_in(&said).as_deref(), said, None))
     }
 
     /// The flag that a message of the command line names.
@@ -245,11 +238,7 @@ impl Said {
     /// If a flag is unknown, has no effect, or a value is wrong.
     pub fn recorded(&self, root: &Path, command: Use) -> Result<Recorded, FolderError> {
         let flags: RunFlags = self.parsed(root)?;
-        let found = general::run_of(&flags).and_then(|run| match run {
-            Some(run) => Ok(Recorded::General(run, flags.section.clone())),
-            None => Ok(Recorded::Surfaces(flags.spec(command)?)),
-        });
-        found.map_err(|e| self.refused(&e))
+        asked::recorded(&flags, command).map_err(|e| self.refused(&e))
     }
 
     /// The question that is asked.

@@ -136,6 +136,13 @@ const TABLE: &[(&str, &str, &[&str])] = &[
         &["--show x", "--alike 0.5"],
     ),
     ("", "scan --system chua --section y=0 --over params.alpha=8,8.5 --t-end 30 --plot p.png", &["--show z"]),
+    ("", "scan --system chua --section y=0 --over params.alpha=8,8.5 --t-end 30", &["--follow down", "--period 1"]),
+    ("", "scan --system impact-oscillator --period 1 --over params.w=2,2.1 --t-end 30", &["--period 2", "--follow up"]),
+    (
+        "",
+        "sensitivities --system bouncing-ball --t-end 1",
+        &["--by r", "--format json", "--out s.csv", "--quiet", "--spec nowhere.json"],
+    ),
     (
         "",
         "scan --system stick-slip --section x=0.5 --over params.belt=0.3,0.4 --over params.friction=1,2 --t-end 20 --plot p.png",
@@ -240,6 +247,7 @@ const TABLE: &[(&str, &str, &[&str])] = &[
 /// Flags that promise what is so anyway in a case where nothing else can be seen: given there, they are neither refused nor ignored.
 const KEPT_PROMISES: &[(&str, &str)] = &[
     ("rests --system chua --within x=-3..3", "--quiet"), // done before progress would be shown
+    ("sensitivities --system bouncing-ball --t-end 1", "--quiet"),
     ("plot --from run.csv --out p.svg", "--quiet"), // nothing is computed, so there is no progress to keep quiet about
 ];
 

@@ -317,12 +317,8 @@ fn wrong_files_and_flags_are_refused() {
     ball(&["--section", "x > v = 0"], 2, &["a condition is no number"]);
     ball(&["--section", "x = 0", "--every", "1"], 2, &["--every has no effect"]);
     ball(&["--t-start", "5", "--t-end", "1"], 2, &["--t-end, --t-start"]);
-    for command in
-        [&["sweep", "--over", "params.r=0.5,0.6"][..], &["scan", "--section", "x=0.1", "--over", "params.r=0.5,0.6"]]
-    {
-        let expected = ["--system bouncing-ball: a general system", "`twofold run`"];
-        refused(at, &[command, &["--quiet", "--system", "bouncing-ball"]].concat(), 2, &expected);
-    }
+    let sweep = ["sweep", "--over", "params.r=0.5,0.6", "--quiet", "--system", "bouncing-ball"];
+    refused(at, &sweep, 2, &["--system bouncing-ball: a general system", "`twofold run`", "`scan`"]);
     refused(at, &["run", "--system", "bouncing-bal"], 2, &["did you mean bouncing-ball?", "driven-by-data"]);
     // A system with one switch still says what it lacks, and who has it.
     fs::write(at.join("f.toml"), "states = ['x']\nh = 'x'\nplus = ['max(x, 1)']\nminus = ['1']").unwrap();
@@ -438,4 +434,145 @@ fn new_begins_with_a_general_system() {
     assert!(table() != "mine");
     refused(at, &["new", "-", "--from", "driven-by-data"], 2, &["inflow.csv", "give a file's name"]);
     refused(at, &["new", "a.toml", "--from", "bouncing-bal"], 2, &["did you mean bouncing-ball?"]);
+}
+
+const FOLDS: &str = "states = ['x']\nstart = [-1]\nf = ['p + x - x^3']\n[parameters]\np = 0\n";
+
+/// The table of `twofold scan` with these arguments.
+fn scanned(folder: &Path, arguments: &[&str]) -> Table {
+    from_csv(&good(folder, &[&["scan", "--quiet"], arguments].concat())).unwrap().1
+}
+
+/// An attractor is followed past the place where another begins: two folds at p = -+2/sqrt(27), and both branches between them.
+#[test]
+fn scans_follow_attractors_up_and_down() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("folds.toml"), FOLDS).unwrap();
+    let base = ["--system", "folds.toml", "--over", "params.p=-0.6..0.6:25", "--period", "1", "--t-end", "60"];
+    let both = scanned(at, &[&base[..], &["--follow", "both", "--plot", "f.svg"]].concat());
+    assert_eq!(names(&both), ["params.p", "follow", "t", "x"]);
+    let ways: Vec<String> = both.words("follow").map(str::to_owned).collect();
+    let fold = 2.0 / 27.0_f64.sqrt();
+    let mut seen = [0, 0];
+    for row in 0..both.len() {
+        let (p, x) = (both.numbers("params.p")[row], both.numbers("x")[row]);
+        let above = if ways[row] == "up" { p > fold } else { p > -fold };
+        assert_eq!(x > 0.0, above, "{} at p = {p}: {x}", ways[row]);
+        near(p + x - x.powi(3), 0.0, 1e-6);
+        seen[usize::from(ways[row] == "up")] += 1;
+    }
+    assert!(seen.iter().all(|n| *n > 25 * 20), "{seen:?}");
+    assert!(fs::read_to_string(at.join("f.svg")).unwrap().starts_with("<svg"));
+    // Without it every run begins at the file's start, and the rows do not depend on the threads.
+    let one = scanned(at, &base);
+    assert_eq!(names(&one), ["params.p", "t", "x"]);
+    assert!(one.numbers("params.p").iter().zip(one.numbers("x")).all(|(p, x)| (*x > 0.0) == (*p > fold)));
+    for follow in ["up", "down", "both"] {
+        let flags = |n| [&["scan", "--quiet", "--threads", n, "--follow", follow][..], &base].concat();
+        assert_eq!(good(at, &flags("1")), good(at, &flags("2")));
+    }
+    // Systems with h, plus and minus are followed by their crossings.
+    let slip = ["--system", "stick-slip", "--section", "x=0.5", "--over", "params.belt=0.3,0.4", "--t-end", "20"];
+    let up = scanned(at, &[&slip[..], &["--follow", "up"]].concat());
+    assert_eq!(names(&up), ["params.belt", "follow", "t", "x", "v"]);
+    for (more, says) in [
+        (&["--follow", "up", "--section", "x=0"][..], "--period has no effect"),
+        (&["--over", "start.x=0,1", "--follow", "up"], "give --over once"),
+        (&["--every", "1"], "--every has no effect"),
+    ] {
+        refused(at, &[&["scan", "--quiet"][..], &base, more].concat(), 2, &[says]);
+    }
+    let scan = ["scan", "--quiet", "--system", "folds.toml"];
+    for (more, says) in [
+        (&["--over", "start.x=0,1", "--follow", "up", "--period", "1"][..], "begins where the run before ended"),
+        (&["--over", "params.p=0,1"], "give --section, such as x=0, or --period"),
+        (&["--over", "params.q=0,1", "--period", "1"], "no parameter `q`"),
+        (&["--over", "eps=0.1,0.2", "--period", "1"], "eps belongs to systems with h, plus and minus"),
+        (&["--over", "params.p=0..1", "--period", "1"], "drawn at random"),
+        (&["--over", "params.p=0,1", "--period", "0"], "--period is 0"),
+    ] {
+        refused(at, &[&scan[..], more].concat(), 2, &[says]);
+    }
+}
+
+/// The buck converter's first period doubling lies between 24 and 25 V (Deane & Hamill 1990).
+#[test]
+fn a_scan_shows_a_period_doubling() {
+    let folder = tempfile::tempdir().unwrap();
+    let scan = ["--system", "buck-ramp", "--period", "4e-4", "--t-end", "0.12", "--over", "params.input=24,25"];
+    let table = scanned(folder.path(), &scan);
+    let points = |input: f64| -> Vec<f64> {
+        let mut found: Vec<f64> = (0..table.len())
+            .filter(|r| table.numbers("params.input")[*r] == input)
+            .map(|r| table.numbers("v")[r])
+            .collect();
+        found.sort_by(f64::total_cmp);
+        found.dedup_by(|a, b| (*a - *b).abs() < 1e-4);
+        found
+    };
+    assert_eq!((points(24.0).len(), points(25.0).len()), (1, 2));
+}
+
+/// Over two settings: a map of what general systems end on.
+#[test]
+fn scans_of_general_systems_map_endings() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(
+        at.join("wells.toml"),
+        "states = ['x', 'v']\nstart = [0, 0]\nf = ['v', 'x - x^3 - 0.3*v']\n[[event]]\nname = 'edge'\nwhen = 'x - 3'\nstop = true",
+    )
+    .unwrap();
+    let map = ["--system", "wells.toml", "--section", "v=0", "--t-end", "120"];
+    let over = ["--over", "start.x=-2..2:5", "--over", "start.v=0,8", "--plot", "m.png"];
+    let table = scanned(at, &[&map[..], &over].concat());
+    assert_eq!(names(&table), ["start.x", "start.v", "ending", "number", "reason"]);
+    let words: Vec<&str> = table.words("ending").collect();
+    // Two wells and the saddle between them; one start runs over the edge.
+    assert_eq!(words[4], "rest", "at the saddle");
+    assert!(words.contains(&"stopped by edge"), "{words:?}");
+    let mut rests: Vec<i64> = (0..table.len())
+        .filter(|r| words[*r] == "rest")
+        .map(|r| table.column("number").unwrap().get(r).value() as i64)
+        .collect();
+    rests.sort_unstable();
+    rests.dedup();
+    assert_eq!(rests.len(), 3, "{words:?}");
+    // A driven one: closed orbits.
+    let driven = ["--system", "impact-oscillator", "--period", "2.243994752564138", "--t-end", "400"];
+    let over = ["--over", "start.x=-0.1,0.1", "--over", "start.v=0,0.1"];
+    let table = scanned(at, &[&driven[..], &over].concat());
+    assert!(
+        table.words("ending").all(|w| w.starts_with("period-") || w == "irregular"),
+        "{:?}",
+        table.words("ending").collect::<Vec<_>>()
+    );
+}
+
+/// Derivatives of a run's end, from the command.
+#[test]
+fn sensitivities_of_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("decay.toml"), "states = ['x']\nstart = [1]\nf = ['-k*x']\n[parameters]\nk = 2").unwrap();
+    let base = ["sensitivities", "--quiet", "--system", "decay.toml", "--t-end", "1"];
+    let table = from_csv(&good(at, &[&base[..], &["--format", "csv"]].concat())).unwrap().1;
+    assert_eq!(names(&table), ["state", "value", "start.x", "params.k"]);
+    let e = (-2.0_f64).exp();
+    for (name, want) in [("value", e), ("start.x", e), ("params.k", -e)] {
+        near(table.numbers(name)[0], want, 1e-9);
+    }
+    let text = String::from_utf8(good(at, &base)).unwrap();
+    assert!(text.starts_with("at t = 1\n") && text.contains("params.k"), "{text}");
+    refused(at, &[&base[..], &["--by", "q"]].concat(), 2, &["no parameter `q`; the system has k"]);
+    refused(at, &[&base[..], &["--section", "x=0.5"]].concat(), 2, &["--section has no effect"]);
+    refused(at, &["sensitivities", "--t-end", "5"], 2, &["give --switch filippov"]);
+    // Sliding takes away what is normal to the surface.
+    let slip =
+        ["sensitivities", "--system", "stick-slip", "--switch", "filippov", "--start", "0.5,0.3", "--t-end", "1"];
+    let table = from_csv(&good(at, &[&slip[..], &["--format", "csv", "--by", "belt"]].concat())).unwrap().1;
+    let v = table.words("state").position(|s| s == "v").unwrap();
+    near(table.numbers("start.v")[v], 0.0, 1e-12);
+    near(table.numbers("params.belt")[v], 1.0, 1e-9);
 }

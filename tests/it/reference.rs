@@ -111,7 +111,8 @@ fn flags_of_a_run_are_as_the_page_says() {
 
 /// Commands that know figures and files, not runs of a system.
 fn of_figures(name: &str) -> bool {
-    !["run", "plot", "orbit", "lyapunov", "rests", "scan", "sweep", "sweep merge", "new"].contains(&name)
+    !["run", "plot", "orbit", "lyapunov", "rests", "scan", "sensitivities", "sweep", "sweep merge", "new"]
+        .contains(&name)
 }
 
 /// A section for each of these commands.
