@@ -30,7 +30,7 @@ fn spec(text: &str) -> PyResult<RunSpec> {
 }
 
 /// The answer to a run, moved out of the executor that asked.
-fn ask(run: RunSpec, work: &Work) -> Result<Answer, JobError> {
+fn answer_to(run: RunSpec, work: &Work) -> Result<Answer, JobError> {
     let answer = Executor::new(None, work).ask(&Run(run))?;
     let answer = Arc::try_unwrap(answer).unwrap_or_else(|shared| (*shared).clone());
     if answer.stop == Stop::Interrupted { Err(JobError::Interrupted) } else { Ok(answer) }
@@ -43,7 +43,7 @@ pub fn run<'py>(py: Python<'py>, text: &str, show: Option<&Bound<'py, PyAny>>) -
     let spec = spec(text)?;
     let question = question_hash(&Run(spec.clone()));
     let (answer, hash) = supervise(py, show, move |work| {
-        let answer = ask(spec, work)?;
+        let answer = answer_to(spec, work)?;
         let hash = answer.hash();
         Ok((answer, hash))
     })?;
@@ -156,7 +156,7 @@ pub fn written(py: Python<'_>, text: &str, format: &str, show: Option<&Bound<'_,
     };
     supervise(py, show, move |work| {
         let run = Run(spec);
-        let answer = ask(run.0.clone(), work)?;
+        let answer = answer_to(run.0.clone(), work)?;
         let about = json!({ "kind": run.kind(), "question": run.json(), "stop": answer.stop });
         Ok(if as_csv { encode::csv_of_run(&run, &answer) } else { encode::json(&answer, &about) })
     })

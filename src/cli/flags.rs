@@ -151,7 +151,7 @@ pub struct RunFlags {
     #[arg(long, allow_negative_numbers = true, help_heading = "Random numbers")]
     pub stream: Option<u64>,
     /// Record crossings of a plane instead of the path, such as y=0.
-    #[arg(long, value_name = "COORDINATE=VALUE", help_heading = "Recording")]
+    #[arg(long, value_name = "COORDINATE=VALUE", allow_hyphen_values = true, help_heading = "Recording")]
     pub section: Option<String>,
     /// Largest distance between the recorded polyline and the path [default: 0.001; of a picture 0.0001].
     #[arg(long, allow_hyphen_values = true, help_heading = "Recording")]

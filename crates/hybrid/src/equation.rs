@@ -258,6 +258,7 @@ impl Equation {
     }
 
     fn register(&mut self, expression: Expression, whole: bool, chooses: bool) {
+        let (expression, _) = if whole { (expression, false) } else { self.bare(&expression) };
         let key = |e: &Expression| format!("{}{e}", if whole { "whole " } else { "" });
         if let Some((i, _)) = self.by_text.get(&key(&expression)) {
             self.guards[*i].chooses |= chooses;
@@ -266,6 +267,16 @@ impl Equation {
         let i = self.guards.len();
         if !whole {
             self.by_text.insert(key(&mirrored(&expression)), (i, true));
+            if let Some((sum, flipped)) = self.sum_key(&expression) {
+                if let Some((other, opposite)) = self.by_text.get(&sum).copied() {
+                    // Written before in another scale.
+                    self.guards[other].chooses |= chooses;
+                    self.by_text.insert(key(&mirrored(&expression)), (other, opposite == flipped));
+                    self.by_text.insert(key(&expression), (other, opposite != flipped));
+                    return;
+                }
+                self.by_text.insert(sum, (i, flipped));
+            }
         }
         self.by_text.insert(key(&expression), (i, false));
         self.guards.push(Guard { expression, whole, chooses });
@@ -273,8 +284,73 @@ impl Equation {
 
     /// The guard of an expression, and whether it is the expression's negative.
     fn guard(&self, e: &Expression, whole: bool) -> (usize, bool) {
+        let (e, flipped) = if whole { (e.clone(), false) } else { self.bare(e) };
         let key = format!("{}{e}", if whole { "whole " } else { "" });
-        self.by_text.get(&key).copied().unwrap_or((0, false))
+        self.by_text.get(&key).map_or((0, flipped), |(i, other)| (*i, *other != flipped))
+    }
+
+    /// An expression that has the same sign everywhere, or the other one, without what changes nothing about that: constant factors, odd powers, odd rising
+    /// functions, absolute values beside what they are of.
+    fn bare(&self, e: &Expression) -> (Expression, bool) {
+        let constant = |e: &Expression| -> Option<f64> {
+            let fixed = |name: &str| self.values.contains_key(name);
+            let known = e.names().into_iter().all(fixed) && !asks(e);
+            known.then(|| self.value(e, 0.0, &[])).filter(|v| v.is_finite() && *v != 0.0)
+        };
+        let scaled = |e: &Expression, factor: f64| {
+            let (e, flipped) = self.bare(e);
+            (e, flipped != (factor < 0.0))
+        };
+        match e {
+            Expression::Neg(a) => scaled(a, -1.0),
+            Expression::Mul(a, b) => match (constant(a), constant(b)) {
+                (Some(factor), _) => scaled(b, factor),
+                (_, Some(factor)) => scaled(a, factor),
+                _ => match (&**a, &**b) {
+                    (x, Expression::Call(Function::Abs, y)) | (Expression::Call(Function::Abs, y), x) if x == &**y => {
+                        self.bare(x)
+                    }
+                    _ => (e.clone(), false),
+                },
+            },
+            Expression::Div(a, b) => constant(b).map_or_else(|| (e.clone(), false), |factor| scaled(a, factor)),
+            Expression::Power(a, n) if *n > 0 && n % 2 == 1 => self.bare(a),
+            Expression::Call(Function::Tanh | Function::Atan | Function::Erf, a) => self.bare(a),
+            Expression::Apply(General::Sinh | General::Asin, list) if list.len() == 1 => self.bare(&list[0]),
+            other => (other.clone(), false),
+        }
+    }
+
+    /// A key that sums of the same states, time and numbers share in whatever scale and order they are written, and whether the sum is the key's negative.
+    fn sum_key(&self, e: &Expression) -> Option<(String, bool)> {
+        let mut names: Vec<String> = e.names().into_iter().map(str::to_owned).collect();
+        names.sort_unstable();
+        names.dedup();
+        names.retain(|name| !self.values.contains_key(name));
+        let is_linear = names.iter().all(|n| n == "t" || self.definition.states.iter().any(|s| s.name == *n));
+        if names.is_empty() || !is_linear || asks(e) {
+            return None;
+        }
+        let value = |at: &dyn Fn(&str) -> f64| {
+            crate::model::evaluate(e, &|name| match self.values.get(name) {
+                Some(value) => Some(*value),
+                None => Some(at(name)),
+            })
+        };
+        let constant = value(&|_| 0.0);
+        let factors: Vec<f64> =
+            names.iter().map(|n| value(&|name| f64::from(u8::from(name == n))) - constant).collect();
+        // Linear: also at a point where nothing is zero, one or small.
+        let point = |name: &str| 0.7 + 1.3 * names.iter().position(|n| n == name).unwrap_or(0) as f64;
+        let sum = names.iter().zip(&factors).map(|(n, f)| f * point(n)).sum::<f64>() + constant;
+        let size = names.iter().zip(&factors).map(|(n, f)| (f * point(n)).abs()).sum::<f64>() + constant.abs();
+        let first = *factors.iter().find(|f| **f != 0.0)?;
+        if !((value(&point) - sum).abs() <= 1e-13 * size) {
+            return None;
+        }
+        let scaled = |v: f64| format!("{:.13e}", v / first + 0.0);
+        let terms: Vec<String> = names.iter().zip(&factors).map(|(n, f)| format!("{n} {}", scaled(*f))).collect();
+        Some((format!("sum {} {}", terms.join(" "), scaled(constant)), first < 0.0))
     }
 
     /// The switching functions as text, in the order of a point's signs.
@@ -286,8 +362,9 @@ impl Equation {
     /// The switching function that an expression or its negative is.
     pub fn switching(&self, e: &Expression) -> Option<usize> {
         let key = match e {
-            Expression::Greater(a, b) => difference(a, b).to_string(),
-            other => other.to_string(),
+            Expression::Greater(a, b) => self.bare(&difference(a, b)).0.to_string(),
+            Expression::Not(inner) => return self.switching(inner),
+            other => self.bare(other).0.to_string(),
         };
         self.by_text.get(&key).or_else(|| self.by_text.get(&format!("whole {key}"))).map(|(i, _)| *i)
     }
@@ -452,8 +529,10 @@ pub(crate) enum Gate {
     Exp,
     /// Sine and cosine.
     Wave,
-    /// A divisor, or the argument of a root or logarithm: smooth in its own scale.
+    /// The argument of a root or logarithm: smooth in its own scale.
     Scale,
+    /// A divisor: the same, and a pole where it is zero.
+    Divisor,
 }
 
 impl Gate {
@@ -464,7 +543,7 @@ impl Gate {
             Gate::Step(flat) => width <= 1.0 || low >= flat || high <= -flat,
             Gate::Exp => width <= 1.0 || high <= -40.0,
             Gate::Wave => width <= 3.0,
-            Gate::Scale => {
+            Gate::Scale | Gate::Divisor => {
                 let (most, least) = (low.abs().max(high.abs()), low.abs().min(high.abs()));
                 width <= 0.0 || (most <= 8.0 * least && low * high > 0.0)
             }
@@ -480,13 +559,21 @@ fn gates(tape: &Tape) -> Vec<(Gate, usize)> {
     let mut found: Vec<(Gate, usize)> = Vec::new();
     for (node, operation) in tape.operations().iter().enumerate() {
         varies[node] = matches!(operation, Variable(_)) || operation.arguments().any(|a| varies[a]);
+        if let Div(_, a) = *operation {
+            let mut factors = Vec::new();
+            factors_of(tape, a, &mut factors);
+            let open = factors.into_iter().filter(|a| varies[*a]).map(|a| (Gate::Divisor, a));
+            let new: Vec<_> = open.filter(|gate| needed[node] && !found.contains(gate)).collect();
+            found.extend(new);
+            continue;
+        }
         let gate = match *operation {
             Tanh(a) => (Gate::Step(10.0), a),
             Erf(a) => (Gate::Step(4.2), a),
             Atan(a) => (Gate::Step(1e3), a),
             Exp(a) => (Gate::Exp, a),
             Sin(a) | Cos(a) => (Gate::Wave, a),
-            Div(_, a) | Sqrt(a) | Ln(a) => (Gate::Scale, a),
+            Sqrt(a) | Ln(a) => (Gate::Scale, a),
             _ => continue,
         };
         if needed[node] && varies[gate.1] && !found.contains(&gate) {
@@ -494,6 +581,21 @@ fn gates(tape: &Tape) -> Vec<(Gate, usize)> {
         }
     }
     found
+}
+
+/// The factors of a product: a square is zero where its root is, and shows no change of sign there.
+fn factors_of(tape: &Tape, node: usize, found: &mut Vec<usize>) {
+    use twofold_num::tape::Operation::{Div, Mul, Neg};
+    match tape.operations()[node] {
+        Mul(a, b) => {
+            factors_of(tape, a, found);
+            if a != b {
+                factors_of(tape, b, found);
+            }
+        }
+        Neg(a) | Div(a, _) => factors_of(tape, a, found),
+        _ => found.push(node),
+    }
 }
 
 /// For each value the variables that it depends on, as bits.

@@ -286,8 +286,9 @@ struct Train {
 }
 
 impl Train {
-    /// Notes one more; gives the time at which infinitely many are over, with a bound on its error, once that is known.
-    fn note(&mut self, t: f64) -> Option<(f64, f64)> {
+    /// Notes one more; gives the time at which infinitely many are over, with a bound on its error, once that is known. Times that are less than
+    /// `grain` apart are not told apart reliably.
+    fn note(&mut self, t: f64, grain: f64) -> Option<(f64, f64)> {
         self.times.push(t);
         let rounding = 4.0 * f64::EPSILON * t.abs();
         if self.times.len() > 20 && t - self.times[self.times.len() - 20] <= rounding {
@@ -315,7 +316,7 @@ impl Train {
         let steady = (g1 / g2 - g2 / g3).abs() < 0.1 && g1 / g2 < 0.999;
         (steady
             && left >= 0.0
-            && left <= 1e-8 * (self.times[n - 1] - self.times[0]).max(1e-4 * t.abs())
+            && (g1 <= grain || left <= 1e-8 * (self.times[n - 1] - self.times[0]).max(1e-4 * t.abs()))
             && error <= 0.1 * left.max(1e-13 * t.abs()))
         .then_some((now, error))
     }
@@ -672,8 +673,10 @@ impl<'a> Follower<'a> {
             self.sought(&step, &mut list);
             let found = self.find(&step, &list, &parts, &mut last_values);
             let earliest = found.iter().map(|(theta, _)| *theta).fold(f64::INFINITY, f64::min);
+            // Together is what no rounding of the time tells apart.
+            let together = (64.0 * f64::EPSILON * self.t.abs().max(wanted) / wanted).min(1e-9);
             let met: Vec<Sought> =
-                found.iter().filter(|(theta, _)| *theta <= earliest + 1e-9).map(|(_, sought)| *sought).collect();
+                found.iter().filter(|(theta, _)| *theta <= earliest + together).map(|(_, sought)| *sought).collect();
             if earliest.is_finite() {
                 self.land(&mut step, earliest * wanted, wanted, met[0]);
             }
@@ -744,9 +747,15 @@ impl<'a> Follower<'a> {
 
     fn step_in_units(&mut self, step: &mut Step, longest: f64, scale: &mut Vec<f64>) -> Option<Accepted> {
         let mut length = longest;
+        let mut noise = None;
         for tried in 0..=MOST_SHORTENINGS {
             step.take(length, &mut |t, x, out| self.rhs(t, x, out));
             scale_now(self, step, scale);
+            if tried > 0 && length <= 1e8 * f64::EPSILON * self.t.abs() {
+                // Whether it is the rounding of the time that keeps the error large.
+                let noise = noise.get_or_insert_with(|| self.noise_of_time(step));
+                scale.iter_mut().zip(noise).for_each(|(s, noise)| *s += 4.0 * length * *noise);
+            }
             let error = step.error(&|i| scale[i]);
             let factor = if error <= 1.0 {
                 // What the step did not see begins there: it is made to end before.
@@ -769,6 +778,15 @@ impl<'a> Follower<'a> {
             }
         }
         None
+    }
+
+    /// By how much the field changes when the time at a step's beginning changes by its rounding.
+    fn noise_of_time(&mut self, step: &Step) -> Vec<f64> {
+        let (mut before, mut after) = (vec![0.0; self.n], vec![0.0; self.n]);
+        let rounding = 2.0 * f64::EPSILON * step.t.abs();
+        self.rhs(step.t - rounding, &step.x, &mut before);
+        self.rhs(step.t + rounding, &step.x, &mut after);
+        before.iter().zip(&after).map(|(a, b)| (b - a).abs()).collect()
     }
 
     /// What is met first in a step, with its place and all else in the same part of the step; `last` takes the values where the search ends.
@@ -859,6 +877,11 @@ impl<'a> Follower<'a> {
         let (mut config, sliding) = (self.config.clone(), self.sliding.clone());
         config.pieces = self.equation.tables.iter().map(|table| table.piece(self.t)).collect();
         self.adopt(config, sliding);
+        if !self.equation.tables.is_empty() {
+            // A table's jump may carry switching functions over zero.
+            let zero = self.sliding.clone();
+            self.follow_jumps(&zero)?;
+        }
         let before = self.before(met)?;
         let ending = self.meet(definition, met, &due, observe)?;
         if ending.is_none() {

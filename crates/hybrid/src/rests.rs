@@ -37,13 +37,22 @@ pub struct Rest {
     pub place: Place,
     /// Eigenvalues of the linearised motion, on a surface along the surface: real and imaginary parts.
     pub eigenvalues: Vec<[f64; 2]>,
+    /// By how much an eigenvalue may be off, the state being known to 1e-9 of the box: at a double root none has a sign.
+    pub blur: f64,
+    /// The switching function that is zero at an equilibrium of a field: the equations change there, and eigenvalues are those of one side.
+    pub boundary: Option<String>,
 }
 
 impl Rest {
     /// "stable node", "saddle", ... from the eigenvalues; on a surface that repels everything is unstable.
     pub fn kind(&self) -> String {
         let size = self.eigenvalues.iter().map(|e| e[0].abs().max(e[1].abs())).fold(0.0, f64::max);
-        let zero = 1e-9 * size;
+        let zero = (1e-9 * size).max(self.blur);
+        if let Some(surface) = &self.boundary {
+            return format!(
+                "boundary equilibrium: the equations change on {surface} = 0, and one side does not decide"
+            );
+        }
         let turns = self.eigenvalues.iter().any(|e| e[1].abs() > zero);
         let (out, into) = (self.eigenvalues.iter().any(|e| e[0] > zero), self.eigenvalues.iter().any(|e| e[0] < -zero));
         let neutral = self.eigenvalues.iter().any(|e| e[0].abs() <= zero);
@@ -256,10 +265,34 @@ impl Search {
                 }
                 let jacobian = self.local(config, None, &x).jacobian;
                 let eigenvalues = eigenvalues(&jacobian, self.n)?;
-                return Some(Rest { x, mode: config.mode, place: Place::Field, eigenvalues });
+                let moved: Vec<f64> = x.iter().zip(&self.widths).map(|(x, w)| x + 1e-9 * w).collect();
+                let other = self.local(config, None, &moved).jacobian;
+                let blur = jacobian.iter().zip(&other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                let boundary = self.boundary(config, &x);
+                return Some(Rest { x, mode: config.mode, place: Place::Field, eigenvalues, blur, boundary });
             }
         }
         None
+    }
+
+    /// The switching function that is zero at a state, to rounding, and on whose other side the equations are others.
+    fn boundary(&self, config: &Configuration, x: &[f64]) -> Option<String> {
+        let n = self.n;
+        let own = self.local(config, None, x);
+        let on = |guard: &usize| {
+            let local = self.local(config, Some(*guard), x);
+            // The distance that the state is known to.
+            let reach: f64 = local.gradient.iter().zip(&self.widths).map(|(g, w)| (g * w).abs()).sum();
+            if self.equation.guards[*guard].whole || !(local.value.abs() <= 1e-12 * reach) {
+                return false;
+            }
+            let mut other = config.clone();
+            other.sides[*guard] = -config.sides[*guard];
+            let there = self.local(&other, None, x);
+            (0..n).any(|i| own.field[i] != there.field[i]) || (0..n * n).any(|i| own.jacobian[i] != there.jacobian[i])
+        };
+        let guard = self.equation.compiled(config).active.iter().copied().find(|g| on(g))?;
+        Some(self.equation.guards[guard].expression.to_string())
     }
 
     /// Newton's method for the state and the weight at once: a mixture of the fields that vanishes, and the switching function that does.
@@ -329,6 +362,6 @@ impl Search {
         eigenvalues.remove(smallest);
         let surface = self.equation.guards[guard].expression.to_string();
         let place = Place::Surface { surface, weight, attracting: normal < 0.0 };
-        Some(Rest { x, mode: low.mode, place, eigenvalues })
+        Some(Rest { x, mode: low.mode, place, eigenvalues, blur: 0.0, boundary: None })
     }
 }

@@ -76,7 +76,13 @@ pub(crate) fn first(
         return Some(narrow(from, to, &v, side, f));
     }
     if depth >= if ends_beyond { DEEPEST } else { DEPTH } {
-        return ends_beyond.then_some(to);
+        if ends_beyond {
+            return Some(to);
+        }
+        return dip(&v, side, from, to, f).map(|(place, value)| {
+            let start = [v[0], v[0], v[0], v[0], value];
+            narrow(from, place, &start, side, f)
+        });
     }
     let middle = 0.5 * (from + to);
     let quarter = 0.25 * (to - from);
@@ -87,6 +93,45 @@ pub(crate) fn first(
     let (p, q) = (f(middle + 0.5 * quarter), f(middle + 1.5 * quarter));
     first([v[2], p, v[3], q, v[4]], side, middle, to, f, depth + 1)
 }
+
+/// Where a function that is on its side at both ends of an interval is beyond zero between them, and its value there: its least value is sought by parabolas
+/// (Brent 1973, ch. 5), where the least of five values is not at an end.
+fn dip(v: &[f64; 5], side: f64, from: f64, to: f64, f: &mut dyn FnMut(f64) -> f64) -> Option<(f64, f64)> {
+    let least = (0..5).min_by(|i, j| (v[*i] * side).total_cmp(&(v[*j] * side)))?;
+    let inner = least.clamp(1, 3);
+    let mut three: [(f64, f64); 3] =
+        std::array::from_fn(|i| (from + PLACES[inner + i - 1] * (to - from), v[inner + i - 1] * side));
+    for _ in 0..MOST_PARABOLAS {
+        let [(a, fa), (b, fb), (c, fc)] = three;
+        let (p, q) = ((b - a) * (fb - fc), (b - c) * (fb - fa));
+        let place = b - 0.5 * ((b - a) * p - (b - c) * q) / (p - q);
+        if !(place > a && place < c) || place == b {
+            return None;
+        }
+        let value = f(place) * side;
+        if value <= 0.0 {
+            return Some((place, value * side));
+        }
+        // A parabola through three points that is right in a fourth has no lower ones.
+        let expected = {
+            let (s, d) = ((fc - fb) / (c - b), (fb - fa) / (b - a));
+            fb + (place - b) * (d + (place - a) * (s - d) / (c - a))
+        };
+        if (value - expected).abs() <= 1e-3 * value {
+            return None;
+        }
+        three = match (place < b, value < fb) {
+            (true, true) => [(a, fa), (place, value), (b, fb)],
+            (true, false) => [(place, value), (b, fb), (c, fc)],
+            (false, true) => [(b, fb), (place, value), (c, fc)],
+            (false, false) => [(a, fa), (b, fb), (place, value)],
+        };
+    }
+    None
+}
+
+/// Most steps of [`dip`].
+const MOST_PARABOLAS: usize = 40;
 
 /// [`first`] of the polynomial through five values itself.
 pub(crate) fn first_of_polynomial(v: [f64; 5], side: f64) -> Option<f64> {
@@ -193,6 +238,13 @@ mod tests {
         // Two zeros between two samples.
         near(find(|x| (x - 0.30) * (x - 0.31) * (1.0 + x), 1.0), 0.3);
         assert_eq!(find(|x| (x - 0.3) * (x - 0.3) + 1e-6, 1.0), None);
+        // A dip far narrower than the finest sampling, of a parabola and of none.
+        for (c, w) in [(0.3, 1e-6), (0.617, 1e-7), (0.25, 1e-7)] {
+            let found = find(|x| (x - c) * (x - c) - w * w, 1.0).unwrap();
+            assert!((found - (c - w)).abs() < 1e-2 * w, "{c}: {found}");
+            let found = find(|x| 1.0 - w * w - (x - c).cos(), 1.0).unwrap();
+            assert!((found - c).abs() < 2.0 * w, "{c}: {found}");
+        }
         // Polynomials themselves, from zero and not.
         let of = |f: &dyn Fn(f64) -> f64, side| first_of_polynomial(PLACES.map(f), side);
         near(of(&|x| x * (0.3 - x), 1.0), 0.3);

@@ -776,3 +776,200 @@ fn an_orbit_closes_on_a_section_through_the_origin() {
         assert!((found.unwrap().period - period).abs() < 1e-9);
     }
 }
+
+/// One state that counts along with others: what is written to it at the end.
+fn last(text: &str, t_end: f64) -> f64 {
+    *end(text, t_end).last().unwrap()
+}
+
+/// Dips of a smooth function that are far narrower than a step: pulses, events, sliding between two surfaces.
+#[test]
+fn narrow_dips_are_not_stepped_over() {
+    for w in [1e-3, 1e-4, 1e-5] {
+        let pulse = format!("states = ['x', 'y']\nstart = [0, 0]\nf = ['1', 'if((x - pi)^2 < {w:e}^2, 1/{w:e}, 0)']");
+        near(last(&pulse, 10.0), 2.0, 1e-7);
+        let event = format!(
+            "states = ['x', 'n']\nstart = [0, 0]\nf = ['1', '0']\n[[event]]\nwhen = '((x - 1)/{w:e})^2 - 1'\nset = {{ n = 'n + 1' }}"
+        );
+        near(last(&event, 2.0), 2.0, 0.0);
+    }
+    let times =
+        "states = ['n']\nstart = [0]\nf = ['0']\n[[event]]\nwhen = 'cos(t) - (1 - 1e-8)'\nset = { n = 'n + 1' }";
+    near(last(times, 20.0), 7.0, 0.0);
+    let between = "states = ['x']\nstart = [1]\nf = ['0.25 - sign(x^2 - 1e-8)']";
+    near(last(between, 3.0), 1e-4, 1e-12);
+    // As wide as a hundred million digits of the time.
+    near(last("states = ['x']\nstart = [0]\nf = ['if(abs(t - pi) < 1e-9, 1e9, 0)']", 10.0), 2.0, 1e-6);
+}
+
+#[test]
+fn a_division_by_zero_is_not_crossed() {
+    let ends = |text: &str, t_end: f64, t: f64, place: &str| match run(&model(text), t_end).1 {
+        Err(HybridError::Domain { t: at, what, .. }) => {
+            near(at, t, 1e-8);
+            assert!(what.contains("a division by a number that comes to zero") && what.contains(place), "{what}");
+        }
+        other => panic!("{other:?}\n{text}"),
+    };
+    // Free fall onto a centre; a quotient that a cube root would carry through; a pole of the tangent.
+    let fall = std::f64::consts::PI / 8.0_f64.sqrt();
+    ends("states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-1/x^2']", 1.2, fall, "equation of v, `-1/x^2`");
+    ends("states = ['x']\nstart = [2]\nf = ['-1/x^2']", 2.8, 8.0 / 3.0, "`-1/x^2`");
+    ends("states = ['x']\nstart = [1]\nf = ['-1/x']", 3.0, 0.5, "`-1/x`");
+    ends("states = ['x']\nstart = [1]\nf = ['tan(x)']", 0.3, -1.0_f64.sin().ln(), "`tan(x)`");
+    // What is continued through zero is followed.
+    near(end("states = ['x', 'y']\nstart = [-1, 0]\nf = ['1', 'sin(x)/x']", 2.0)[1], 2.0 * 0.946_083_070_367_183, 1e-9);
+}
+
+/// An odd root comes to rest at zero: x = (1 - 2 t/3)^1.5.
+#[test]
+fn an_odd_root_comes_to_rest() {
+    let root = "states = ['x']\nstart = [1]\nf = ['-sign(x)*abs(x)^(1/3)']";
+    near(last(root, 1.2), 0.2_f64.powf(1.5), 1e-9);
+    near(last(root, 3.0), 0.0, 1e-15);
+}
+
+/// Floors anywhere, at rest and moving: impacts accumulate, and motion rests on the floor.
+#[test]
+fn a_ball_rests_on_any_floor() {
+    for floor in [-0.7, 0.3, 1.555112, -3.082559, 1e6] {
+        let text = format!(
+            "states = ['x', 'v']\nstart = ['{floor} + 1', 0]\nf = ['v', '-1']\n[[event]]\nwhen = 'x - ({floor})'\ndirection = 'down'\nset = {{ v = '-0.5*v' }}\nafter_zeno = 'stick'"
+        );
+        let x = end(&text, 10.0);
+        near(x[0], floor, 4.0 * f64::EPSILON * floor.abs());
+        near(x[1], 0.0, 0.0);
+    }
+    for speed in [0.1, 0.5, -0.3, 3.0] {
+        let text = format!(
+            "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-1']\n[[event]]\nwhen = 'x - {speed}*t'\ndirection = 'down'\nset = {{ v = '{speed} - 0.5*(v - {speed})' }}\nafter_zeno = 'stick'"
+        );
+        let x = end(&text, 12.0);
+        near(x[0], 12.0 * speed, 1e-10);
+        near(x[1], speed, 1e-12);
+        // The time at which infinitely many impacts are over, within its bound.
+        let stops = text.replace("\nafter_zeno = 'stick'", "");
+        let Ending::Zeno { t, error, .. } = run(&model(&stops), 12.0).1.unwrap().ending else {
+            panic!("no accumulation")
+        };
+        let root = (speed * speed + 2.0).sqrt();
+        near(t, root - speed + 2.0 * root, error + 1e-8);
+        assert!(error < 1e-6);
+    }
+}
+
+/// A condition that a reset makes false again is met anew where it becomes true, and so is another event of the same zero.
+#[test]
+fn conditions_are_met_again_after_resets() {
+    let saw = |rate: f64, start: f64| {
+        format!("states = ['x']\nstart = [{start}]\nf = ['{rate}']\n[[event]]\nwhen = 'x > 1'\nset = {{ x = '0' }}")
+    };
+    for (rate, start) in [(1.0, 0.3), (2.0, 0.3), (0.7, 0.0), (3.0, 0.5)] {
+        let passed: f64 = start + 9.6 * rate;
+        near(last(&saw(rate, start), 9.6), passed - passed.floor(), 1e-12);
+    }
+    let twins = "states = ['x', 'n', 'm']\nstart = [0, 0, 0]\nf = ['1', '0', '0']\n[[event]]\nwhen = 'x > 1'\nset = { x = 'x - 2', m = 'm + 1' }\n[[event]]\nwhen = 'x - 1'\nset = { n = 'n + 1' }";
+    assert_eq!(end(twins, 60.5)[1..], [30.0, 30.0]);
+    // The surface of a switch stays where it is.
+    let slides = "states = ['q', 'n']\nstart = [0, 0]\nf = ['if(q < 1, 1, -1)', '1']\n[[event]]\nwhen = 'n > 2'\nset = { q = 'q + 1', n = '0' }";
+    near(end(slides, 10.5)[0], 1.5, 1e-12);
+}
+
+/// What rests at equality: a counter is at least 5 when it is 5, and not above.
+#[test]
+fn counters_are_compared_as_they_are_written() {
+    let count = |condition: &str| {
+        let text = format!(
+            "states = ['q', 'n']\nstart = [0, 0]\nf = ['1', '0']\n[[event]]\nwhen = 'q > 1 and {condition}'\nset = {{ q = 'q - 1', n = 'n + 1' }}"
+        );
+        last(&text, 20.5)
+    };
+    for (condition, most) in [("n < 5", 5.0), ("n <= 5", 6.0), ("not n >= 5", 5.0), ("5 > n", 5.0), ("not n > 5", 6.0)]
+    {
+        near(count(condition), most, 0.0);
+    }
+    near(last("states = ['n', 'y']\nstart = [5, 0]\nf = ['0', 'if(n >= 5, 1, 0)']", 1.0), 1.0, 1e-15);
+    near(last("states = ['n', 'y']\nstart = [5, 0]\nf = ['0', 'if(n > 5, 1, 0)']", 1.0), 0.0, 0.0);
+}
+
+/// One surface however it is written: 1.75 is 4/3 + 0.25*5/3, with the mean sign 0.25 of the sliding.
+#[test]
+fn one_surface_is_one_switching_function() {
+    let y =
+        |switch: &str| format!("states = ['x', 'y', 'z']\nstart = [1, 0, 1]\nf = ['0.25 - sign(x)', '{switch}', '1']");
+    for switch in [
+        "sign(x)",
+        "sign(2*x)",
+        "sign(x^3)",
+        "-sign(-x/3)",
+        "if(3*x > 0, 1, -1)",
+        "sign(tanh(x))",
+        "sign(x*abs(x))",
+        "2*heaviside(5*x) - 1",
+    ] {
+        near(end(&y(switch), 3.0)[1], 1.75, 1e-12);
+    }
+    let moving = "states = ['x', 'y']\nstart = [1, 0]\nf = ['0.25 - sign(x - 0.1*t)', 'sign(10*x - t)']";
+    near(end(moving, 3.0)[0], 0.3, 1e-12);
+    // Near to each other is not the same; and what only vanishes there is refused.
+    near(end(&y("sign(x + 1e-9)"), 3.0)[1], 3.0, 1e-8);
+    for switch in ["sign(x*z)", "sign(x + abs(x)/2)"] {
+        let error = run(&model(&y(switch)), 3.0).1.unwrap_err();
+        assert!(matches!(error, HybridError::Undecided { .. }), "{switch}: {error}");
+    }
+}
+
+/// Dry friction at rest, a late start at zero, and a table that jumps inside a switching function.
+#[test]
+fn rounding_is_no_motion() {
+    // It holds until sin t = 0.2, and turns where the speed is zero.
+    let friction = "states = ['x']\nstart = [0]\nf = ['sin(t) - 0.2*sign(x)']";
+    let hold = 0.2_f64.asin();
+    near(last(friction, 3.0), hold.cos() - 3.0_f64.cos() - 0.2 * (3.0 - hold), 1e-9);
+    for t in [1e3, 1e5] {
+        let options = Options { t_start: t, t_end: t + 3.0, ..Options::default() };
+        let late =
+            follow(&model(&format!("states = ['x']\nstart = [0]\nf = ['t - {t}']")), &options, &mut |_| true).unwrap();
+        near(late.x[0], 4.5, 1e-8);
+    }
+    let text = |f: &str| {
+        format!(
+            "states = ['x']\nstart = [0]\nf = ['{f}']\n[tables.u]\nfile = 'u.csv'\ntime = 't'\ncolumn = 'y'\ninterpolation = 'previous'"
+        )
+    };
+    for (f, want) in [("max(u, 0.5)", 7.5), ("abs(u)", 10.5), ("sign(u + x*0)", 0.0), ("if(u > 0.5, 1, -1)", 0.0)] {
+        let table = model(&text(f)).with_table("u", "t,y\n0,-1\n5,1.1\n10,0\n").unwrap();
+        let want = if f == "max(u, 0.5)" { 8.0 } else { want };
+        near(run(&table, 10.0).1.unwrap().x[0], want, 1e-12);
+    }
+}
+
+/// A closed orbit that is not isolated is one all the same.
+#[test]
+fn a_linear_oscillator_closes_on_any_section() {
+    use crate::motion::tangent::{Return, closed_orbit};
+    let circle = model("states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-x']");
+    for section in ["x - 0.5", "v - 0.5", "x + v"] {
+        let section = twofold_system::Expression::parse_general(section, &["x", "v"]).unwrap();
+        let options = Options { record: Record::Section(section), t_end: 100.0, ..Options::default() };
+        let found = closed_orbit(&circle, &options, &Return::Crossings(1)).unwrap();
+        near(found.period, 2.0 * std::f64::consts::PI, 1e-8);
+        near(found.multipliers[0][0], 1.0, 1e-6);
+        assert!(found.gap < 1e-8);
+    }
+}
+
+/// Rests on a kink or at a double root are not named by one side's eigenvalues.
+#[test]
+fn stability_is_said_where_it_is_decided() {
+    let kinds = |text: &str, bounds: &[(f64, f64)]| -> Vec<String> {
+        crate::rests::rests(&model(text), bounds).unwrap().iter().map(|r| r.kind()).collect()
+    };
+    for f in ["-abs(x)", "if(x > 0, -x, 2*x)"] {
+        let found = kinds(&format!("states = ['x']\nf = ['{f}']"), &[(-1.0, 1.0)]);
+        assert!(!found.is_empty() && found.iter().all(|k| k.starts_with("boundary equilibrium")), "{f}: {found:?}");
+    }
+    let double = kinds("states = ['x']\nf = ['x^2']", &[(-10.0, 10.0)]);
+    assert!(double.iter().all(|k| k == "not decided by the linearised motion"), "{double:?}");
+    assert_eq!(kinds("states = ['x']\nf = ['-0.001*x']", &[(-10.0, 10.0)]), ["stable node"]);
+}

@@ -276,7 +276,7 @@ pub enum Expression {
     RealPower(Box<Expression>, Box<Expression>),
     /// A function of general systems.
     Apply(General, Vec<Expression>),
-    /// Whether the first is greater than the second. Equality is one point of a motion and decides nothing: `>=` reads as `>`.
+    /// Whether the first is greater than the second.
     Greater(Box<Expression>, Box<Expression>),
     /// Whether both hold.
     And(Box<Expression>, Box<Expression>),
@@ -481,8 +481,7 @@ enum Token {
     Open,
     Close,
     Comma,
-    Greater,
-    Less,
+    Compare { less: bool, equal: bool },
     End,
 }
 
@@ -516,8 +515,8 @@ fn tokens(text: &str, dialect: Dialect) -> Result<Vec<(Token, Range<usize>)>, Ex
             b')' => (Token::Close, at + 1),
             b',' => (Token::Comma, at + 1),
             b @ (b'<' | b'>') if dialect == Dialect::General => {
-                let token = if b == b'<' { Token::Less } else { Token::Greater };
-                (token, at + 1 + usize::from(bytes.get(at + 1) == Some(&b'=')))
+                let equal = bytes.get(at + 1) == Some(&b'=');
+                (Token::Compare { less: b == b'<', equal }, at + 1 + usize::from(equal))
             }
             b'=' | b'!' if dialect == Dialect::General => {
                 return Err(ExpressionError {
@@ -721,19 +720,17 @@ impl Parser<'_> {
 
     fn comparison(&mut self) -> Parsed {
         let left = self.sum()?;
-        let less = match self.peek() {
-            Token::Less => true,
-            Token::Greater => false,
-            _ => return Ok(left),
-        };
+        let Token::Compare { less, equal } = *self.peek() else { return Ok(left) };
         self.advance();
         self.term()?;
         let right = self.sum()?;
-        if matches!(self.peek(), Token::Less | Token::Greater) {
+        if matches!(self.peek(), Token::Compare { .. }) {
             return Err(self.error("two comparisons in a row", Some("join them: 0 < x and x < 1".into())));
         }
-        let (left, right) = if less { (right, left) } else { (left, right) };
-        Ok(Expression::Greater(Box::new(left), Box::new(right)))
+        // a >= b is that b is not greater than a: the same where something moves, and what it says where all rests at equality.
+        let (left, right) = if less != equal { (right, left) } else { (left, right) };
+        let greater = Expression::Greater(Box::new(left), Box::new(right));
+        Ok(if equal { Expression::Not(Box::new(greater)) } else { greater })
     }
 
     fn sum(&mut self) -> Parsed {
@@ -1104,8 +1101,8 @@ mod tests {
     const GENERAL: [(&str, &str); 20] = [
         ("max(x, 0, alpha)", "max(x, 0, alpha)"),
         ("x < 1", "1 > x"),
-        ("x >= 1", "x > 1"),
-        ("x <= 1", "1 > x"),
+        ("x >= 1", "not 1 > x"),
+        ("x <= 1", "not x > 1"),
         ("not x > 0 and t < 1 or alpha > 0", "not x > 0 and 1 > t or alpha > 0"),
         ("not (x > 0 and (t < 1 or alpha > 0))", "not (x > 0 and (1 > t or alpha > 0))"),
         ("(x > 0)*(1 - x)", "(x > 0)*(1 - x)"),

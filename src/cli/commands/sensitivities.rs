@@ -7,6 +7,7 @@ use serde_json::json;
 use crate::cli::flags::RunFlags;
 use crate::cli::speak::{Delivery, deliver, try_delivery};
 use crate::cli::{CliError, Exit, ending, general};
+use crate::hybrid::motion::sensitivity::parameters;
 use crate::job::general::GeneralSensitivities;
 use crate::job::{Executor, JobError, Question, encode};
 
@@ -21,7 +22,7 @@ use crate::job::{Executor, JobError, Question, encode};
 pub struct Arguments {
     #[command(flatten)]
     flags: RunFlags,
-    /// The parameters, comma-separated [default: all].
+    /// The parameters, comma-separated [default: all that set no times of events].
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', help_heading = "Sensitivities")]
     by: Option<Vec<String>>,
     /// Output format [default: what the name of --out ends in, else text].
@@ -64,8 +65,7 @@ impl Arguments {
                 )
             })?,
         };
-        let all = || run.model.definition().parameters().iter().map(|p| p.name.clone()).collect();
-        let by = self.by.clone().unwrap_or_else(all);
+        let by = self.by.clone().unwrap_or_else(|| parameters(&run.model));
         Ok(GeneralSensitivities { run, by })
     }
 }

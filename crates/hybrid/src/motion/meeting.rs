@@ -89,7 +89,7 @@ impl Follower<'_> {
             self.outcome.switches += 1;
             self.settle(&zero)?;
             for guard in crossed {
-                let found = self.switch_trains[guard].note(self.t);
+                let found = self.switch_trains[guard].note(self.t, 0.0);
                 accumulates = accumulates.or(found.map(|(t, error)| (guard, t, error)));
             }
             self.watch_jumps(definition, &mut passed, &mut fired);
@@ -170,8 +170,11 @@ impl Follower<'_> {
             }
             let resets = matches!(event.when, When::Zero(..) | When::Becomes(_))
                 && (!event.set.is_empty() || event.mode.is_some());
-            if resets && let Some((t, error)) = self.trains[*i].note(self.t) {
-                zeno = Some((*i, t, error));
+            if resets {
+                let grain = self.grain(*i);
+                if let Some((t, error)) = self.trains[*i].note(self.t, grain) {
+                    zeno = Some((*i, t, error));
+                }
             }
         }
         if !new.iter().all(|v| v.is_finite()) {
@@ -265,6 +268,19 @@ impl Follower<'_> {
         }
         // What a reset or a new mode makes true happens at once.
         self.happen(definition, &newly, &[], observe)
+    }
+
+    /// The time of a flight over an event's surface whose height is a thousand roundings of the event's expression: shorter ones are not resolved.
+    fn grain(&mut self, event: usize) -> f64 {
+        let Some(watched) = self.event_of.iter().position(|e| *e == Some(event)) else { return 0.0 };
+        self.variables[..self.n].copy_from_slice(&self.x);
+        self.variables[self.n] = self.t;
+        let mut field = vec![0.0; self.n];
+        self.compiled.field.evaluate(&self.variables, &mut field);
+        let bend = self.second_along(&field, None)[self.compiled.active.len() + watched].abs();
+        let rounding = f64::EPSILON * self.terms_now(&self.equation.watched[watched]);
+        // A parabola of height bend*g^2/8.
+        if bend > 0.0 { (8e3 * rounding / bend).sqrt() } else { 0.0 }
     }
 
     /// A start at rest on a surface on which motion may stick, pressed against it, stays there.

@@ -250,16 +250,72 @@ impl Follower<'_> {
             if !quiet && depth < DEEPEST {
                 open.push((middle, b, depth + 1, between.clone(), last));
                 open.push((a, middle, depth + 1, first, between));
+            } else if !quiet && self.has_pole(step, middle, &field.clone()) {
+                return Some(a);
             }
         }
         None
+    }
+
+    /// Whether the field, which has this value at a place of a step where a divisor is as good as zero, has a pole there, integrable or not: it grows
+    /// towards it. What is continued through such a place, as sin(x)/x is, has none.
+    fn has_pole(&mut self, step: &Step, theta: f64, there: &[f64]) -> bool {
+        const DISTANCE: f64 = 1.0 / 256.0;
+        const GROWTH: f64 = 3.0;
+        if !self.compiled.gates.contains(&Gate::Divisor) {
+            return false;
+        }
+        let (mut at, mut field) = (vec![0.0; self.n], vec![0.0; self.n]);
+        let mut least = vec![f64::INFINITY; self.n];
+        for away in [theta - DISTANCE, theta + DISTANCE] {
+            if (0.0..=1.0).contains(&away) {
+                step.at(away, &mut at);
+                self.rhs(step.t + away * step.h, &at, &mut field);
+                least.iter_mut().zip(&field).for_each(|(l, f)| *l = l.min(f.abs()));
+            }
+        }
+        (0..self.n).any(|i| there[i].abs() > GROWTH * least[i])
+    }
+
+    /// The division by a number that comes to zero at once, if the motion from this point meets one: the equation that it is in.
+    fn division_ahead(&mut self, t: f64, x: &[f64]) -> Option<String> {
+        let compiled = self.compiled.clone();
+        let mut field = vec![0.0; self.n];
+        self.rhs(t, x, &mut field);
+        let longest = 1e-6 * (self.options.t_end - self.options.t_start);
+        let at = |follower: &mut Self, ahead: f64| {
+            for i in 0..follower.n {
+                follower.variables[i] = x[i] + ahead * field[i];
+            }
+            follower.variables[follower.n] = t + ahead;
+            let mut out = vec![0.0; compiled.gates.len()];
+            compiled.gate_arguments.evaluate(&follower.variables, &mut out);
+            out
+        };
+        let now = at(self, 0.0);
+        let comes = |follower: &mut Self, i: usize| {
+            // So far ahead that the divisor changes and is not yet zero.
+            let moved = x.iter().zip(&field).map(|(x, f)| (x / f).abs()).fold(longest, f64::min);
+            let d = at(follower, 1e-3 * moved)[i];
+            let left = 1e-3 * moved * now[i] / (now[i] - d);
+            left > 0.0 && left <= longest
+        };
+        let divisors: Vec<usize> = (0..now.len()).filter(|i| compiled.gates[*i] == Gate::Divisor).collect();
+        divisors.into_iter().find(|i| comes(self, *i))?;
+        let worst = (0..self.n).max_by(|i, j| {
+            let share = |i: usize| field[i].abs() / self.size[i].max(f64::MIN_POSITIVE);
+            share(*i).total_cmp(&share(*j))
+        })?;
+        let definition = self.model.definition();
+        let (name, mode) = (&definition.states()[worst].name, &definition.modes()[self.config.mode]);
+        Some(format!("a division by a number that comes to zero, in the equation of {name}, `{}`", mode.field[worst]))
     }
 
     /// Makes the step end where `sought` is zero, near `h`: Newton's method on steps of their own length.
     pub(super) fn land(&mut self, step: &mut Step, h: f64, longest: f64, sought: Sought) {
         let mut room = std::mem::take(&mut self.room);
         room.resize(self.n, 0.0);
-        let delta = 1e-4;
+        let delta = 1e-6;
         let (a, b) = ((h / longest - delta).max(0.0), (h / longest + delta).min(1.0));
         step.at(a, &mut room);
         let low = self.value_of(sought, self.t + a * longest, &room);
@@ -314,7 +370,8 @@ impl Follower<'_> {
         let d = d1.max(norm(&difference) / h0);
         let h1 = if d <= 1e-15 { h0 * 1e3 } else { rough_pow(0.01 / d, 0.2) };
         let h = if h1.is_finite() { (100.0 * h0).min(h1) } else { h0 };
-        h.min(span)
+        // The time moves.
+        h.max(1e3 * f64::EPSILON * self.t.abs()).min(span)
     }
 
     /// Where an expression's domain ends at a switch, as that of |x|^0.5 does on either side, no step goes across. Very near to it the state is put
@@ -354,7 +411,7 @@ impl Follower<'_> {
     }
 
     /// The gradient of a watched expression in the states, at those that the variables hold.
-    fn gradient(&self, t: f64, place: usize) -> Vec<f64> {
+    pub(super) fn gradient(&self, t: f64, place: usize) -> Vec<f64> {
         let n = self.n;
         let mut still = self.variables.clone();
         still[n] = t;
@@ -414,6 +471,7 @@ impl Follower<'_> {
         {
             return HybridError::Stuck { t, x: x.to_vec(), why };
         }
+        let what = what.or_else(|| self.division_ahead(t, x));
         let what = what.unwrap_or_else(|| {
             "steps become too short to move: a singularity, or a solution that grows without bound".into()
         });
@@ -463,6 +521,10 @@ impl Follower<'_> {
 fn are_quiet(gates: &[Gate], first: &[f64], between: &[f64], last: &[f64]) -> bool {
     gates.iter().enumerate().all(|(i, gate)| {
         let (p, q, r) = (first[i], between[i], last[i]);
+        // What does not move misses nothing, also at the logarithm of zero.
+        if p == q && q == r {
+            return true;
+        }
         // A parabola's reach beyond its three points.
         let bend = (0.5 * (p + r) - q).abs() * 0.5;
         gate.is_quiet(p.min(q).min(r) - bend, p.max(q).max(r) + bend)

@@ -7,8 +7,9 @@
 use super::tangent::explicit;
 use super::{Ending, Follower, HybridError, Options, Record};
 use crate::Model;
-use crate::definition::{Constant, ParameterEntry};
+use crate::definition::{Constant, ParameterEntry, When};
 use twofold_num::Decimal;
+use twofold_system::Expression;
 use twofold_system::document::{About, StateEntry};
 
 /// The derivatives of the state at the end of a run.
@@ -64,6 +65,32 @@ pub fn sensitivities(model: &Model, options: &Options, parameters: &[&str]) -> R
     })
 }
 
+/// The parameters that have derivatives: all but those that set times of events.
+pub fn parameters(model: &Model) -> Vec<String> {
+    let definition = model.definition();
+    let timed: Vec<&str> = definition
+        .events()
+        .iter()
+        .flat_map(|event| match &event.when {
+            When::At(times) => times.iter().flat_map(Expression::names).collect(),
+            When::Every(time) => time.names(),
+            _ => Vec::new(),
+        })
+        .collect();
+    let parameters = definition.parameters();
+    // A parameter that others are given by sets what they set.
+    let sets = |name: &str| {
+        let mut reached = vec![name];
+        for p in parameters {
+            if !model.is_given(&p.name) && p.value.names().iter().any(|n| reached.contains(n)) {
+                reached.push(&p.name);
+            }
+        }
+        reached.iter().any(|name| timed.contains(name))
+    };
+    parameters.iter().filter(|p| !sets(&p.name)).map(|p| p.name.clone()).collect()
+}
+
 /// The model and the start that its file gives.
 type Extended = (Model, Option<Vec<f64>>);
 
@@ -79,6 +106,10 @@ fn with_states(model: &Model, parameters: &[&str]) -> Result<(Extended, Vec<f64>
         if parameters[..i].contains(name) {
             return Err(bad(format!("the parameter `{name}` is named twice")));
         }
+    }
+    let with = self::parameters(model);
+    if let Some(name) = parameters.iter().find(|p| !with.iter().any(|w| w == *p)) {
+        return Err(bad(format!("no derivative by {name}, which sets the times of events; leave it out (--by)")));
     }
     let start = model.start().map_err(|e| bad(e.to_string()))?;
     let mut document = model.definition().document().clone();
@@ -240,7 +271,7 @@ mod tests {
         says(BALL, &at(1.5), &["g", "g"], "named twice");
         let timed =
             "states = ['x']\nstart = [1]\nf = ['-x']\n[parameters]\np = 1\n[[event]]\nevery = 'p'\nset = { x = '2*x' }";
-        says(timed, &at(1.5), &["p"], "a parameter that sets the times of events has none");
+        says(timed, &at(1.5), &["p"], "no derivative by p, which sets the times of events");
         let stops = "states = ['x']\nstart = [1]\nf = ['-1']\n[[event]]\nwhen = 'x'\nstop = true";
         says(stops, &at(3.0), &[], "before --t-end: give a time before it");
         let corner = "states = ['x', 'y']\nstart = [-1, -1]\nf = ['1 + 0.5*sign(x)', '1 + 0.5*sign(y)']";

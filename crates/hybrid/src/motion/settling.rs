@@ -25,6 +25,16 @@ impl Follower<'_> {
         }
     }
 
+    /// The size of the terms that an expression is a sum of, as they are now.
+    pub(super) fn terms_now(&self, e: &Expression) -> f64 {
+        match e {
+            Expression::Add(a, b) | Expression::Sub(a, b) => self.terms_now(a) + self.terms_now(b),
+            Expression::Neg(a) => self.terms_now(a),
+            Expression::Mul(a, b) => self.terms_now(a) * self.terms_now(b),
+            other => self.equation.value(other, self.t, &self.x).abs(),
+        }
+    }
+
     /// Which side a guard's value is on; none if it is zero to rounding.
     pub(super) fn side_of(&self, guard: usize) -> Option<f64> {
         let g = &self.equation.guards[guard];
@@ -49,10 +59,15 @@ impl Follower<'_> {
                 continue;
             }
             match self.side_of(guard) {
-                Some(side) => self.config.sides[guard] = side,
+                Some(side) => {
+                    self.config.sides[guard] = side;
+                    // A reset took it away from zero.
+                    self.fresh_guard[guard] = false;
+                }
                 None => {
+                    // What rests at equality is not greater.
                     self.config.sides[guard] =
-                        self.low(guard) + if self.equation.guards[guard].whole { 1.0 } else { 2.0 };
+                        self.low(guard) + if self.equation.guards[guard].whole { 1.0 } else { 0.0 };
                     at_zero.push(guard);
                 }
             }
@@ -198,6 +213,17 @@ impl Follower<'_> {
                     ways[set[0]] = if plus { Way::Plus } else { Way::Minus };
                     continue;
                 }
+                // A comparison of what rests, such as a counter: equality is what it says.
+                let guard = zero[set[0]];
+                let rests = |follower: &mut Self, plus: bool| {
+                    let (_, place, rates) = vertex(follower, &|i| i == set[0] && plus);
+                    place[set[0]].is_some_and(|p| rates.terms[p] == 0.0 && rates.second[p] == 0.0)
+                };
+                if self.equation.chooses(guard) && rests(self, false) && rests(self, true) {
+                    let plus = self.config.sides[guard] == highs[set[0]];
+                    ways[set[0]] = if plus { Way::Plus } else { Way::Minus };
+                    continue;
+                }
             }
             let found = possibilities(set.len(), |assignment| {
                 let slides: Vec<usize> = (0..set.len()).filter(|i| assignment[*i] == Way::Stay).collect();
@@ -261,9 +287,11 @@ impl Follower<'_> {
                     return false;
                 }
                 (0..set.len()).filter(|i| !slides.contains(i)).all(|i| {
-                    let rate =
-                        base[i] + columns.iter().zip(&weights).map(|((_, r, _), w)| w * (r[i] - base[i])).sum::<f64>();
-                    goes(i, rate)
+                    let added = || columns.iter().zip(&weights).map(|((_, r, _), w)| w * (r[i] - base[i]));
+                    let (rate, size) =
+                        (base[i] + added().sum::<f64>(), added().fold(base[i].abs(), |a, v| a + v.abs()));
+                    // What is zero to rounding goes nowhere.
+                    goes(i, if rate.abs() <= 1e-13 * size { 0.0 } else { rate })
                 })
             });
             let chosen = match found.as_slice() {
@@ -355,7 +383,46 @@ impl Follower<'_> {
                 return Err(self.no_mixture(&self.sliding));
             }
         }
+        self.no_side_is_left_open(&zero)?;
         self.follow_jumps(&zero)
+    }
+
+    /// A function that stays zero while the motion slides on another's zero has no side that the equations decide: so has x*z on x = 0. What its side
+    /// changes nothing of may stay open.
+    fn no_side_is_left_open(&mut self, zero: &[usize]) -> Result<(), HybridError> {
+        if self.sliding.is_empty() {
+            return Ok(());
+        }
+        let open: Vec<usize> = zero.iter().copied().filter(|g| !self.sliding.contains(g)).collect();
+        let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
+        self.rhs(t, &x, &mut field);
+        for guard in open {
+            let Some(place) = self.compiled.place(guard) else { continue };
+            self.variables[..self.n].copy_from_slice(&x);
+            self.variables[self.n] = t;
+            let side = self.config.sides[guard];
+            let mut other = self.config.clone();
+            other.sides[guard] = -side;
+            self.ask_new(&mut other);
+            let (here, there) = (self.rates(&self.config.clone()).1.field, self.rates(&other).1.field);
+            let gradient = self.gradient(t, place);
+            let rate = Self::along(&self.compiled, &self.variables, &field)[place];
+            let terms: f64 = gradient.iter().zip(&here).map(|(g, f)| (g * f).abs()).sum();
+            // Away from zero on its side, or moved by the time alone.
+            if self.equation.guards[guard].whole || rate * side > 1e-11 * terms || terms == 0.0 && rate != 0.0 {
+                continue;
+            }
+            if same(&here, &there) {
+                continue;
+            }
+            let why = format!(
+                "{} stays zero there while the motion slides on {}: write both switches by one function",
+                self.equation.guards[guard].expression,
+                self.names(&self.sliding)
+            );
+            return Err(self.undecided(&[guard], &why));
+        }
+        Ok(())
     }
 
     /// Surfaces by their places among `guards` in the order of the rule; those that it does not name are missing.

@@ -136,7 +136,7 @@ impl Follower<'_> {
             let (weights, _, field1) = self.separate_weights(t, x, out);
             for (i, owner) in self.separate.iter().flatten().enumerate() {
                 if let Some(place) = owner {
-                    out[i] += weights[*place] * (field1[i] - out[i]);
+                    out[i] = sum([out[i], weights[*place] * (field1[i] - out[i])].into_iter());
                 }
             }
         } else if !self.corners.is_empty() {
@@ -146,12 +146,11 @@ impl Follower<'_> {
             }
         } else if !self.sliding.is_empty() {
             let weights = self.weights(t, x, out);
-            let field0 = out.to_vec();
-            for (place, weight) in weights.iter().enumerate() {
-                let other = &self.positive_field(place, t, x);
-                for i in 0..n {
-                    out[i] += weight * (other[i] - field0[i]);
-                }
+            let others: Vec<Vec<f64>> = (0..weights.len()).map(|place| self.positive_field(place, t, x)).collect();
+            for i in 0..n {
+                let low = out[i];
+                let added = weights.iter().zip(&others).map(|(weight, other)| weight * (other[i] - low));
+                out[i] = sum(std::iter::once(low).chain(added));
             }
         }
         if !self.contacts.is_empty() {

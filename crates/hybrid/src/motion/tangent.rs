@@ -591,7 +591,8 @@ pub fn closed_orbit(model: &Model, options: &Options, after: &Return) -> Result<
         let first = turn(model, &options, &Return::Crossings(1), &x, false)?;
         (x, options.mode) = (first.end, first.mode);
     }
-    let mut best = f64::INFINITY;
+    let mut best: Option<ClosedOrbit> = None;
+    let gap_of = |best: &Option<ClosedOrbit>| best.as_ref().map_or(f64::INFINITY, |b| b.gap);
     for _ in 0..30 {
         let Turn { time, end, mode, mut matrix, section, size } = turn(model, &options, after, &x, true)?;
         // The same state in another mode is another point.
@@ -609,16 +610,26 @@ pub fn closed_orbit(model: &Model, options: &Options, after: &Return) -> Result<
         }
         let gap: Vec<f64> = end.iter().zip(&x).map(|(e, x)| e - x).collect();
         let off = gap.iter().fold(0.0_f64, |a, v| a.max(v.abs())) / size.max(f64::MIN_POSITIVE);
-        if off <= 1e-11 || (off >= best && best <= 1e-8) {
+        if off >= gap_of(&best)
+            && gap_of(&best) <= 1e-8
+            && let Some(best) = best
+        {
+            // As near as rounding lets it come. Where orbits are not isolated the next step may lead anywhere.
+            return Ok(best);
+        }
+        if off < gap_of(&best) {
             let mut multipliers = eigenvalues(&matrix, n).unwrap_or_default();
             multipliers.sort_by(|a, b| (b[0] * b[0] + b[1] * b[1]).total_cmp(&(a[0] * a[0] + a[1] * a[1])));
             if section.is_some() {
                 // The return map has an eigenvalue 0 along the field, which is none of the orbit's.
                 multipliers.pop();
             }
-            return Ok(ClosedOrbit { x, period: time, multipliers, gap: off });
+            let found = ClosedOrbit { x: x.clone(), period: time, multipliers, gap: off };
+            if off <= 1e-11 {
+                return Ok(found);
+            }
+            best = Some(found);
         }
-        best = best.min(off);
         let mut system = vec![0.0; n * n];
         for i in 0..n {
             for j in 0..n {
@@ -629,7 +640,8 @@ pub fn closed_orbit(model: &Model, options: &Options, after: &Return) -> Result<
         x.iter_mut().zip(&change).for_each(|(x, c)| *x += c);
     }
     Err(HybridError::NoOrbit(format!(
-        "Newton's method found no closed orbit (the best return was {best:e} off): start nearer (--start), or let the motion settle longer"
+        "Newton's method found no closed orbit (the best return was {:e} off): start nearer (--start), or let the motion settle longer",
+        gap_of(&best)
     )))
 }
 
