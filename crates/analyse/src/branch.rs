@@ -404,6 +404,10 @@ const FEW: usize = 3;
 const MANY: usize = 8;
 /// A step along which multipliers change by more than this is halved.
 const JUMP: f64 = 0.75;
+/// The longest step as a share of the orbit's own extent.
+const REACH: f64 = 0.4;
+/// An orbit of this share of the branch's largest extent has shrunk to a point.
+const GONE: f64 = 1e-4;
 
 /// A point of the branch, scaled: the state by its size, the parameter by its range.
 #[derive(Clone)]
@@ -429,6 +433,11 @@ pub fn follow(
         let last = &branch.orbits[branch.orbits.len() - 1];
         let n = last.point.len();
         let (du, dp) = direction.clone().unwrap_or((vec![0.0; n], towards));
+        // An orbit that shrinks to a point is not stepped over: behind it the same orbits come again, seen from their other side.
+        let way = scales.state * sqrt(du.iter().map(|d| d * d).sum());
+        if step * way > REACH * last.extent {
+            step = REACH * last.extent / way;
+        }
         let guess: Vec<f64> = last.point.iter().zip(&du).map(|(u, d)| u + step * scales.state * d).collect();
         let p = last.parameter + step * scales.parameter * dp;
         let beyond = (p - options.to) * towards >= 0.0;
@@ -457,14 +466,21 @@ pub fn follow(
                 step *= 0.5;
                 if step < SHORTEST * options.longest {
                     let missed = 4.0 * step * scales.parameter;
-                    let (change, end) = ended(map, &branch.orbits, trouble, missed);
-                    branch.bifurcations.extend(change);
-                    branch.end = end;
+                    finish(map, &mut branch, trouble, missed, &scales);
                     return branch;
                 }
                 continue;
             }
         };
+        let widest = branch.orbits.iter().map(|o| o.extent).fold(0.0, f64::max);
+        if next.extent <= GONE * widest {
+            let (missed, said) = ((next.parameter - last.parameter).abs(), "the orbit shrinks to a point".to_owned());
+            let trouble = Trouble { obstacle: Obstacle::Point(next.point.clone()), said };
+            go_on(&next);
+            branch.orbits.push(next);
+            finish(map, &mut branch, trouble, missed, &scales);
+            return branch;
+        }
         let (su, sp) = (
             next.point.iter().zip(&last.point).map(|(a, b)| (a - b) / scales.state).collect::<Vec<f64>>(),
             (next.parameter - last.parameter) / scales.parameter,
@@ -489,6 +505,20 @@ pub fn follow(
         }
     }
     branch
+}
+
+/// Ends a branch where it cannot be followed.
+fn finish(map: &dyn ReturnMap, branch: &mut Branch, trouble: Trouble, missed: f64, scales: &Scales) {
+    let (change, end) = ended(map, &branch.orbits, trouble, missed);
+    if let (End::Vanished, Some(last)) = (&end, &change) {
+        // Where orbits shrink to a point a multiplier is 1, which is no change of its own.
+        let near = |b: &Bifurcation| {
+            (b.parameter - last.parameter).abs() <= b.uncertainty + last.uncertainty + 1e-6 * scales.parameter
+        };
+        branch.bifurcations.retain(|b| !(matches!(b.change, Change::Fold | Change::Branching) && near(b)));
+    }
+    branch.bifurcations.extend(change);
+    branch.end = end;
 }
 
 /// An orbit of at most this share of the branch's largest extent is about to vanish, if there is none beyond it.
@@ -1160,8 +1190,9 @@ mod tests {
     #[test]
     fn a_branch_ends_where_its_orbits_shrink_to_a_hopf_point() {
         let first = closed_orbit(&Shrinking, &[0.7, 0.0], 0.5, NEWTON).unwrap();
-        for to in [-0.5, -3.0] {
-            let options = BranchOptions { from: 0.5, to, longest: 0.1, most: 200, newton: NEWTON };
+        // With long steps too, which could pass the point and find the same orbits from their other side.
+        for (to, longest) in [(-0.5, 0.1), (-3.0, 0.1), (-0.5, 1.0), (-3.0, 5.0)] {
+            let options = BranchOptions { from: 0.5, to, longest, most: 200, newton: NEWTON };
             let branch = follow(&Shrinking, first.clone(), &options, &mut |_| true);
             assert_eq!(branch.end, End::Vanished);
             assert!(branch.orbits.iter().all(|o| o.parameter > -1e-12 && o.point[0] > 0.0), "{branch:?}");

@@ -425,7 +425,8 @@ impl Scan {
         let given = cells
             .iter()
             .flat_map(|c| self.axes().iter().zip(&c.0))
-            .filter_map(|(axis, entry)| matches!(axis.coordinate, Coordinate::Start(_)).then(|| entry.value()));
+            .filter(|(axis, _)| matches!(axis.coordinate, Coordinate::Start(_)))
+            .map(|(_, entry)| entry.value());
         let start = match &self.subject {
             Subject::Surfaces(sweep) => sweep.run().start.clone(),
             Subject::General(run, _) => {
