@@ -286,6 +286,15 @@ struct Train {
 }
 
 impl Train {
+    /// Whether what happened before, and at `t` again, comes in ever shorter times.
+    fn shrinks(&self, t: f64) -> bool {
+        let n = self.times.len();
+        n >= 5 && {
+            let gap = |i: usize| self.times[n - i] - self.times[n - i - 1];
+            t - self.times[n - 1] < gap(1) && gap(1) < gap(2) && gap(2) < gap(3)
+        }
+    }
+
     /// Notes one more; gives the time at which infinitely many are over, with a bound on its error, once that is known. Times that are less than
     /// `grain` apart are not told apart reliably.
     fn note(&mut self, t: f64, grain: f64) -> Option<(f64, f64)> {

@@ -171,7 +171,7 @@ impl Follower<'_> {
             let resets = matches!(event.when, When::Zero(..) | When::Becomes(_))
                 && (!event.set.is_empty() || event.mode.is_some());
             if resets {
-                let grain = self.grain(*i);
+                let grain = if self.trains[*i].shrinks(self.t) { self.grain(*i) } else { 0.0 };
                 if let Some((t, error)) = self.trains[*i].note(self.t, grain) {
                     zeno = Some((*i, t, error));
                 }
