@@ -792,8 +792,8 @@ impl RunFlags {
 fn from_file(name: &str) -> Result<System, Misuse> {
     let path = Path::new(name);
     let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    // A general system's file comes here if it cannot be read as one.
-    let is_file = json || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) || path.is_file();
+    // A general system's file comes here if it cannot be read as one, and so does a file's name that is misspelt.
+    let is_file = name.contains(['.', '/', '\\']) || path.is_file();
     if !is_file {
         let (help, known) = super::general::known(name);
         return Err(Misuse::NoSuchSystem { name: name.into(), help, known });

@@ -131,10 +131,17 @@ impl Arguments {
             ("--t-end", given.contains(&"--t-end")),
         ];
         if let Some((flag, _)) = refused.iter().find(|(_, given)| *given) {
-            return Err(CliError::no_effect(
-                *flag,
-                "it has none on orbits of general systems; leave it out (a section's other side is -(...)=0)",
-            ));
+            let why = match *flag {
+                "--along" => {
+                    "branches are followed of systems with h, plus and minus; an attractor of this one is followed by `twofold scan --follow`"
+                }
+                "--downward" => {
+                    "a section's other side is that of its negative, such as --section \"-v=0\"; leave it out"
+                }
+                "--t-end" => "--settle and --longest-return say how long motion is followed; leave it out",
+                _ => "an orbit is its point, period and multipliers; leave it out",
+            };
+            return Err(CliError::no_effect(*flag, why));
         }
         let driven = run.model.depends_on_time();
         let after = match (self.period, &run.options.record) {

@@ -444,8 +444,8 @@ pub fn exponents(model: &Model, options: &Options, transient: f64, count: usize)
     let (outcome, follower) = follower.run_whole(&mut |_| true)?;
     if outcome.ending != Ending::Finished {
         return Err(HybridError::Bad(format!(
-            "the run ends at t = {} ({:?}), and there is no mean",
-            outcome.t, outcome.ending
+            "the run ends at t = {}, before its end time, and there is no mean: end it before that (--t-end)",
+            outcome.t
         )));
     }
     let growth = follower.growth.ok_or_else(|| HybridError::Bad("there is no mean".into()))?;
@@ -690,9 +690,14 @@ fn turn(model: &Model, options: &Options, after: &Return, x: &[f64], on_section:
         Return::Crossings(_) => crossings >= wanted,
     };
     if !back {
+        let ending = match &outcome.ending {
+            Ending::Stopped(event) => format!("where {event} ends the run"),
+            Ending::Zeno { event, .. } => format!("where {event} accumulates"),
+            Ending::Finished | Ending::Interrupted => "and is not followed further".to_owned(),
+        };
         let why = format!(
-            "the orbit does not come back to the section by t = {} ({:?}): give a later end (--t-end), another section or start",
-            outcome.t, outcome.ending
+            "the orbit does not come back to the section by t = {}, state {:?}, {ending}: follow it longer (--longest-return), or give another section or start",
+            outcome.t, outcome.x
         );
         return Err(HybridError::NoOrbit(why));
     }
