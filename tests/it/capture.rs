@@ -14,7 +14,7 @@ use twofold::paper::{Reading, effects};
 use crate::census::{path, rows};
 use crate::examples::visits;
 
-fn table(name: &str) -> Table {
+pub fn table(name: &str) -> Table {
     rows(&format!("figures/{name}.csv")).table()
 }
 
@@ -61,21 +61,21 @@ fn candidates() -> Vec<Candidate> {
 }
 
 /// The texts between the marks of a page, in order, are these.
-fn page_says(page: &str, texts: &[String]) {
+pub fn page_says(page: &str, begin: &str, end: &str, texts: &[String]) {
     let before = fs::read_to_string(path(page)).unwrap();
-    let mut parts = before.split(capture::BEGIN);
+    let mut parts = before.split(begin);
     let mut after = parts.next().unwrap().to_owned();
     let mut texts = texts.iter();
     for part in parts {
-        let (_, rest) = part.split_once(capture::END).unwrap_or_else(|| panic!("a text in {page} has no end"));
+        let (_, rest) = part.split_once(end).unwrap_or_else(|| panic!("a text in {page} has no end"));
         let text = texts.next().unwrap_or_else(|| panic!("{page} has more places than texts"));
-        after.push_str(&format!("{}\n\n{}\n\n{}{rest}", capture::BEGIN, text.trim(), capture::END));
+        after.push_str(&format!("{begin}\n\n{}\n\n{end}{rest}", text.trim()));
     }
     assert!(texts.next().is_none(), "{page} has too few places for texts");
     if std::env::var_os("TWOFOLD_UPDATE").is_some() {
         fs::write(path(page), after).unwrap();
     } else {
-        assert!(before == after, "{page} does not say what figures/capture says; TWOFOLD_UPDATE=1 writes:\n{after}");
+        assert!(before == after, "{page} does not say what the runs say; TWOFOLD_UPDATE=1 writes:\n{after}");
     }
 }
 
@@ -84,7 +84,7 @@ fn the_page_of_methods_says_what_the_study_says() {
     let rules = &claims().rules;
     let (fig7, fig8) = (table("census/fig7"), table("census/fig8"));
     let texts = [capture::capture_text(&methods(), rules), capture::effects_text(&fig7, &fig8, rules)];
-    page_says("docs/capture.md", &texts);
+    page_says("docs/capture.md", capture::BEGIN, capture::END, &texts);
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn the_page_of_parameters_says_what_the_study_says() {
         capture::priors_text(&candidates, rules),
         capture::map_text([&map7, &map8], [&old7, &old8], rules),
     ];
-    page_says("docs/parameters.md", &texts);
+    page_says("docs/parameters.md", capture::BEGIN, capture::END, &texts);
 }
 
 /// The hazard ratios that the findings and README repeat.

@@ -48,6 +48,7 @@ mod readme;
 mod records;
 mod reference;
 mod report;
+mod resolved;
 mod rigor_interval;
 mod rigor_law;
 mod rigor_theorems;

@@ -34,6 +34,7 @@ pub mod effects;
 pub mod pipeline;
 pub mod plots;
 pub mod report;
+pub mod resolved;
 pub mod similarity;
 pub mod standing;
 pub mod study;

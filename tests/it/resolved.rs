@@ -1,0 +1,88 @@
+//! The census by methods that resolve the layer: docs/resolved.md says what figures/resolved says. `TWOFOLD_UPDATE=1 cargo test --test it resolved::` writes
+//! the texts anew.
+
+use twofold::job::table::{Entry, Table};
+use twofold::paper::census::PANELS;
+use twofold::paper::claims::claims;
+use twofold::paper::effects::LogRank;
+use twofold::paper::resolved::{self, Belongs, compared};
+use twofold::paper::{Reading, capture, census};
+
+use crate::capture::{page_says, table};
+use crate::census::rows;
+
+fn tables(names: &[&str]) -> Vec<Table> {
+    names.iter().map(|name| table(name)).collect()
+}
+
+fn lsoda() -> Vec<Table> {
+    tables(&["census/fig7", "census/fig8"])
+}
+
+fn taylor() -> Vec<Table> {
+    tables(&["resolved/taylor7", "resolved/taylor8"])
+}
+
+#[test]
+fn the_page_says_what_the_runs_say() {
+    let rules = &claims().rules;
+    let (lsoda, taylor, layered) = (lsoda(), taylor(), tables(&["resolved/layered7"]));
+    let against_lsoda = compared(&lsoda, &taylor);
+    assert_eq!(against_lsoda.len(), 12);
+    assert!(against_lsoda.iter().all(|c| c.reference.len() == 300 && c.runs.len() == 100));
+    let tolerances: Vec<_> = Reading::ALL
+        .into_iter()
+        .map(|reading| {
+            let alpha = || vec![("params.alpha", Entry::Number(reading.caricature().alpha))];
+            let tight = census::runs(&table(&format!("capture/taylor-{}", reading.word())), &alpha());
+            (reading, PANELS[2].runs(&taylor[0], alpha()), tight)
+        })
+        .collect();
+    let texts = [
+        resolved::outcomes_text(&against_lsoda, rules),
+        resolved::kinds_text(&against_lsoda, ["LSODA", "Taylor 10⁻¹³"], rules),
+        resolved::kinds_text(&compared(&taylor, &layered), ["Taylor 10⁻¹³", "layered 10⁻¹³"], rules),
+        resolved::tolerance_text(&tolerances, rules),
+    ];
+    page_says("docs/resolved.md", resolved::BEGIN, resolved::END, &texts);
+}
+
+/// No start is shared with LSODA or between methods, as the rules have it; fig. 7 and 8 share none either.
+#[test]
+fn no_two_samples_share_a_start() {
+    let shifts = |t: &Table| -> Vec<u64> { t.numbers("shift.x").iter().map(|v| v.to_bits()).collect() };
+    let layered = table("resolved/layered7");
+    let mut all: Vec<u64> = lsoda().iter().take(1).chain(&taylor()).chain([&layered]).flat_map(shifts).collect();
+    let count = all.len();
+    all.sort_unstable();
+    all.dedup();
+    assert_eq!(all.len(), count);
+}
+
+/// Rows that are quick, computed anew: the same to the last bit.
+#[test]
+fn committed_rows_come_out_the_same() {
+    for (name, number) in [("taylor7", 2), ("taylor8", 2), ("layered7", 2)] {
+        let rows = rows(&format!("figures/resolved/{name}.csv"));
+        let row = rows.get(number).unwrap();
+        assert_eq!(rows.sweep().row(number, &()).unwrap().line(), row.line(), "{name}");
+    }
+}
+
+/// What the page says of whose the outcomes are, and that the two resolving methods do not agree in the printed reading, follows from the runs.
+#[test]
+fn outcomes_belong_to_whom_the_page_says() {
+    use Belongs::{Neither, OtherOdds, System};
+    let rules = &claims().rules;
+    let found: Vec<Belongs> =
+        resolved::belongs(&compared(&lsoda(), &taylor()), rules).into_iter().map(|(whose, _)| whose).collect();
+    let printed = [System, Neither, Neither, Neither, System, System];
+    assert_eq!(found, [printed, [OtherOdds, System, System, System, OtherOdds, OtherOdds]].concat());
+    let methods = compared(&taylor(), &tables(&["resolved/layered7"]));
+    let ratio = |c: &resolved::Compared| {
+        let times = |runs: &[census::Run]| runs.iter().map(|r| capture::time(r, rules.end)).collect::<Vec<_>>();
+        LogRank::of(&times(&c.runs), &times(&c.reference)).hazard_ratio(rules.confidence)
+    };
+    assert!(methods[..3].iter().all(|c| ratio(c).interval[1] < 0.5));
+    assert!(methods[3..].iter().all(|c| ratio(c).interval[0] > 0.7));
+}
