@@ -145,7 +145,7 @@ mod tests {
         let changes: [&dyn Fn(&mut Picture); 6] = [
             &|p| p.panels[0].title.push('.'),
             &|p| p.panels[0].label.push('.'),
-            &|p| p.panels[0].claim = None,
+            &|p| p.panels[0].claim = Some(crate::Claim::LessOrganisedThanNext),
             &|p| p.panels[0].run.t_end += 1.0,
             &|p| p.view = View::Section { horizontal: 2, vertical: 0 },
             &|p| drop(p.panels.pop()),
