@@ -157,21 +157,24 @@ impl Equation {
         Ok(equation)
     }
 
-    fn reset(&self, set: &[(usize, Expression)]) -> Option<Program> {
-        let whole = |e: &Expression| {
-            let names = e.names();
-            let tables = &self.definition.tables;
-            !asks(e) && names.iter().all(|n| self.term(n).is_none() && !tables.iter().any(|(table, _)| table == n))
-        };
-        if !set.iter().all(|(_, e)| whole(e)) {
-            return None;
-        }
+    /// Whether an expression is one of states, time and parameters, which no switching function decides.
+    fn is_plain(&self, e: &Expression) -> bool {
+        let tables = &self.definition.tables;
+        !asks(e) && e.names().iter().all(|n| self.term(n).is_none() && !tables.iter().any(|(table, _)| table == n))
+    }
+
+    /// Plain expressions as a tape.
+    fn record(&self, plain: &[&Expression]) -> Tape {
         let at = Configuration { mode: 0, sides: vec![1.0; self.guards.len()], pieces: Vec::new() };
-        let tape = Tape::record(self.variables(), |v| {
+        Tape::record(self.variables(), |v| {
             let mut writer = Writer { equation: self, at: &at, v, terms: HashMap::new(), guards: BTreeMap::new() };
-            set.iter().map(|(_, e)| writer.number(e)).collect()
-        });
-        Some(Program::new(&tape))
+            plain.iter().map(|e| writer.number(e)).collect()
+        })
+    }
+
+    fn reset(&self, set: &[(usize, Expression)]) -> Option<Program> {
+        let values: Vec<&Expression> = set.iter().map(|(_, e)| e).collect();
+        values.iter().all(|e| self.is_plain(e)).then(|| Program::new(&self.record(&values)))
     }
 
     /// Number of states.
@@ -321,35 +324,18 @@ impl Equation {
         }
     }
 
-    /// A key that sums of the same states, time and numbers share in whatever scale and order they are written, and whether the sum is the key's negative.
+    /// A key that sums of the same states and time share in whatever scale and order they are written, and whether the sum is the key's negative.
     fn sum_key(&self, e: &Expression) -> Option<(String, bool)> {
-        let mut names: Vec<String> = e.names().into_iter().map(str::to_owned).collect();
-        names.sort_unstable();
-        names.dedup();
-        names.retain(|name| !self.values.contains_key(name));
-        let is_linear = names.iter().all(|n| n == "t" || self.definition.states.iter().any(|s| s.name == *n));
-        if names.is_empty() || !is_linear || asks(e) {
+        if !self.is_plain(e) {
             return None;
         }
-        let value = |at: &dyn Fn(&str) -> f64| {
-            crate::model::evaluate(e, &|name| match self.values.get(name) {
-                Some(value) => Some(*value),
-                None => Some(at(name)),
-            })
-        };
-        let constant = value(&|_| 0.0);
-        let factors: Vec<f64> =
-            names.iter().map(|n| value(&|name| f64::from(u8::from(name == n))) - constant).collect();
-        // Linear: also at a point where nothing is zero, one or small.
-        let point = |name: &str| 0.7 + 1.3 * names.iter().position(|n| n == name).unwrap_or(0) as f64;
-        let sum = names.iter().zip(&factors).map(|(n, f)| f * point(n)).sum::<f64>() + constant;
-        let size = names.iter().zip(&factors).map(|(n, f)| (f * point(n)).abs()).sum::<f64>() + constant.abs();
-        let first = *factors.iter().find(|f| **f != 0.0)?;
-        if !((value(&point) - sum).abs() <= 1e-13 * size) {
-            return None;
-        }
-        let scaled = |v: f64| format!("{:.13e}", v / first + 0.0);
-        let terms: Vec<String> = names.iter().zip(&factors).map(|(n, f)| format!("{n} {}", scaled(*f))).collect();
+        let Affine { constant, mut factors } = affine(&self.record(&[e])).pop()??;
+        factors.retain(|(_, factor)| *factor != 0.0);
+        factors.sort_unstable_by_key(|(variable, _)| *variable);
+        let first = factors.first()?.1;
+        // Without the last digit, in which the same ratio may differ.
+        let scaled = |v: f64| format!("{:.14e}", v / first + 0.0);
+        let terms: Vec<String> = factors.iter().map(|(variable, f)| format!("{variable} {}", scaled(*f))).collect();
         Some((format!("sum {} {}", terms.join(" "), scaled(constant)), first < 0.0))
     }
 

@@ -911,7 +911,10 @@ fn one_surface_is_one_switching_function() {
     }
     let moving = "states = ['x', 'y']\nstart = [1, 0]\nf = ['0.25 - sign(x - 0.1*t)', 'sign(10*x - t)']";
     near(end(moving, 3.0)[0], 0.3, 1e-12);
-    // Near to each other is not the same; and what only vanishes there is refused.
+    // Near to each other is not the same, in any units; and what only vanishes there is refused.
+    let far =
+        "states = ['x', 'y']\nstart = [-0.999995e12, 0]\nf = ['0', 'sign(1e-12*x + 1) + sign(1.00001e-12*x + 1)']";
+    near(last(far, 1.0), 0.0, 0.0);
     near(end(&y("sign(x + 1e-9)"), 3.0)[1], 3.0, 1e-8);
     for switch in ["sign(x*z)", "sign(x + abs(x)/2)"] {
         let error = run(&model(&y(switch)), 3.0).1.unwrap_err();
