@@ -250,7 +250,7 @@ impl Follower<'_> {
             if !quiet && depth < DEEPEST {
                 open.push((middle, b, depth + 1, between.clone(), last));
                 open.push((a, middle, depth + 1, first, between));
-            } else if !quiet && self.has_pole(step, middle, &field.clone()) {
+            } else if !quiet && self.has_pole(step, middle, &field) {
                 return Some(a);
             }
         }

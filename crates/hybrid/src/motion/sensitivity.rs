@@ -1,8 +1,8 @@
 //! How the state at the end of a run changes with the start and with parameters.
 //!
-//! Parameters become states that do not move, so that one set of tangent vectors, with the same saltation matrices, carries both (Galán, Feehery & Barton
-//! 1999, Applied Numerical Mathematics 31, 17, derive the jumps of parametric sensitivities in this way). Everything that happens at a switch or reset is in them: that it comes
-//! earlier or later, and that the reset itself depends on the parameter.
+//! Parameters become states that do not move, so that one set of tangent vectors, with the same saltation matrices, carries both. Everything that happens
+//! at a switch or reset is in them: that it comes earlier or later, and that the reset itself depends on the parameter (the jumps of parametric
+//! sensitivities: Galán, Feehery & Barton 1999, Applied Numerical Mathematics 31, 17).
 
 use super::tangent::explicit;
 use super::{Ending, Follower, HybridError, Options, Record};
@@ -107,19 +107,18 @@ fn with_states(model: &Model, parameters: &[&str]) -> Result<(Extended, Vec<f64>
             return Err(bad(format!("the parameter `{name}` is named twice")));
         }
     }
-    let with = self::parameters(model);
-    if let Some(name) = parameters.iter().find(|p| !with.iter().any(|w| w == *p)) {
+    let derivable = self::parameters(model);
+    if let Some(name) = parameters.iter().find(|p| !derivable.iter().any(|d| d == *p)) {
         return Err(bad(format!("no derivative by {name}, which sets the times of events; leave it out (--by)")));
     }
     let start = model.start().map_err(|e| bad(e.to_string()))?;
     let mut document = model.definition().document().clone();
     document.start = None;
-    let zero = || Constant::Number(0.0);
     let names: Vec<String> = parameters.iter().map(|p| (*p).to_owned()).collect();
     document.states.extend(names.iter().map(|name| StateEntry { name: name.clone(), about: About::default() }));
     let fields = [&mut document.f, &mut document.plus, &mut document.minus].into_iter().flatten();
     for field in fields.chain(document.modes.0.iter_mut().map(|(_, mode)| &mut mode.f)) {
-        field.extend(names.iter().map(|_| zero()));
+        field.extend(names.iter().map(|_| Constant::Number(0.0)));
     }
     // A parameter that is given by others moves with them, unless it has a value of its own.
     let mut moving = names.clone();
@@ -144,12 +143,8 @@ fn with_states(model: &Model, parameters: &[&str]) -> Result<(Extended, Vec<f64>
         }
     }
     document.parameters.0 = kept;
-    let extended = model.redefined(document).map_err(|why| {
-        bad(format!(
-            "no derivative by {}: {why} (a parameter that sets the times of events has none)",
-            names.join(", ")
-        ))
-    })?;
+    let extended =
+        model.redefined(document).map_err(|why| bad(format!("no derivative by {}: {why}", names.join(", "))))?;
     Ok(((extended, start), names.iter().map(|n| values[n]).collect()))
 }
 

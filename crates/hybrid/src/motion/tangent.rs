@@ -177,47 +177,37 @@ impl Follower<'_> {
             self.variables[n] = t;
             let mut field0 = vec![0.0; n];
             self.compiled.field.evaluate(&self.variables, &mut field0);
-            let place = |follower: &Self, guard: usize| follower.compiled.place(guard);
-            let compiled = self.compiled.clone();
-            let at_rest = Self::along(&compiled, &self.variables, &vec![0.0; n]);
+            // What each surface's positive side adds to the field, and to the surfaces' functions.
             let separate = self.separate.clone();
-            let (jumps, field1) = match separate {
-                Some(_) => {
+            let (added, matrix): (Vec<Vec<f64>>, Vec<f64>) = match &separate {
+                Some(owners) => {
                     let (_, jumps, field1) = self.separate_weights(t, &x, &field0);
-                    (jumps, field1)
+                    let of = |place: usize| {
+                        let own = |i: usize| if owners[i] == Some(place) { field1[i] - field0[i] } else { 0.0 };
+                        (0..n).map(own).collect()
+                    };
+                    let diagonal = |i: usize| if i / k == i % k { jumps[i / k] } else { 0.0 };
+                    ((0..k).map(of).collect(), (0..k * k).map(diagonal).collect())
                 }
-                None => (Vec::new(), Vec::new()),
+                None => {
+                    let matrix = self.sliding_equations(t, &x, &field0).1;
+                    let difference = |high: Vec<f64>| high.iter().zip(&field0).map(|(a, b)| a - b).collect();
+                    ((0..k).map(|place| difference(self.positive_field(place, t, &x))).collect(), matrix)
+                }
             };
-            let matrix = if separate.is_some() { Vec::new() } else { self.sliding_equations(t, &x, &field0).1 };
-            let others: Vec<Vec<f64>> =
-                if separate.is_some() { Vec::new() } else { (0..k).map(|c| self.positive_field(c, t, &x)).collect() };
             self.variables[..n].copy_from_slice(&x);
             self.variables[n] = t;
+            let compiled = self.compiled.clone();
+            let in_time = Self::along(&compiled, &self.variables, &vec![0.0; n]);
             for y in &mut vectors {
                 let moved = Self::along(&compiled, &self.variables, y);
-                let off: Vec<f64> = self
-                    .sliding
-                    .iter()
-                    .map(|g| place(self, *g).map_or(f64::NAN, |p| -(moved[p] - at_rest[p])))
-                    .collect();
-                match &separate {
-                    Some(owners) => {
-                        for (i, owner) in owners.iter().enumerate() {
-                            if let Some(p) = owner {
-                                y[i] += off[*p] / jumps[*p] * (field1[i] - field0[i]);
-                            }
-                        }
-                    }
-                    None => {
-                        let Some(weights) = solve_any(&matrix, &off, 0.0) else {
-                            return Err(self.no_tangents("motion begins where sliding is not defined"));
-                        };
-                        for (weight, other) in weights.iter().zip(&others) {
-                            for i in 0..n {
-                                y[i] += weight * (other[i] - field0[i]);
-                            }
-                        }
-                    }
+                let off = |guard: &usize| compiled.place(*guard).map_or(f64::NAN, |p| in_time[p] - moved[p]);
+                let off: Vec<f64> = self.sliding.iter().map(off).collect();
+                let Some(weights) = solve_any(&matrix, &off, 0.0) else {
+                    return Err(self.no_tangents("motion begins where sliding is not defined"));
+                };
+                for (weight, added) in weights.iter().zip(&added) {
+                    y.iter_mut().zip(added).for_each(|(y, a)| *y += weight * a);
                 }
             }
         }
