@@ -476,6 +476,11 @@ fn scans_follow_attractors_up_and_down() {
     let slip = ["--system", "stick-slip", "--section", "x=0.5", "--over", "params.belt=0.3,0.4", "--t-end", "20"];
     let up = scanned(at, &[&slip[..], &["--follow", "up"]].concat());
     assert_eq!(names(&up), ["params.belt", "follow", "t", "x", "v"]);
+    let sliding = scanned(at, &[&slip[..], &["--follow", "down", "--switch", "filippov"]].concat());
+    assert_eq!(sliding.numbers("params.belt").first(), Some(&0.4));
+    // What has a memory beside its coordinates is not handed on.
+    let memory = [&["scan", "--quiet", "--follow", "up", "--switch", "hysteretic"][..], &slip].concat();
+    refused(at, &memory, 2, &["of a switch with a memory"]);
     for (more, says) in [
         (&["--follow", "up", "--section", "x=0"][..], "--period has no effect"),
         (&["--over", "start.x=0,1", "--follow", "up"], "give --over once"),

@@ -15,6 +15,7 @@ use super::executor::{Executor, JobWatch, Progress};
 use super::general::GeneralRun;
 use super::question::JobError;
 use super::run::Run;
+use super::spec::SwitchSpec;
 use super::sweep::{self, Axis, Coordinate, Sweep};
 use super::table::{Column, Entry, Table};
 use super::{Answer, Stop};
@@ -167,6 +168,14 @@ impl Scan {
             if !matches!(axes[0].value(0, 0.5), Entry::Number(_) | Entry::Integer(_)) {
                 return Err("an attractor is followed along numbers".into());
             }
+            if let Subject::Surfaces(sweep) = &scan.subject
+                && !matches!(sweep.run().switch, SwitchSpec::Smoothed { .. } | SwitchSpec::Filippov { .. })
+            {
+                return Err(
+                    "of a switch with a memory more than the coordinates would have to be handed on; leave --follow out"
+                        .into(),
+                );
+            }
         }
         let runs = scan.cells().saturating_mul(if follow == Some(Follow::Both) { 2 } else { 1 });
         if runs > MOST_RUNS {
@@ -318,8 +327,7 @@ impl Scan {
         }
         let run = &mut question.0.run;
         if let Some((state, _)) = from {
-            // A hysteretic switch has a state of its own behind the system's.
-            run.start = state[..run.start.len()].to_vec();
+            run.start.clone_from(state);
         }
         let answer = executor.ask(&Run(run.clone()))?;
         if answer.stop == Stop::Interrupted {
@@ -429,9 +437,7 @@ impl Scan {
             .map(|(_, entry)| entry.value());
         let start = match &self.subject {
             Subject::Surfaces(sweep) => sweep.run().start.clone(),
-            Subject::General(run, _) => {
-                run.options.start.clone().or_else(|| run.model.start().ok().flatten()).unwrap_or_default()
-            }
+            Subject::General(run, _) => start_of(run).unwrap_or_default(),
         };
         let near = self.alike * places.chain(start.into_iter().chain(given)).fold(0.0_f64, |a, x| a.max(x.abs()));
         let height = self.axes().get(1).map_or(1, Axis::count).max(1) as usize;
@@ -481,6 +487,12 @@ fn late(t_end: f64, states: &[&str], answer: &Answer) -> Option<Vec<(f64, Vec<f6
     Some(upward.map(|(row, _)| (t[row], columns.iter().map(|c| c[row]).collect())).collect())
 }
 
+/// Where a run begins.
+fn start_of(run: &GeneralRun) -> Result<Vec<f64>, String> {
+    let given = run.options.start.clone().map_or_else(|| run.model.start(), |start| Ok(Some(start)));
+    given.map_err(|e| e.to_string())?.ok_or_else(|| "the file has no start; give --start".to_owned())
+}
+
 /// The run with this value, or why it would have no effect.
 fn apply(run: &GeneralRun, coordinate: &Coordinate, value: &Entry) -> Result<GeneralRun, String> {
     let number = value.value();
@@ -490,16 +502,11 @@ fn apply(run: &GeneralRun, coordinate: &Coordinate, value: &Entry) -> Result<Gen
         let place = states.iter().position(|s| *s == name);
         place.ok_or_else(|| format!("the system has no state {name}; it has {}", states.join(", ")))
     };
-    let start = |run: &GeneralRun| -> Result<Vec<f64>, String> {
-        let given =
-            run.options.start.clone().map_or_else(|| run.model.start().map_err(|e| e.to_string()), |s| Ok(Some(s)));
-        given?.ok_or_else(|| "the file has no start; give --start".to_owned())
-    };
     match coordinate {
         Coordinate::Parameter(name) => run.model = run.model.with(name, number).map_err(|e| e.to_string())?,
         Coordinate::Start(name) | Coordinate::Shift(name) => {
             let i = component(name)?;
-            let mut x = start(&run)?;
+            let mut x = start_of(&run)?;
             x[i] = if matches!(coordinate, Coordinate::Start(_)) { number } else { x[i] + number };
             run.options.start = Some(x);
         }
@@ -546,7 +553,8 @@ fn rests_at(run: &GeneralRun, x: &[f64], mode: usize, asked: &Asked<'_>) -> Resu
         record: Record::Times { every: f64::INFINITY },
         ..run.options.clone()
     };
-    let size = run.options.start.iter().flatten().chain(x).fold(0.0_f64, |a, v| a.max(v.abs()));
+    let start = start_of(run).unwrap_or_default();
+    let size = start.iter().chain(x).fold(0.0_f64, |a, v| a.max(v.abs()));
     let mut moved = 0.0_f64;
     let mut observe = |point: &twofold_hybrid::Point<'_>| {
         moved = point.x.iter().zip(x).fold(moved, |a, (p, q)| a.max((p - q).abs()));

@@ -48,7 +48,7 @@ pub struct Arguments {
     /// Period of a general system that depends on the time: its states at the multiples of it, instead of a --section.
     #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Scan")]
     period: Option<f64>,
-    /// Over one setting, begin each run where that of the value below or above ended; both: up, then down.
+    /// Over one setting, begin each run where that of the value below or above ended; both: up, then down. Not for switches with a memory.
     #[arg(long, value_enum, help_heading = "Scan")]
     follow: Option<Direction>,
     /// Draw the picture into this file (.png, .svg or .pdf).
