@@ -117,31 +117,41 @@ fn the_findings_have_the_hazard_ratios_of_the_study() {
     }
 }
 
+/// Rows of sweeps under figures, computed anew: the same to the last bit.
+pub fn come_out_the_same(numbers: &[(&str, u64)]) {
+    for (name, number) in numbers {
+        let rows: Rows = rows(&format!("figures/{name}.csv"));
+        let row = rows.get(*number).unwrap();
+        assert_eq!(rows.sweep().row(*number, &()).unwrap().line(), row.line(), "{name}");
+    }
+}
+
+/// No two rows of these sweeps have one start.
+pub fn share_no_start(sweeps: &[&str]) {
+    let starts = |name: &&str| -> Vec<u64> { table(name).numbers("shift.x").iter().map(|v| v.to_bits()).collect() };
+    let mut all: Vec<u64> = sweeps.iter().flat_map(starts).collect();
+    let count = all.len();
+    all.sort_unstable();
+    all.dedup();
+    assert_eq!(all.len(), count, "{sweeps:?}");
+}
+
 /// No two samples that are compared share a start, as the rules have it.
 #[test]
 fn no_two_methods_share_a_start() {
-    let shifts = |name: &str| -> Vec<u64> { table(name).numbers("shift.x").iter().map(|v| v.to_bits()).collect() };
     for reading in Reading::ALL {
-        let mut names: Vec<_> =
+        let mut names: Vec<String> =
             ["dopri5", "radau5", "taylor"].map(|m| format!("capture/{m}-{}", reading.word())).into();
         names.retain(|name| path(&format!("figures/{name}.csv")).exists());
-        let mut all: Vec<u64> = shifts("census/fig7");
-        all.extend(names.iter().flat_map(|name| shifts(name)));
-        let count = all.len();
-        all.sort_unstable();
-        all.dedup();
-        assert_eq!(all.len(), count);
+        let all: Vec<&str> = ["census/fig7"].into_iter().chain(names.iter().map(String::as_str)).collect();
+        share_no_start(&all);
     }
 }
 
 /// Rows that are quick, computed anew: the same to the last bit; and visits.
 #[test]
 fn committed_rows_of_the_study_come_out_the_same() {
-    for (name, number) in [("dopri5-printed", 3), ("taylor-printed", 3), ("map7", 4)] {
-        let rows: Rows = rows(&format!("figures/capture/{name}.csv"));
-        let row = rows.get(number).unwrap();
-        assert_eq!(rows.sweep().row(number, &()).unwrap().line(), row.line(), "{name}");
-    }
+    come_out_the_same(&[("capture/dopri5-printed", 3), ("capture/taylor-printed", 3), ("capture/map7", 4)]);
     let table = visited();
     for (i, at) in visits::CANDIDATES.into_iter().enumerate() {
         assert_eq!(f64::from(visits::visits(at, 7).unwrap()), table.numbers("visits")[30 * i + 7], "{at:?}");

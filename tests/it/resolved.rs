@@ -8,8 +8,7 @@ use twofold::paper::effects::LogRank;
 use twofold::paper::resolved::{self, Belongs, compared};
 use twofold::paper::{Reading, capture, census};
 
-use crate::capture::{page_says, table};
-use crate::census::rows;
+use crate::capture::{come_out_the_same, page_says, share_no_start, table};
 
 fn tables(names: &[&str]) -> Vec<Table> {
     names.iter().map(|name| table(name)).collect()
@@ -50,23 +49,13 @@ fn the_page_says_what_the_runs_say() {
 /// No start is shared with LSODA or between methods, as the rules have it; fig. 7 and 8 share none either.
 #[test]
 fn no_two_samples_share_a_start() {
-    let shifts = |t: &Table| -> Vec<u64> { t.numbers("shift.x").iter().map(|v| v.to_bits()).collect() };
-    let layered = table("resolved/layered7");
-    let mut all: Vec<u64> = lsoda().iter().take(1).chain(&taylor()).chain([&layered]).flat_map(shifts).collect();
-    let count = all.len();
-    all.sort_unstable();
-    all.dedup();
-    assert_eq!(all.len(), count);
+    share_no_start(&["census/fig7", "resolved/taylor7", "resolved/taylor8", "resolved/layered7"]);
 }
 
 /// Rows that are quick, computed anew: the same to the last bit.
 #[test]
 fn committed_rows_come_out_the_same() {
-    for (name, number) in [("taylor7", 2), ("taylor8", 2), ("layered7", 2)] {
-        let rows = rows(&format!("figures/resolved/{name}.csv"));
-        let row = rows.get(number).unwrap();
-        assert_eq!(rows.sweep().row(number, &()).unwrap().line(), row.line(), "{name}");
-    }
+    come_out_the_same(&[("resolved/taylor7", 2), ("resolved/taylor8", 2), ("resolved/layered7", 2)]);
 }
 
 /// What the page says of whose the outcomes are, and that the two resolving methods do not agree in the printed reading, follows from the runs.
