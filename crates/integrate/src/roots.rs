@@ -131,8 +131,28 @@ impl CrossingFinder {
             last = point;
         };
         let mut here = sample(1);
+        // A smallest value beside an end of the step is between its first or last two samples.
+        let beside = |end: (f64, f64), inner: (f64, f64)| {
+            let same = end.1 != 0.0 && inner.1 != 0.0 && (end.1 > 0.0) == (inner.1 > 0.0);
+            if !same || end.1.abs() > inner.1.abs() {
+                return None;
+            }
+            let sign = end.1.signum();
+            let little = end.0 + BESIDE * (inner.0 - end.0);
+            if sign * value(little) >= sign * end.1 {
+                return None;
+            }
+            let point = smallest(value, end.0.min(inner.0), end.0.max(inner.0), sign);
+            (sign * point.1 < 0.0).then_some(point)
+        };
+        if let Some(point) = beside(before, here) {
+            next(point);
+        }
         for i in 1..=n {
             if i == n {
+                if let Some(point) = beside(here, before) {
+                    next(point);
+                }
                 next(here);
                 break;
             }
@@ -186,6 +206,9 @@ impl CrossingFinder {
         self.of(step.interpolant.degree(), &|theta| step.coordinate(theta, coordinate) - value)
     }
 }
+
+/// So near to an end, in parts of the distance to the next sample, it is seen whether a function falls from there.
+const BESIDE: f64 = 1e-6;
 
 /// Golden-section search for the smallest `sign * f` on [a, b]; stops early once it is negative.
 fn smallest(f: &dyn Fn(f64) -> f64, mut a: f64, mut b: f64, sign: f64) -> (f64, f64) {
@@ -594,6 +617,18 @@ mod tests {
 
     fn zeros(c: [f64; 4]) -> Vec<f64> {
         passages(c).iter().map(|p| p.theta).collect()
+    }
+
+    /// Two crossings between the first two samples, or the last two, are found as those in the middle are.
+    #[test]
+    fn a_dip_beside_an_end_is_found() {
+        for c in [1e-3, 0.02, 0.1, 0.5, 0.97, 0.999] {
+            for w in [1e-4, 1e-6] {
+                let found = zeros([c * c - w * w, -2.0 * c, 1.0, 0.0]);
+                assert!(found.len() == 2 && (found[0] - (c - w)).abs() < 1e-9, "{c} {w}: {found:?}");
+            }
+        }
+        assert!(zeros([0.02 * 0.02 + 1e-9, -0.04, 1.0, 0.0]).is_empty());
     }
 
     /// The senses of the crossings of the plane x = `value` in steps given by their cubics, one after the other.
