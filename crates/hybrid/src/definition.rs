@@ -155,7 +155,7 @@ pub struct EventEntry {
     /// The direction in which `when` passes zero: up, down or both.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub direction: Option<Direction>,
-    /// New values of states, by name; they see the old values.
+    /// New values of states, by name; they see the values before this event.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub set: Option<Ordered<Constant>>,
     /// The mode that holds from then on.
@@ -167,10 +167,10 @@ pub struct EventEntry {
     /// Whether the run ends there.
     #[serde(default)]
     pub stop: bool,
-    /// Fires at the multiples of this time.
+    /// Fires at the multiples of this time after the run's start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub every: Option<Constant>,
-    /// Fires at this time, or at these.
+    /// Fires at this time, or at these, the run's start included.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at: Option<Constants>,
     /// What happens where it fires infinitely often in finite time: "stick", or the run ends there.

@@ -194,14 +194,23 @@ impl Equation {
 
     /// Whether a field depends on the time, by itself or through a table.
     pub fn depends_on_time(&self) -> bool {
-        fn asks(equation: &Equation, e: &Expression) -> bool {
-            e.names().into_iter().any(|name| {
-                name == "t"
-                    || equation.definition.tables.iter().any(|(table, _)| table == name)
-                    || equation.term(name).is_some_and(|term| asks(equation, term))
-            })
-        }
-        self.definition.modes.iter().flat_map(|m| &m.field).any(|e| asks(self, e))
+        self.definition.modes.iter().flat_map(|m| &m.field).any(|e| self.sees_time(e))
+    }
+
+    /// Whether an event's expression depends on the time.
+    pub fn events_see_time(&self) -> bool {
+        self.definition.events.iter().any(|event| match &event.when {
+            When::At(_) | When::Every(_) => false,
+            When::Zero(e, _) | When::Becomes(e) => self.sees_time(e),
+        })
+    }
+
+    fn sees_time(&self, e: &Expression) -> bool {
+        e.names().into_iter().any(|name| {
+            name == "t"
+                || self.definition.tables.iter().any(|(table, _)| table == name)
+                || self.term(name).is_some_and(|term| self.sees_time(term))
+        })
     }
 
     /// The parameters' values.
@@ -293,7 +302,7 @@ impl Equation {
     }
 
     /// An expression that has the same sign everywhere, or the other one, without what changes nothing about that: constant factors, odd powers, odd rising
-    /// functions, absolute values beside what they are of.
+    /// functions, absolute values beside what they are of, divisors instead of factors.
     fn bare(&self, e: &Expression) -> (Expression, bool) {
         let constant = |e: &Expression| -> Option<f64> {
             let fixed = |name: &str| self.values.contains_key(name);
@@ -316,8 +325,12 @@ impl Equation {
                     _ => (e.clone(), false),
                 },
             },
-            Expression::Div(a, b) => constant(b).map_or_else(|| (e.clone(), false), |factor| scaled(a, factor)),
-            Expression::Power(a, n) if *n > 0 && n % 2 == 1 => self.bare(a),
+            Expression::Div(a, b) => match (constant(a), constant(b)) {
+                (_, Some(factor)) => scaled(a, factor),
+                (Some(factor), _) => scaled(b, factor),
+                _ => (Expression::Mul(a.clone(), b.clone()), false),
+            },
+            Expression::Power(a, n) if n % 2 != 0 => self.bare(a),
             Expression::Call(Function::Tanh | Function::Atan | Function::Erf, a) => self.bare(a),
             Expression::Apply(General::Sinh | General::Asin, list) if list.len() == 1 => self.bare(&list[0]),
             other => (other.clone(), false),

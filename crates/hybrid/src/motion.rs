@@ -27,7 +27,7 @@ use crate::definition::{Direction, When};
 use crate::equation::{Compiled, Configuration, Equation, EquationError};
 use crate::model::Model;
 use crate::roots::{PLACES, at_fraction, first, first_of_polynomial, stays};
-use crate::selection::{Intersection, MOST_TOGETHER, Mixture, Way, groups, mixture, possibilities};
+use crate::selection::{Intersection, MOST_TOGETHER, Mixture, Way, groups, mixture, nearest_of_hull, possibilities};
 use crate::step::Step;
 
 /// What is recorded.
@@ -271,6 +271,8 @@ enum Sought {
     Guard { guard: usize, upper: bool },
     /// A watched expression.
     Watched(usize),
+    /// A watched expression that changes its sign through a pole.
+    Pole(usize),
     /// A weight of sliding: the surface's place among those slid upon, and whether it is left to the positive side.
     Leave { place: usize, plus: bool },
     /// Sliding stops being attracting.
@@ -366,6 +368,8 @@ struct Follower<'a> {
     sliding: Vec<usize>,
     /// Whether each guard is slid upon.
     slides: Vec<bool>,
+    /// For each guard that is slid upon the side whose field runs along the surface, so that its weight is one to rounding; else 0.
+    along: Vec<f64>,
     base: Vec<(Rc<Compiled>, Vec<f64>)>,
     /// Where mixtures differ: the fields on all sides of the surfaces slid upon, for the rule that chooses among them.
     corners: Vec<(Rc<Compiled>, Vec<f64>)>,
@@ -374,6 +378,10 @@ struct Follower<'a> {
     /// Surfaces slid upon that know nothing of each other: the one that each state's derivative depends on.
     separate: Option<Vec<Option<usize>>>,
     contacts: Vec<Contact>,
+    /// Whether the motion has come to a point that it does not leave.
+    rests: bool,
+    /// Whether the last step's error was the rounding of the time.
+    noisy: bool,
     /// Which side of zero each watched expression is on; 0 if it stays there.
     watch_side: Vec<f64>,
     /// Guards and watched expressions that left zero at the step's beginning.
@@ -557,11 +565,14 @@ impl<'a> Follower<'a> {
             variables: vec![0.0; equation.variables()],
             sliding: Vec::new(),
             slides: vec![false; guards],
+            along: vec![0.0; guards],
             base: Vec::new(),
             corners: Vec::new(),
             order,
             separate: None,
             contacts: Vec::new(),
+            rests: false,
+            noisy: false,
             watch_side: vec![0.0; watched],
             fresh_guard: vec![false; guards],
             fresh_watch: vec![false; watched],
@@ -643,6 +654,13 @@ impl<'a> Follower<'a> {
             if self.t >= self.options.t_end {
                 return Ok(Ending::Finished);
             }
+            if self.rests {
+                let until = clock.next().unwrap_or(f64::INFINITY).min(self.options.t_end);
+                if !self.rest_until(until, observe)? {
+                    return Ok(Ending::Interrupted);
+                }
+                continue;
+            }
             if self.outcome.steps.is_multiple_of(STEPS_BETWEEN_WORDS)
                 && self.reached.is_some_and(|go_on| !go_on(self.t))
             {
@@ -656,6 +674,9 @@ impl<'a> Follower<'a> {
             self.rhs(step.t, &step.x, &mut room);
             step.k[0].copy_from_slice(&room);
             if !room.iter().all(|v| v.is_finite()) {
+                if self.comes_to_rest(self.t) {
+                    continue;
+                }
                 return Err(self.left_domain(step.t, &step.x));
             }
             if self.options.method == Method::Radau5 {
@@ -674,6 +695,9 @@ impl<'a> Follower<'a> {
                 if self.land_at_an_edge()? {
                     continue;
                 }
+                if self.comes_to_rest(self.t) {
+                    continue;
+                }
                 return Err(self.left_domain(self.t, &step.x.clone()));
             };
             let stopped = to_stop && !rejected;
@@ -684,9 +708,10 @@ impl<'a> Follower<'a> {
             let earliest = found.iter().map(|(theta, _)| *theta).fold(f64::INFINITY, f64::min);
             // Together is what no rounding of the time tells apart.
             let together = (64.0 * f64::EPSILON * self.t.abs().max(wanted) / wanted).min(1e-9);
-            let met: Vec<Sought> =
+            let mut met: Vec<Sought> =
                 found.iter().filter(|(theta, _)| *theta <= earliest + together).map(|(_, sought)| *sought).collect();
             if earliest.is_finite() {
+                self.tell_poles(&step, earliest, &mut met);
                 self.land(&mut step, earliest * wanted, wanted, met[0]);
             }
             // The step stands.
@@ -704,6 +729,9 @@ impl<'a> Follower<'a> {
             self.t = end;
             self.x.copy_from_slice(&step.y);
             self.note_growth(end);
+            if !earliest.is_finite() && self.along.iter().any(|along| *along != 0.0) {
+                self.tell_along(&list, &last_values);
+            }
             if progress {
                 self.clear_fresh(&list, &last_values, earliest.is_finite());
             }
@@ -760,8 +788,8 @@ impl<'a> Follower<'a> {
         for tried in 0..=MOST_SHORTENINGS {
             step.take(length, &mut |t, x, out| self.rhs(t, x, out));
             scale_now(self, step, scale);
-            if tried > 0 && length <= 1e8 * f64::EPSILON * self.t.abs() {
-                // Whether it is the rounding of the time that keeps the error large.
+            if (tried > 0 || self.noisy) && length <= 1e8 * f64::EPSILON * self.t.abs() {
+                // Whether it is the rounding of the time that keeps the error large, as in the step before.
                 let noise = noise.get_or_insert_with(|| self.noise_of_time(step));
                 scale.iter_mut().zip(noise).for_each(|(s, noise)| *s += 4.0 * length * *noise);
             }
@@ -772,7 +800,10 @@ impl<'a> Follower<'a> {
                 match unseen.or_else(|| self.too_long_for_tangents(step)) {
                     Some(factor) => factor,
                     None => match self.parts(step) {
-                        Some(parts) => return Some(Accepted { length, error, parts, rejected: tried > 0 }),
+                        Some(parts) => {
+                            self.noisy = noise.is_some();
+                            return Some(Accepted { length, error, parts, rejected: tried > 0 });
+                        }
                         None => search::SHORTER,
                     },
                 }

@@ -2,7 +2,7 @@
 //!
 //! Values at five places give a polynomial of degree four, which is what a linear function of the step's continuous extension is. Where its Bernstein
 //! coefficients have one sign there is no zero (Farin 2002, sec. 6.3); else the step is halved until a change of sign stands alone, which is then narrowed
-//! down on the function itself (regula falsi, the Illinois way: Dowell & Jarratt 1971).
+//! down on the function itself (regula falsi, the Illinois way: Dowell & Jarratt 1971; halving where that is slow).
 
 /// Places of the samples, as fractions.
 pub(crate) const PLACES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
@@ -192,11 +192,14 @@ fn narrow(from: f64, to: f64, v: &[f64; 5], side: f64, f: &mut dyn FnMut(f64) ->
     let (mut a, mut fa, mut b, mut fb) = (from, v[0], to, v[4]);
     let rounding = 8.0 * f64::EPSILON * v.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
     let mut c = from + (to - from) * polynomial_root(v, side);
-    for _ in 0..100 {
+    let mut width = b - a;
+    for i in 0..200 {
         if fb == 0.0 || b - a <= 4.0 * f64::EPSILON * b.abs() {
             break;
         }
-        if !(c > a && c < b) {
+        // Where a few secants did not halve the interval, as near a pole, the next step does.
+        let slow = i % 4 == 3 && b - a > 0.5 * std::mem::replace(&mut width, b - a);
+        if slow || !(c > a && c < b) {
             c = 0.5 * (a + b);
         }
         if !(c > a && c < b) {

@@ -177,6 +177,37 @@ fn shortest(fields: &[Vec<f64>], rates: &[Vec<f64>], k: usize) -> Option<Vec<f64
     best.map(|(_, weights)| weights)
 }
 
+/// The point of the convex hull of some vectors that is nearest to zero: weight is moved between the two vectors that gain most by it (Wolfe 1970; Mitchell, Demyanov &
+/// Malozemov 1974).
+pub(crate) fn nearest_of_hull(vectors: &[Vec<f64>]) -> Vec<f64> {
+    const MOST_MOVES: usize = 5000;
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let mut weights = vec![1.0 / vectors.len() as f64; vectors.len()];
+    let mut nearest = vec![0.0; vectors[0].len()];
+    let mix = |weights: &[f64], nearest: &mut Vec<f64>| {
+        for (i, value) in nearest.iter_mut().enumerate() {
+            *value = weights.iter().zip(vectors).map(|(w, v)| w * v[i]).sum();
+        }
+    };
+    mix(&weights, &mut nearest);
+    for _ in 0..MOST_MOVES {
+        let along: Vec<f64> = vectors.iter().map(|v| dot(v, &nearest)).collect();
+        let order = |a: &usize, b: &usize| along[*a].total_cmp(&along[*b]);
+        let taken = (0..vectors.len()).filter(|i| weights[*i] > 0.0).max_by(order);
+        let (Some(from), Some(to)) = (taken, (0..vectors.len()).min_by(order)) else { break };
+        let way: Vec<f64> = vectors[to].iter().zip(&vectors[from]).map(|(a, b)| a - b).collect();
+        let size = dot(&way, &way);
+        let share = ((along[from] - along[to]) / size).min(weights[from]);
+        if !(share > 0.0) {
+            break;
+        }
+        weights[from] = if share == weights[from] { 0.0 } else { weights[from] - share };
+        weights[to] += share;
+        mix(&weights, &mut nearest);
+    }
+    nearest
+}
+
 /// All assignments of ways to `k` functions that are consistent; `consistent` says whether one is.
 pub(crate) fn possibilities(k: usize, mut consistent: impl FnMut(&[Way]) -> bool) -> Vec<Vec<Way>> {
     let ways = [Way::Plus, Way::Minus, Way::Stay];
@@ -210,4 +241,23 @@ pub(crate) fn groups(k: usize, coupled: impl Fn(usize, usize) -> bool) -> Vec<Ve
     names.sort_unstable();
     names.dedup();
     names.iter().map(|name| (0..k).filter(|i| group[*i] == *name).collect()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nearest_of_hull;
+
+    #[test]
+    fn the_nearest_point_of_a_hull() {
+        let near = |vectors: &[[f64; 2]], want: [f64; 2]| {
+            let vectors: Vec<Vec<f64>> = vectors.iter().map(|v| v.to_vec()).collect();
+            let found = nearest_of_hull(&vectors);
+            assert!((found[0] - want[0]).hypot(found[1] - want[1]) < 1e-10, "{found:?}");
+        };
+        near(&[[1.0, 0.0], [-1.0, 0.0]], [0.0, 0.0]);
+        near(&[[1.0, 2.0], [-1.0, 2.0], [0.0, 7.0]], [0.0, 2.0]);
+        near(&[[3.0, 1.0], [1.0, 3.0]], [2.0, 2.0]);
+        near(&[[-1.0, -0.3], [-1.0, 0.9], [2.0, 0.1]], [0.0, 0.0]);
+        near(&[[5.0, 0.0]], [5.0, 0.0]);
+    }
 }

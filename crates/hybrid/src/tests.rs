@@ -295,7 +295,7 @@ fn fifty_blocks_on_a_belt() {
 }
 
 #[test]
-fn events_happen_in_the_files_order_and_see_old_values() {
+fn events_happen_in_the_files_order_one_after_the_other() {
     let text = "states = ['x', 'y']\nstart = [0, 0]\nf = ['1', '0']\n\
         [[event]]\nname = 'a'\nwhen = 'x - 1'\nset = { x = 'y - 5', y = 'x + 10' }\n\
         [[event]]\nname = 'b'\nwhen = 'x - 1'\nset = { y = 'y + 1' }\n\
@@ -307,7 +307,8 @@ fn events_happen_in_the_files_order_and_see_old_values() {
     assert_eq!(outcome.ending, Ending::Stopped("e".into()));
     near(outcome.t, 3.0, 1e-12);
     near(outcome.x[0], -3.0, 1e-12);
-    near(outcome.x[1], 1.0, 1e-12);
+    // 0 and 1 become -5 and 11 together, then b adds one.
+    near(outcome.x[1], 12.0, 1e-12);
 }
 
 /// What is zero at the start happens when it is next met.
@@ -975,4 +976,97 @@ fn stability_is_said_where_it_is_decided() {
     let double = kinds("states = ['x']\nf = ['x^2']", &[(-10.0, 10.0)]);
     assert!(double.iter().all(|k| k == "not decided by the linearised motion"), "{double:?}");
     assert_eq!(kinds("states = ['x']\nf = ['-0.001*x']", &[(-10.0, 10.0)]), ["stable node"]);
+}
+
+/// A pole is no zero, for events, sections and switches, wherever it is met together with others; a quotient has the sign of the product.
+#[test]
+fn poles_are_no_zeros() {
+    let count = |when: &str, t_end: f64| {
+        let text = format!(
+            "states = ['x', 'n']\nstart = [0.1, 0]\nf = ['1', '0']\n[[event]]\nwhen = '{when}'\ndirection = 'both'\nset = {{ n = 'n + 1' }}"
+        );
+        last(&text, t_end)
+    };
+    // tan x = 1 at seven places of (0.1, 20.1).
+    for (when, want) in
+        [("tan(x) - 1", 7.0), ("1/(x - 3)", 0.0), ("1/(x - 3) + 2", 1.0), ("1/tan(x)", 6.0), ("x/(x - 3) - 5", 1.0)]
+    {
+        near(count(when, 20.0), want, 0.0);
+    }
+    let both = "states = ['x', 'n', 'm']\nstart = [0.1, 0, 0]\nf = ['1', '0', '0']\n[[event]]\nwhen = 'tan(x)'\ndirection = 'up'\nset = { n = 'n + 1' }\n[[event]]\nwhen = '1/tan(x) + 1/(x - 2)'\ndirection = 'both'\nset = { m = 'm + 1' }";
+    near(end(both, 20.0)[1], 6.0 + 1.0, 0.0);
+    near(end(both, 20.0)[2], 7.0, 0.0);
+    let section = twofold_system::Expression::parse_general("tan(x)", &["x"]).unwrap();
+    let options = Options { record: Record::Section(section), t_end: 20.0, ..Options::default() };
+    let mut rows = 0;
+    follow(&model("states = ['x']\nstart = [0.1]\nf = ['1']"), &options, &mut |_| {
+        rows += 1;
+        true
+    })
+    .unwrap();
+    assert_eq!(rows, 6);
+    for (switch, want) in [("sign(1/(x - 1))", 1.0), ("sign(x/(x - 1))", 1.0), ("if(2/(x - 1)^3 > 0, 1, -1)", 1.0)] {
+        near(last(&format!("states = ['x', 'y']\nstart = [0, 0]\nf = ['1', '{switch}']"), 3.0), want, 1e-12);
+    }
+}
+
+/// Several events of one moment see each other's work, also in derivatives.
+#[test]
+fn events_of_one_moment_see_each_other() {
+    let text = "states = ['x', 'n']\nstart = [0, 0]\nf = ['1', '0']\n[[event]]\nwhen = 'x - 1'\nset = { x = '0', n = 'n + 1' }\n[[event]]\nwhen = 'x - 1'\nset = { n = 'n + 10' }";
+    near(last(text, 10.5), 110.0, 0.0);
+    // Both at t = 1: first doubled, then the square; d((2x)^2)/dx = 8x.
+    let timed = "states = ['x']\nstart = [3]\nf = ['0']\n[[event]]\nat = 1\nset = { x = '2*x' }\n[[event]]\nevery = 1\nset = { x = 'x^2' }";
+    near(last(timed, 1.5), 36.0, 0.0);
+    let options = Options { t_end: 1.5, ..Options::default() };
+    let found = crate::motion::sensitivity::sensitivities(&model(timed), &options, &[]).unwrap();
+    near(found.by_start[0][0], 24.0, 1e-8);
+}
+
+/// A field that runs along the surface which the other one leads to: the time-optimal control of a double integrator (Pontryagin et al. 1962), in any
+/// units, and its rest; rests that are reached in finite time; the rest at a corner of max(|x|, |y|).
+#[test]
+fn motion_along_a_switching_curve_and_into_rest() {
+    for (unit, time) in [(1.0, 1.0), (1e-9, 1.0), (1e6, 1e-3)] {
+        let (speed, force) = (unit / time, unit / (time * time));
+        let text = format!(
+            "states = ['x', 'v']\nstart = [{unit:e}, {speed:e}]\nf = ['v', '-{force:e}*sign(x + v*abs(v)/{:e})']",
+            2.0 * force
+        );
+        // From (1, 1) the curve is met at v = -sqrt(3/2), and (0, 0) at t = 1 + 2 sqrt(3/2).
+        let left = 1.0 + 6.0_f64.sqrt() - 3.2;
+        let x = end(&text, 3.2 * time);
+        near(x[0] / unit, 0.5 * left * left, 1e-12);
+        near(x[1] / speed, -left, 1e-12);
+        let rest = end(&text, 9.0 * time);
+        assert!(rest[0].abs() < 1e-12 * unit && rest[1].abs() < 1e-12 * speed, "{rest:?}");
+    }
+    // Tangent to second order only: it is slid upon from x = 0 on, or left there.
+    near(last("states = ['x', 'y']\nstart = [-1, 1]\nf = ['1', 'if(y > 0, -1, x^3)']", 2.0), 0.0, 1e-15);
+    near(last("states = ['x', 'y']\nstart = [-1, 1]\nf = ['1', 'if(y > 0, -1, -x^3)']", 2.0), -0.25, 1e-12);
+    for text in [
+        "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-2*sign(v + sqrt(2*abs(x))*sign(x)*0.9)']",
+        "states = ['x', 'v']\nstart = [1, 0]\nf = ['-1.5*sqrt(abs(x))*sign(x) + v', '-1.1*sign(x)']",
+        "states = ['x', 'v']\nstart = [1, 0.4]\nf = ['-if(abs(x) > abs(v), sign(x), 0)', '-if(abs(x) > abs(v), 0, sign(v))']",
+    ] {
+        let x = end(text, 5.0);
+        assert!(x.iter().all(|v| v.abs() < 1e-12), "{text}: {x:?}");
+    }
+    // A kick in time is not overslept: from (1, 0) at t = 3 the control is -1 for a unit of time.
+    let kicked =
+        "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-sign(x + v*abs(v)/2)']\n[[event]]\nat = 3\nset = { x = '1' }";
+    near(end(kicked, 4.0)[0], 0.5, 1e-12);
+    let counted = kicked.replace("x = '1'", "x = 'x'").replace("at = 3", "every = 0.75");
+    assert!(end(&counted, 4.0)[0].abs() < 1e-12);
+}
+
+/// A sawtooth of the time from zero, however late.
+#[test]
+fn a_late_start_is_followed() {
+    for t in [1e4, 1e6, 1e8] {
+        let options = Options { t_start: t, t_end: t + 3.0, ..Options::default() };
+        let found = follow(&model("states = ['x']\nstart = [0]\nf = ['mod(t, 1)']"), &options, &mut |_| true).unwrap();
+        near(found.x[0], 1.5, 1e-15 * t + 1e-9);
+        assert!(found.steps < 100);
+    }
 }

@@ -47,8 +47,16 @@ impl Follower<'_> {
                         }
                     }
                 }
+                // It is not zero there.
+                Sought::Pole(i) => {
+                    self.watch_side[i] = -self.watch_side[i];
+                    self.fresh_watch[i] = false;
+                }
                 Sought::Leave { place, plus } => leave.push((self.sliding[place], plus)),
                 Sought::Repelling => {
+                    if self.comes_to_rest(self.t) {
+                        return Ok(None);
+                    }
                     let zero = self.sliding.clone();
                     match self.options.exit {
                         Exit::Undecided => {
@@ -101,9 +109,8 @@ impl Follower<'_> {
         }
         fired.extend(self.new_conditions(definition));
         if let Some((guard, t, error)) = accumulates.filter(|_| fired.is_empty()) {
-            if self.rests_where_switches_accumulate(t) {
-                let more = self.emit_rest(observe);
-                return Ok(Some(if more { Ending::Finished } else { Ending::Interrupted }));
+            if self.comes_to_rest(t) {
+                return Ok(None);
             }
             let surfaces = self.names(&[guard]);
             return Err(HybridError::Accumulation { t, error, x: self.x.clone(), surfaces });
@@ -123,7 +130,7 @@ impl Follower<'_> {
         (0..self.sliding.len()).map(share).all(|w| !(w <= 1e-6 || w >= 1.0 - 1e-6))
     }
 
-    /// Lets events happen, in the file's order.
+    /// Lets events happen, in the file's order: each finds the state as those before it left it.
     pub(super) fn happen(
         &mut self,
         definition: &crate::Definition,
@@ -147,12 +154,17 @@ impl Follower<'_> {
         for i in &fired {
             let event = &definition.events()[*i];
             self.outcome.events += 1;
+            self.x.copy_from_slice(&new);
             if !quiet && !self.emit(self.t, Some(&event.name), observe) {
                 return Ok(Some(Ending::Interrupted));
             }
+            let seen = self.x.clone();
+            if !event.set.is_empty() {
+                self.note_reset(&event.set, &seen);
+            }
             match &self.equation.resets[*i] {
                 Some(program) => {
-                    self.variables[..self.n].copy_from_slice(&old);
+                    self.variables[..self.n].copy_from_slice(&seen);
                     self.variables[self.n] = self.t;
                     let mut values = vec![0.0; event.set.len()];
                     program.evaluate(&self.variables, &mut values);
@@ -160,7 +172,7 @@ impl Follower<'_> {
                 }
                 None => {
                     for (state, value) in &event.set {
-                        new[*state] = self.equation.value(value, self.t, &old);
+                        new[*state] = self.equation.value(value, self.t, &seen);
                     }
                 }
             }
@@ -183,11 +195,6 @@ impl Follower<'_> {
             return Err(HybridError::Stuck { t: self.t, x: old, why });
         }
         let changed = new != old;
-        let set: Vec<(usize, &Expression)> =
-            fired.iter().flat_map(|i| &definition.events()[*i].set).map(|(state, e)| (*state, e)).collect();
-        if !set.is_empty() {
-            self.note_reset(&set, &old);
-        }
         self.x = new;
         if changed || mode.is_some() {
             if let Some(mode) = mode {
@@ -444,10 +451,10 @@ impl Follower<'_> {
         }
     }
 
-    /// Whether the motion rests from `t` on at the point where its switches accumulate: all functions that are nearly zero there are zero, and a mixture of
-    /// the fields around it vanishes. If so the state is put there.
-    fn rests_where_switches_accumulate(&mut self, t: f64) -> bool {
-        if self.equation.depends_on_time() || !self.equation.tables.is_empty() {
+    /// Whether the motion rests from `t` on at the point that it has come to: all functions that are nearly zero there are zero, a mixture of the fields
+    /// around it vanishes, and none of the fields leads away on its own side. If so the state is put there.
+    pub(super) fn comes_to_rest(&mut self, t: f64) -> bool {
+        if self.equation.depends_on_time() || self.equation.events_see_time() {
             return false;
         }
         let n = self.n;
@@ -458,96 +465,161 @@ impl Follower<'_> {
             .active
             .iter()
             .enumerate()
-            .filter(|(place, guard)| !self.equation.guards[**guard].whole && values[*place].abs() <= 1e-6 * largest)
+            // On the wrong side of another a function may have no value.
+            .filter(|(place, guard)| !self.equation.guards[**guard].whole && !(values[*place].abs() > 1e-6 * largest))
             .map(|(place, guard)| (place, *guard))
             .collect();
         if near.is_empty() || near.len() > MOST_TOGETHER {
             return false;
         }
-        // The point where all of them are zero, nearest to the state.
-        let still = vec![0.0; n];
-        let in_time = Self::along(&self.compiled, &self.variables, &still);
-        let mut rows = vec![vec![0.0; n]; near.len()];
-        for i in 0..n {
-            let mut unit = vec![0.0; n];
-            unit[i] = 1.0;
-            let slopes = Self::along(&self.compiled, &self.variables, &unit);
-            for (row, (place, _)) in rows.iter_mut().zip(&near) {
-                row[i] = slopes[*place] - in_time[*place];
-            }
-        }
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let gram: Vec<f64> = rows.iter().flat_map(|a| rows.iter().map(|b| dot(a, b)).collect::<Vec<_>>()).collect();
-        let off: Vec<f64> = near.iter().map(|(place, _)| values[*place]).collect();
-        let Some(weights) = solve_any(&gram, &off, 0.0) else { return false };
-        let mut x = self.x.clone();
-        for (row, weight) in rows.iter().zip(&weights) {
-            x.iter_mut().zip(row).for_each(|(x, r)| *x -= weight * r);
-        }
-        let field = |sides: &dyn Fn(usize) -> f64, follower: &Self| {
+        let known: Vec<(usize, usize)> = near.iter().copied().filter(|(place, _)| values[*place].is_finite()).collect();
+        let x = self.nearest_meeting(&known, &values);
+        let of_sides = |vertex: usize, follower: &Self| {
             let mut config = follower.config.clone();
-            near.iter().enumerate().for_each(|(i, (_, guard))| config.sides[*guard] = sides(i));
-            let mut v = follower.load(&config);
-            v[..n].copy_from_slice(&x);
+            for (i, (_, guard)) in near.iter().enumerate() {
+                config.sides[*guard] = if vertex >> i & 1 == 1 { 1.0 } else { -1.0 };
+            }
+            config
+        };
+        let velocity = |config: &Configuration, x: &[f64], follower: &Self| {
+            let mut v = follower.load(config);
+            v[..n].copy_from_slice(x);
             let mut f = vec![0.0; n];
-            follower.equation.compiled(&config).field.evaluate(&v, &mut f);
+            follower.equation.compiled(config).field.evaluate(&v, &mut f);
             f
         };
-        let low = field(&|_| -1.0, self);
-        let minus = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<f64>>();
-        let columns: Vec<Vec<f64>> =
-            (0..near.len()).map(|j| minus(&field(&|i| if i == j { 1.0 } else { -1.0 }, self), &low)).collect();
-        // Least squares with weights from 0 to 1, one after the other (Hildreth 1957).
-        let (mut weights, mut left) = (vec![0.5; near.len()], low.clone());
-        for column in &columns {
-            left.iter_mut().zip(column).for_each(|(l, c)| *l += 0.5 * c);
-        }
-        for _ in 0..1000 {
-            for (weight, column) in weights.iter_mut().zip(&columns) {
-                let size = dot(column, column);
-                if size > 0.0 {
-                    let new = (*weight - dot(column, &left) / size).clamp(0.0, 1.0);
-                    left.iter_mut().zip(column).for_each(|(l, c)| *l += (new - *weight) * c);
-                    *weight = new;
-                }
-            }
-        }
-        let speed = columns.iter().flatten().chain(&low).fold(0.0_f64, |most, v| most.max(v.abs()));
-        // The fields are sums of what each switch gives, so that mixtures have no other velocities.
-        let corner = minus(&field(&|_| 1.0, self), &low);
-        let sum: Vec<f64> = (0..n).map(|i| columns.iter().map(|c| c[i]).sum()).collect();
-        let affine = corner.iter().zip(&sum).all(|(a, b)| (a - b).abs() <= 1e-9 * speed);
-        if !(affine && left.iter().all(|v| v.abs() <= 1e-6 * speed)) {
+        let fields: Vec<Vec<f64>> =
+            (0..1 << near.len()).map(|vertex| velocity(&of_sides(vertex, self), &x, self)).collect();
+        // States that hardly move on any side until the run ends rest.
+        let left = self.options.t_end - t;
+        let fastest: Vec<f64> = (0..n).map(|i| fields.iter().fold(0.0_f64, |most, f| most.max(f[i].abs()))).collect();
+        let moves: Vec<usize> =
+            (0..n).filter(|i| fastest[*i] * left > 1e-8 * self.size[*i].max(1e-3 * largest)).collect();
+        if !moves.iter().all(|i| fastest[*i].is_finite()) {
             return false;
+        }
+        let parts: Vec<Vec<f64>> = fields.iter().map(|f| moves.iter().map(|i| f[*i] / fastest[*i]).collect()).collect();
+        // Where mixtures differ only one that all surfaces hold is known to stay.
+        if settling::mixtures_differ(&parts) && !self.holds_still(&near, &moves) {
+            return false;
+        }
+        if !nearest_of_hull(&parts).iter().all(|v| v.abs() <= 1e-6) {
+            return false;
+        }
+        // A field that leads to its own side for a short time leads away.
+        let brief = 1e-4 * moves.iter().map(|i| self.size[*i] / fastest[*i]).fold(left, f64::min);
+        for (vertex, f) in fields.iter().enumerate() {
+            let config = of_sides(vertex, self);
+            let ahead = |by: f64, slope: &[f64]| -> Vec<f64> { x.iter().zip(slope).map(|(x, f)| x + by * f).collect() };
+            let k2 = velocity(&config, &ahead(0.5 * brief, f), self);
+            let k3 = velocity(&config, &ahead(0.5 * brief, &k2), self);
+            let k4 = velocity(&config, &ahead(brief, &k3), self);
+            let mean: Vec<f64> = (0..n).map(|i| (f[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]) / 6.0).collect();
+            let (there, mut v) = (ahead(brief, &mean), self.load(&config));
+            v[..n].copy_from_slice(&there);
+            let compiled = self.equation.compiled(&config);
+            let mut watched = vec![0.0; compiled.outputs];
+            compiled.watched.evaluate(&v, &mut watched);
+            let leads_away = near.iter().all(|(_, guard)| {
+                let beyond = active_value(&compiled, &watched, *guard) * config.sides[*guard];
+                beyond > 1e-14 * self.magnitude(&self.equation.guards[*guard].expression)
+            });
+            if leads_away {
+                return false;
+            }
         }
         self.x = x;
         self.t = t;
+        self.rests = true;
         self.sliding = near.iter().map(|(_, guard)| *guard).collect();
         let (config, sliding) = (self.config.clone(), self.sliding.clone());
         self.adopt(config, sliding);
         true
     }
 
-    /// Records a state that rests until the end of the run; says whether more was wanted.
-    fn emit_rest(&mut self, observe: &mut dyn FnMut(&Point) -> bool) -> bool {
-        let end = self.options.t_end;
+    /// The gradients of functions, by place and guard, in the states at the present point.
+    fn gradients_of(&self, near: &[(usize, usize)]) -> Vec<Vec<f64>> {
+        let gradients = self.compiled.gradients(&self.variables);
+        let dense = |(place, _): &(usize, usize)| {
+            let mut row = vec![0.0; self.n];
+            for (variable, slope) in self.compiled.touches[*place].iter().zip(&gradients[*place]) {
+                if *variable < self.n {
+                    row[*variable] = *slope;
+                }
+            }
+            row
+        };
+        near.iter().map(dense).collect()
+    }
+
+    /// Whether these functions cannot all stay zero while one of these states moves: their gradients span the states' directions.
+    fn holds_still(&self, near: &[(usize, usize)], moves: &[usize]) -> bool {
+        let mut rows: Vec<Vec<f64>> =
+            self.gradients_of(near).iter().map(|row| moves.iter().map(|i| row[*i] * self.size[*i]).collect()).collect();
+        for column in 0..moves.len() {
+            let size = |row: &Vec<f64>| row.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+            rows.retain(|row| size(row) > 0.0);
+            rows.iter_mut().for_each(|row| {
+                let size = size(row);
+                row.iter_mut().for_each(|v| *v /= size);
+            });
+            let Some(at) = (0..rows.len()).max_by(|a, b| rows[*a][column].abs().total_cmp(&rows[*b][column].abs()))
+            else {
+                return false;
+            };
+            let pivot = rows.swap_remove(at);
+            if !(pivot[column].abs() > 1e-9) {
+                return false;
+            }
+            for row in &mut rows {
+                let factor = row[column] / pivot[column];
+                row.iter_mut().zip(&pivot).for_each(|(v, p)| *v -= factor * p);
+            }
+        }
+        true
+    }
+
+    /// The point where the functions in `near`, by place and guard, are zero, that is nearest to the state; the state itself where that is not to be had.
+    fn nearest_meeting(&mut self, near: &[(usize, usize)], values: &[f64]) -> Vec<f64> {
+        let rows = self.gradients_of(near);
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let gram: Vec<f64> = rows.iter().flat_map(|a| rows.iter().map(|b| dot(a, b)).collect::<Vec<_>>()).collect();
+        let off: Vec<f64> = near.iter().map(|(place, _)| values[*place]).collect();
+        let mut x = self.x.clone();
+        for (row, weight) in rows.iter().zip(solve_any(&gram, &off, 0.0).unwrap_or_default()) {
+            x.iter_mut().zip(row).for_each(|(x, r)| *x -= weight * r);
+        }
+        let largest = self.size.iter().fold(0.0_f64, |most, s| most.max(*s));
+        let moved = x.iter().zip(&self.x).all(|(a, b)| (a - b).abs() <= 1e-5 * largest);
+        if moved { x } else { self.x.clone() }
+    }
+
+    /// Lets the state rest until a time; says whether more is wanted.
+    pub(super) fn rest_until(
+        &mut self,
+        end: f64,
+        observe: &mut dyn FnMut(&Point) -> bool,
+    ) -> Result<bool, HybridError> {
+        if self.tangents.is_some() {
+            return Err(self.no_tangents("the motion comes to rest, where neighbours have no common linear motion"));
+        }
         match self.options.record {
             Record::Section(_) => {}
             Record::Path { .. } => {
                 if !self.emit(self.t, None, observe) || !self.emit(end, None, observe) {
-                    return false;
+                    return Ok(false);
                 }
             }
             Record::Times { every } => {
                 while self.next_record <= end {
                     if !self.emit(self.next_record, None, observe) {
-                        return false;
+                        return Ok(false);
                     }
                     self.next_record = ((self.next_record / every).round() + 1.0) * every;
                 }
             }
         }
         self.t = end;
-        true
+        Ok(true)
     }
 }

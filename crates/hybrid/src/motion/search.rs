@@ -12,6 +12,8 @@ pub(super) const SHORTER: f64 = 0.25;
 const DEEPEST: usize = 16;
 /// By so much of what its error is measured by the derivative of the continuous extension, which is of lower order than the step, may miss the field.
 const LARGEST_DEFECT: f64 = 1e3;
+/// A weight of sliding that is zero because a field runs along the surface is so up to this rounding; one that grows beyond its root is none.
+const ALONG: f64 = 1e-10;
 
 impl Follower<'_> {
     /// What may be met in a step, with the side that it is on.
@@ -156,9 +158,14 @@ impl Follower<'_> {
                         (true, true) => self.config.sides[guard] + 1.0 - value,
                     }
                 }
-                Sought::Watched(i) => values[active + i],
-                Sought::Leave { place, plus: false } => weights[place],
-                Sought::Leave { place, plus: true } => others.get(place).map_or(1.0 - weights[place], |w| *w),
+                Sought::Watched(i) | Sought::Pole(i) => values[active + i],
+                Sought::Leave { place, plus } => {
+                    let weight =
+                        if plus { others.get(place).map_or(1.0 - weights[place], |w| *w) } else { weights[place] };
+                    let rounding =
+                        if self.along[self.sliding[place]] == if plus { 1.0 } else { -1.0 } { ALONG } else { 0.0 };
+                    weight + rounding
+                }
                 Sought::Repelling => determinant,
                 // A surface pushes and does not pull.
                 Sought::Release(place) => {
@@ -327,7 +334,7 @@ impl Follower<'_> {
         for correction in 0.. {
             let follower = &mut *self;
             step.take(length, &mut |t, x, out| follower.rhs(t, x, out));
-            if correction == 3 {
+            if correction == 3 || matches!(sought, Sought::Pole(_)) {
                 break;
             }
             let correction = self.value_of(sought, self.t + length, &step.y) / slope;
@@ -342,6 +349,34 @@ impl Follower<'_> {
                 break;
             }
             length = wanted;
+        }
+    }
+
+    /// Tells zeros of watched expressions at a place of a step from poles, which they change their sign at, too: towards a pole they grow.
+    pub(super) fn tell_poles(&mut self, step: &Step, theta: f64, met: &mut [Sought]) {
+        const NEAR: f64 = 1e-9;
+        const GROWTH: f64 = 100.0;
+        let (t, mut x) = (step.t + theta * step.h, vec![0.0; self.n]);
+        step.at(theta, &mut x);
+        for sought in met {
+            let Sought::Watched(i) = *sought else { continue };
+            let there = self.value_of(*sought, t, &x).abs();
+            let e = &self.equation.watched[i];
+            // The rounding of a sum that is zero has no size.
+            if there < 1e-6 * self.magnitude(e) {
+                continue;
+            }
+            let mut field = vec![0.0; self.n];
+            self.rhs(t, &x, &mut field);
+            let moves = field.iter().zip(&self.size).filter(|(f, _)| **f != 0.0);
+            let away = moves.map(|(f, size)| NEAR * size / f.abs()).fold(NEAR * t.abs(), f64::max);
+            let beside = [-away, away].map(|away| {
+                let point: Vec<f64> = x.iter().zip(&field).map(|(x, f)| x + away * f).collect();
+                self.value_of(*sought, t + away, &point).abs()
+            });
+            if beside.iter().all(|v| there > GROWTH * v) {
+                *sought = Sought::Pole(i);
+            }
         }
     }
 
@@ -483,6 +518,17 @@ impl Follower<'_> {
             Sought::Guard { guard, .. } => self.fresh_guard[guard],
             Sought::Watched(i) => self.fresh_watch[i],
             _ => false,
+        }
+    }
+
+    /// A field that ran along the surface and does so no more is one as others.
+    pub(super) fn tell_along(&mut self, list: &[(Sought, f64)], end: &[f64]) {
+        for ((sought, _), value) in list.iter().zip(end) {
+            let Sought::Leave { place, plus } = *sought else { continue };
+            let guard = self.sliding[place];
+            if self.along[guard] == if plus { 1.0 } else { -1.0 } && *value > ALONG.sqrt() {
+                self.along[guard] = 0.0;
+            }
         }
     }
 

@@ -123,6 +123,7 @@ impl Follower<'_> {
 
     /// The same, where what is slid upon is decided, too, but for the guards in `kept`.
     pub(super) fn decide(&mut self, zero: &[usize], kept: &[bool]) -> Result<(), HybridError> {
+        self.rests = false;
         // Only what the equations ask here; what they do not ask keeps its side until it is asked.
         let zero: Vec<usize> = zero.iter().copied().filter(|g| self.compiled.place(*g).is_some()).collect();
         if zero.is_empty() {
@@ -253,9 +254,10 @@ impl Follower<'_> {
                 let b: Vec<f64> = slides.iter().map(|s| -base[*s]).collect();
                 let weights = solve_any(&matrix, &b, 0.0);
                 if m == 1 {
-                    // On both sides towards or away from the surface, to second order.
+                    // On both sides towards or away from the surface, to second order; or along it on one side and towards it on the other.
                     let (d0, d1) = (direction[slides[0]], columns[0].2[slides[0]]);
-                    if d0 * d1 >= 0.0 {
+                    let along_one = d0 == 0.0 && d1 < 0.0 || d1 == 0.0 && d0 > 0.0;
+                    if d0 * d1 >= 0.0 && !along_one {
                         return false;
                     }
                 } else if self.options.intersection != Intersection::Undecided {
@@ -295,6 +297,9 @@ impl Follower<'_> {
                 })
             });
             let chosen = match found.as_slice() {
+                [] if self.options.intersection == Intersection::Undecided && self.comes_to_rest(self.t) => {
+                    return Ok(());
+                }
                 [] => {
                     let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
                     return Err(match self.options.intersection {
@@ -321,8 +326,18 @@ impl Follower<'_> {
                     }
                 }
             };
-            for (i, way) in set.iter().zip(chosen) {
-                ways[*i] = way;
+            for (i, way) in set.iter().zip(&chosen) {
+                ways[*i] = *way;
+            }
+            if let ([i], [Way::Stay]) = (set.as_slice(), chosen.as_slice()) {
+                let (low, high) = (at(self, vec![false]).2[0], at(self, vec![true]).2[0]);
+                self.along[zero[*i]] = if low == 0.0 {
+                    -1.0
+                } else if high == 0.0 {
+                    1.0
+                } else {
+                    0.0
+                };
             }
         }
         // Surfaces that do not change each other's speeds may still act on other states together.
@@ -570,7 +585,7 @@ impl Follower<'_> {
 }
 
 /// Whether mixtures of 2^k fields have more than one velocity on their surfaces: the fields are not sums of what each side adds.
-fn mixtures_differ(fields: &[Vec<f64>]) -> bool {
+pub(super) fn mixtures_differ(fields: &[Vec<f64>]) -> bool {
     let n = fields[0].len();
     let size = fields.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
     let added = |vertex: usize, i: usize| -> f64 {

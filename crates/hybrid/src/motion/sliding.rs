@@ -217,6 +217,17 @@ impl Follower<'_> {
         out.iter().map(|d| d.partials[0]).collect()
     }
 
+    /// The derivatives of the field along itself.
+    fn slopes_along(compiled: &Compiled, variables: &[f64], field: &[f64]) -> Vec<f64> {
+        let n = field.len();
+        let mut duals: Vec<Dual<f64, 1>> = variables.iter().map(|v| Dual::constant(*v)).collect();
+        duals.iter_mut().zip(field).for_each(|(dual, slope)| dual.partials = [*slope]);
+        duals[n].partials = [1.0];
+        let mut slopes = vec![Dual::constant(0.0); n];
+        compiled.field.evaluate(&duals, &mut slopes);
+        slopes.iter().map(|d| d.partials[0]).collect()
+    }
+
     /// Weights of the positive sides in sliding; not-a-number where there are none.
     pub(super) fn weights(&mut self, t: f64, x: &[f64], field0: &[f64]) -> Vec<f64> {
         let (a, matrix) = self.sliding_equations(t, x, field0);
@@ -311,11 +322,24 @@ impl Follower<'_> {
         // Second derivatives matter where first ones are zero; they are asked of the present programs.
         let mut second = vec![0.0; outputs];
         if (0..outputs).any(|i| !(slopes[i].abs() > 1e-11 * terms[i])) {
+            let bends = Self::slopes_along(&compiled, &variables, &field);
             let kept = (
                 std::mem::replace(&mut self.variables, variables),
                 std::mem::replace(&mut self.compiled, compiled.clone()),
             );
             second = self.second_along(&field, None);
+            // What the field's bends add, and the rest, may cancel to rounding.
+            for (o, gradient) in compiled.gradients(&self.variables).iter().enumerate() {
+                let (mut by_bends, mut size) = (0.0, 0.0);
+                for (variable, slope) in compiled.touches[o].iter().zip(gradient).filter(|(v, _)| **v < n) {
+                    by_bends += slope * bends[*variable];
+                    size += (slope * bends[*variable]).abs();
+                }
+                size += (second[o] - by_bends).abs();
+                if second[o].abs() <= 1e-13 * size {
+                    second[o] = 0.0;
+                }
+            }
             (self.variables, self.compiled) = kept;
         }
         (compiled, Rates { field, first: slopes, second, terms })

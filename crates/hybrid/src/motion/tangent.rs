@@ -273,12 +273,12 @@ impl Follower<'_> {
         }))
     }
 
-    fn no_tangents(&self, why: &str) -> HybridError {
+    pub(super) fn no_tangents(&self, why: &str) -> HybridError {
         HybridError::Stuck { t: self.t, x: self.x.clone(), why: format!("tangent vectors end: {why}") }
     }
 
-    /// Notes the derivative of a reset, for tangent vectors.
-    pub(super) fn note_reset(&mut self, set: &[(usize, &Expression)], old: &[f64]) {
+    /// Notes the derivative of a reset, for tangent vectors, after those of this moment that were noted before.
+    pub(super) fn note_reset(&mut self, set: &[(usize, Expression)], old: &[f64]) {
         if self.tangents.is_none() {
             return;
         }
@@ -305,9 +305,15 @@ impl Follower<'_> {
             let h = 1e-4 * (self.options.t_end - self.options.t_start).min(1.0);
             by_time[*state] = slope(&|shift| value(self.t + shift, old), h);
         }
-        if let Some(tangents) = &mut self.tangents {
-            tangents.reset = Some((by_state, by_time));
+        let Some(tangents) = &mut self.tangents else { return };
+        if let Some((first, first_by_time)) = &tangents.reset {
+            let times =
+                |column: &dyn Fn(usize) -> f64, i: usize| (0..n).map(|k| by_state[i * n + k] * column(k)).sum::<f64>();
+            let both = (0..n * n).map(|at| times(&|k| first[k * n + at % n], at / n)).collect();
+            let late = (0..n).map(|i| times(&|k| first_by_time[k], i) + by_time[i]).collect();
+            (by_state, by_time) = (both, late);
         }
+        tangents.reset = Some((by_state, by_time));
     }
 
     /// Multiplies the tangent vectors by the saltation matrix of what has been met.
