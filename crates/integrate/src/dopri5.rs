@@ -213,7 +213,7 @@ impl<const N: usize> Dopri5<N> {
         sum / N as f64
     }
 
-    fn first_step<D: Driven<N>>(&mut self, field: &D) -> f64 {
+    fn first_step(&mut self, field: &dyn Driven<N>) -> f64 {
         let (t, x) = (self.t, self.x);
         let longest = self.max_step.min(self.t_end - t);
         let norm = |v: &SVector<f64, N>| self.norm(v, |i| x[i].abs());
@@ -245,10 +245,9 @@ impl<const N: usize> Stepper<N> for Dopri5<N> {
 }
 
 impl<const N: usize> DrivenStepper<N> for Dopri5<N> {
-    #[inline]
-    fn restart_driven<D: Driven<N>>(
+    fn restart_driven(
         &mut self,
-        field: &D,
+        field: &dyn Driven<N>,
         t: f64,
         x: SVector<f64, N>,
         t_end: f64,
@@ -273,8 +272,7 @@ impl<const N: usize> DrivenStepper<N> for Dopri5<N> {
         Ok(())
     }
 
-    #[inline(always)]
-    fn step_driven<D: Driven<N>>(&mut self, field: &D) -> Result<Step<'_, N>, Failure> {
+    fn step_driven(&mut self, field: &dyn Driven<N>) -> Result<Step<'_, N>, Failure> {
         let (t0, x0, k1) = (self.t, self.x, self.fsal);
         let mut rejected_before = false;
         loop {

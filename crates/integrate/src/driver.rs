@@ -111,6 +111,52 @@ where
     F: VectorField<N>,
     M: Stepper<N>,
 {
+    drive_any(&mut Pair { field, stepper }, x0, options, observer, watch)
+}
+
+/// A method with its equation: what the loop asks of both, whichever they are, so that it is compiled once a dimension.
+trait Driving<const N: usize> {
+    /// [`Stepper::restart`], or [`Stepper::restart_again`].
+    fn restart(&mut self, again: bool, t: f64, x: SVector<f64, N>, t_end: f64, max_step: f64) -> Result<(), Failure>;
+    /// [`Stepper::step`].
+    fn step(&mut self) -> Result<Step<'_, N>, Failure>;
+    /// [`Stepper::statistics`].
+    fn statistics(&self) -> &Statistics;
+    /// The failure with its cause in the equation.
+    fn diagnosed(&self, failure: Failure) -> Failure;
+}
+
+struct Pair<'a, F, M> {
+    field: &'a F,
+    stepper: &'a mut M,
+}
+
+impl<F: VectorField<N>, M: Stepper<N>, const N: usize> Driving<N> for Pair<'_, F, M> {
+    fn restart(&mut self, again: bool, t: f64, x: SVector<f64, N>, t_end: f64, max_step: f64) -> Result<(), Failure> {
+        if again {
+            self.stepper.restart_again(self.field, t, x, t_end, max_step)
+        } else {
+            self.stepper.restart(self.field, t, x, t_end, max_step)
+        }
+    }
+    fn step(&mut self) -> Result<Step<'_, N>, Failure> {
+        self.stepper.step(self.field)
+    }
+    fn statistics(&self) -> &Statistics {
+        self.stepper.statistics()
+    }
+    fn diagnosed(&self, failure: Failure) -> Failure {
+        failure.diagnosed(&self.field.tape())
+    }
+}
+
+fn drive_any<const N: usize>(
+    pair: &mut dyn Driving<N>,
+    x0: SVector<f64, N>,
+    options: &DriveOptions,
+    observer: &mut dyn Observer<N>,
+    watch: &dyn Watch,
+) -> Result<Summary<N>, Failure> {
     let DriveOptions { t_end, ref schedule, step_cap, max_steps, kicked_states } = *options;
     let mut kicker = schedule.kick.map(|kick| Kicker::new(kick, kicked_states));
     let (mut t, mut x) = (0.0, x0);
@@ -118,23 +164,23 @@ where
     let mut most_steps_in_segment = 0;
     let mut stop = StopReason::EndTime;
     'run: for segment in schedule.segments(0.0, t_end) {
-        let steps_before = stepper.statistics().steps;
+        let steps_before = pair.statistics().steps;
         let longest = step_cap.for_segment(segment.end - t);
-        if !std::mem::replace(&mut begun, true) {
-            stepper.restart(field, t, x, segment.end, longest).map_err(|f| f.diagnosed(&field.tape()))?;
-        } else {
-            stepper.restart_again(field, t, x, segment.end, longest).map_err(|f| f.diagnosed(&field.tape()))?;
-        }
+        let again = std::mem::replace(&mut begun, true);
+        pair.restart(again, t, x, segment.end, longest).map_err(|f| pair.diagnosed(f))?;
         while t < segment.end {
             // Looked at where it was made: `?` would move it, in other pieces than it was written in, which waits until all are written.
-            let flow = match &stepper.step(field) {
+            let flow = match &pair.step() {
                 Ok(step) => {
                     (t, x) = (step.t1, step.x1);
                     observer.step(step)
                 }
-                Err(failure) => return Err(failure.clone().diagnosed(&field.tape())),
+                Err(failure) => {
+                    let failure = failure.clone();
+                    return Err(pair.diagnosed(failure));
+                }
             };
-            let steps = stepper.statistics().steps;
+            let steps = pair.statistics().steps;
             if flow == Flow::Stop {
                 stop = StopReason::Observer;
             } else if steps.is_multiple_of(4096) && !watch.reached(t) && t < t_end {
@@ -147,7 +193,7 @@ where
                 break 'run;
             }
         }
-        most_steps_in_segment = most_steps_in_segment.max(stepper.statistics().steps - steps_before);
+        most_steps_in_segment = most_steps_in_segment.max(pair.statistics().steps - steps_before);
         if let (true, Some(kicker)) = (segment.kick, kicker.as_mut()) {
             let kicked = kicker.apply(x);
             observer.kick(t, &x, &kicked);
@@ -155,7 +201,7 @@ where
         }
     }
     watch.reached(t);
-    Ok(Summary { t, x, statistics: stepper.statistics().clone(), most_steps_in_segment, stop })
+    Ok(Summary { t, x, statistics: pair.statistics().clone(), most_steps_in_segment, stop })
 }
 
 #[cfg(test)]

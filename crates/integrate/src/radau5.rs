@@ -220,7 +220,7 @@ impl<const N: usize> Radau5<N> {
     }
 
     /// A first step size, for an error estimate of order 3.
-    fn first_step<D: Driven<N>>(&mut self, field: &D) -> f64 {
+    fn first_step(&mut self, field: &dyn Driven<N>) -> f64 {
         let (t, weights) = (self.t, self.weights());
         let longest = self.max_step.min(self.t_end - t);
         let norm = |v: &SVector<f64, N>| norm(v, &weights);
@@ -248,7 +248,7 @@ impl<const N: usize> Radau5<N> {
     }
 
     /// Solves Z = h A F(x + Z) by simplified Newton iteration in the coordinates that split A^-1 (eq. IV.8.12-13).
-    fn solve<D: Driven<N>>(&mut self, field: &D, h: f64, weights: &SVector<f64, N>) -> Option<Solved<N>> {
+    fn solve(&mut self, field: &dyn Driven<N>, h: f64, weights: &SVector<f64, N>) -> Option<Solved<N>> {
         self.factorise(h)?;
         let (_, matrices) = self.matrices.as_ref()?;
         let t = &self.tableau;
@@ -364,9 +364,9 @@ impl<const N: usize> Stepper<N> for Radau5<N> {
 }
 
 impl<const N: usize> DrivenStepper<N> for Radau5<N> {
-    fn restart_driven<D: Driven<N>>(
+    fn restart_driven(
         &mut self,
-        field: &D,
+        field: &dyn Driven<N>,
         t: f64,
         x: SVector<f64, N>,
         t_end: f64,
@@ -398,7 +398,7 @@ impl<const N: usize> DrivenStepper<N> for Radau5<N> {
         Ok(())
     }
 
-    fn step_driven<D: Driven<N>>(&mut self, field: &D) -> Result<Step<'_, N>, Failure> {
+    fn step_driven(&mut self, field: &dyn Driven<N>) -> Result<Step<'_, N>, Failure> {
         let (t0, x0) = (self.t, self.x);
         let weights = self.weights();
         let mut failures = 0;

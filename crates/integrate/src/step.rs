@@ -157,7 +157,7 @@ pub trait Stepper<const N: usize> {
     fn statistics(&self) -> &Statistics;
 }
 
-/// A right-hand side that depends on time, x' = f(t, x).
+/// A right-hand side that depends on time, x' = f(t, x); methods call it without knowing which it is, so that each is compiled once a dimension.
 pub(crate) trait Driven<const N: usize> {
     /// f(t, x).
     fn eval(&self, t: f64, x: &SVector<f64, N>) -> SVector<f64, N>;
@@ -182,16 +182,16 @@ impl<F: VectorField<N>, const N: usize> Driven<N> for Steady<'_, F> {
 /// A one-step method for right-hand sides that depend on time: [`Stepper::restart`] and [`Stepper::step`] for them.
 pub(crate) trait DrivenStepper<const N: usize>: Stepper<N> {
     /// [`Stepper::restart`].
-    fn restart_driven<D: Driven<N>>(
+    fn restart_driven(
         &mut self,
-        field: &D,
+        field: &dyn Driven<N>,
         t: f64,
         x: SVector<f64, N>,
         t_end: f64,
         max_step: f64,
     ) -> Result<(), Failure>;
     /// [`Stepper::step`].
-    fn step_driven<D: Driven<N>>(&mut self, field: &D) -> Result<Step<'_, N>, Failure>;
+    fn step_driven(&mut self, field: &dyn Driven<N>) -> Result<Step<'_, N>, Failure>;
 }
 
 /// Work done by a method. Counts that a method does not have stay zero.

@@ -37,12 +37,12 @@ use serde::{Deserialize, Serialize};
 
 use super::guard::Redoable;
 use super::linear::Lu;
-use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
+use super::step::{Driven, Failure, Interpolant, Statistics, Steady, Step, Stepper, Tolerance, finite};
 use coefficients::{ADAMS, ADAMS_ORDERS, ADAMS_STABILITY, BDF, BDF_ORDERS, ERROR_RATIO, Formula};
 use nordsieck::Nordsieck;
 use selection::*;
 use twofold_num::elementary::{rough_pow, sqrt};
-use twofold_system::{VectorField, jacobian};
+use twofold_system::VectorField;
 
 const EPSILON: f64 = f64::EPSILON;
 
@@ -318,8 +318,8 @@ impl<const N: usize> Lsoda<N> {
     }
 
     /// Evaluates the Jacobian and factorises I - h l_0 J.
-    fn make_matrix<F: VectorField<N>>(&mut self, field: &F, x: &SVector<f64, N>) -> Result<(), NotConverged> {
-        let j = jacobian(field, x);
+    fn make_matrix(&mut self, field: &dyn Driven<N>, x: &SVector<f64, N>) -> Result<(), NotConverged> {
+        let j = field.jacobian(self.t, x);
         let h = self.h * self.formula().l[0];
         self.statistics.jacobians += 1;
         self.statistics.factorisations += 1;
@@ -334,7 +334,7 @@ impl<const N: usize> Lsoda<N> {
 
     /// Solves the corrector equation e = h f(y_0 + l_0 e) - y_1 from e = 0, by functional iteration (Adams) or Newton
     /// iteration with a kept matrix (BDF). Returns the error of the step in units of the tolerance.
-    fn correct<F: VectorField<N>>(&mut self, field: &F) -> Result<f64, NotConverged> {
+    fn correct(&mut self, field: &dyn Driven<N>) -> Result<f64, NotConverged> {
         let formula = self.formula();
         let l0 = formula.l[0];
         let (y0, y1) = (*self.history.x(), *self.history.column(1));
@@ -345,7 +345,7 @@ impl<const N: usize> Lsoda<N> {
         let mut new_matrix = false;
         'start: loop {
             let mut x = y0;
-            let mut derivative = field.eval(&x);
+            let mut derivative = field.eval(self.t, &x);
             self.statistics.evaluations += 1;
             if self.family == Family::Bdf && self.renew_matrix {
                 self.make_matrix(field, &x)?;
@@ -402,7 +402,7 @@ impl<const N: usize> Lsoda<N> {
                     continue 'start;
                 }
                 change_before = change;
-                derivative = field.eval(&x);
+                derivative = field.eval(self.t, &x);
                 self.statistics.evaluations += 1;
             }
         }
@@ -531,11 +531,102 @@ impl<const N: usize> Lsoda<N> {
         accurate.min(stable)
     }
 
+    /// One accepted step.
+    fn advance(&mut self, field: &dyn Driven<N>) -> Result<Step<'_, N>, Failure> {
+        if !self.held {
+            self.carry_out_pending();
+            self.stop_at_end();
+        }
+        self.weigh();
+        let (t0, x0) = (self.t, *self.history.x());
+        let underflow = |h: f64| Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) };
+        // Tolerances below the rounding of x itself (or zero: a NaN here).
+        let rounding = self.norm(&x0) * EPSILON;
+        if rounding > 1.0 || rounding.is_nan() {
+            return Err(underflow(self.h));
+        }
+        let (mut not_converged, mut too_inaccurate) = (0, 0);
+        let error = loop {
+            if self.family == Family::Bdf {
+                let drift = self.h * self.formula().l[0] / self.matrix_h - 1.0;
+                let age = self.statistics.steps - self.matrix_step;
+                if drift.abs() > MATRIX_DRIFT || age >= MATRIX_LIFETIME || self.held {
+                    self.renew_matrix = true;
+                }
+            }
+            self.history.predict(self.order);
+            let corrected = self.correct(field);
+            match corrected {
+                Ok(error) if error <= 1.0 || self.held => break error,
+                _ => {}
+            }
+            self.history.retract(self.order);
+            self.history.set_column(0, x0);
+            self.growth_limit = GROWTH_AFTER_FAILURE;
+            match corrected {
+                Err(NotConverged) => {
+                    self.statistics.convergence_failures += 1;
+                    not_converged += 1;
+                    if not_converged == MOST_FAILURES {
+                        let x = x0 + *self.history.column(1);
+                        return Err(if finite(&field.eval(self.t, &x)) {
+                            Failure::NotConverged { t: t0, h: self.h, state: Failure::state(&x0) }
+                        } else {
+                            Failure::NotFinite { t: t0, state: Failure::state(&x0) }
+                        });
+                    }
+                    self.renew_matrix = true;
+                    self.change_step(SHRINK_NOT_CONVERGED);
+                }
+                Ok(error) => {
+                    self.statistics.rejected += 1;
+                    too_inaccurate += 1;
+                    if too_inaccurate == MOST_FAILURES {
+                        return Err(underflow(self.h));
+                    }
+                    if too_inaccurate >= 3 {
+                        self.start_over(field);
+                    } else if let Some(change) = self.select(error, too_inaccurate) {
+                        self.change_order(change.order);
+                        self.change_step(change.ratio);
+                    }
+                }
+            }
+            if self.h < f64::MIN_POSITIVE {
+                return Err(underflow(self.h));
+            }
+        };
+
+        self.history.correct(self.order, self.formula(), &self.correction);
+        self.t = t0 + self.h;
+        if (self.t - self.t_end).abs() <= 100.0 * EPSILON * (self.t.abs() + self.h) {
+            self.t = self.t_end;
+        }
+        let statistics = &mut self.statistics;
+        statistics.steps += 1;
+        statistics.stiff_steps += u64::from(self.family == Family::Bdf);
+        statistics.highest_order = statistics.highest_order.max(self.order as u64);
+
+        // A first step may be below the spacing of numbers at t and soon grows; a run of such steps will not.
+        self.standing_still = if self.t > t0 { 0 } else { self.standing_still + 1 };
+        let x1 = *self.history.x();
+        if !finite(&x1) {
+            return Err(Failure::NotFinite { t: t0, state: Failure::state(&x0) });
+        }
+        if self.standing_still > 100 {
+            return Err(underflow(self.h));
+        }
+        if !self.held {
+            self.look_ahead(error);
+        }
+        Ok(Step { t0, t1: self.t, x0, x1, interpolant: &self.history })
+    }
+
     /// After repeated failures the history is not to be believed: keep x alone, at order 1 and a tenth of the step.
-    fn start_over<F: VectorField<N>>(&mut self, field: &F) {
+    fn start_over(&mut self, field: &dyn Driven<N>) {
         self.h *= SHRINK_RESET;
         let x = *self.history.x();
-        self.history.set_column(1, field.eval(&x) * self.h);
+        self.history.set_column(1, field.eval(self.t, &x) * self.h);
         self.statistics.evaluations += 1;
         self.order = 1;
         self.renew_matrix = true;
@@ -589,93 +680,7 @@ impl<const N: usize> Stepper<N> for Lsoda<N> {
     }
 
     fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
-        if !self.held {
-            self.carry_out_pending();
-            self.stop_at_end();
-        }
-        self.weigh();
-        let (t0, x0) = (self.t, *self.history.x());
-        let underflow = |h: f64| Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) };
-        // Tolerances below the rounding of x itself (or zero: a NaN here).
-        let rounding = self.norm(&x0) * EPSILON;
-        if rounding > 1.0 || rounding.is_nan() {
-            return Err(underflow(self.h));
-        }
-        let (mut not_converged, mut too_inaccurate) = (0, 0);
-        let error = loop {
-            if self.family == Family::Bdf {
-                let drift = self.h * self.formula().l[0] / self.matrix_h - 1.0;
-                let age = self.statistics.steps - self.matrix_step;
-                if drift.abs() > MATRIX_DRIFT || age >= MATRIX_LIFETIME || self.held {
-                    self.renew_matrix = true;
-                }
-            }
-            self.history.predict(self.order);
-            let corrected = self.correct(field);
-            match corrected {
-                Ok(error) if error <= 1.0 || self.held => break error,
-                _ => {}
-            }
-            self.history.retract(self.order);
-            self.history.set_column(0, x0);
-            self.growth_limit = GROWTH_AFTER_FAILURE;
-            match corrected {
-                Err(NotConverged) => {
-                    self.statistics.convergence_failures += 1;
-                    not_converged += 1;
-                    if not_converged == MOST_FAILURES {
-                        let x = x0 + *self.history.column(1);
-                        return Err(if finite(&field.eval(&x)) {
-                            Failure::NotConverged { t: t0, h: self.h, state: Failure::state(&x0) }
-                        } else {
-                            Failure::NotFinite { t: t0, state: Failure::state(&x0) }
-                        });
-                    }
-                    self.renew_matrix = true;
-                    self.change_step(SHRINK_NOT_CONVERGED);
-                }
-                Ok(error) => {
-                    self.statistics.rejected += 1;
-                    too_inaccurate += 1;
-                    if too_inaccurate == MOST_FAILURES {
-                        return Err(underflow(self.h));
-                    }
-                    if too_inaccurate >= 3 {
-                        self.start_over(field);
-                    } else if let Some(change) = self.select(error, too_inaccurate) {
-                        self.change_order(change.order);
-                        self.change_step(change.ratio);
-                    }
-                }
-            }
-            if self.h < f64::MIN_POSITIVE {
-                return Err(underflow(self.h));
-            }
-        };
-
-        self.history.correct(self.order, self.formula(), &self.correction);
-        self.t = t0 + self.h;
-        if (self.t - self.t_end).abs() <= 100.0 * EPSILON * (self.t.abs() + self.h) {
-            self.t = self.t_end;
-        }
-        let statistics = &mut self.statistics;
-        statistics.steps += 1;
-        statistics.stiff_steps += u64::from(self.family == Family::Bdf);
-        statistics.highest_order = statistics.highest_order.max(self.order as u64);
-
-        // A first step may be below the spacing of numbers at t and soon grows; a run of such steps will not.
-        self.standing_still = if self.t > t0 { 0 } else { self.standing_still + 1 };
-        let x1 = *self.history.x();
-        if !finite(&x1) {
-            return Err(Failure::NotFinite { t: t0, state: Failure::state(&x0) });
-        }
-        if self.standing_still > 100 {
-            return Err(underflow(self.h));
-        }
-        if !self.held {
-            self.look_ahead(error);
-        }
-        Ok(Step { t0, t1: self.t, x0, x1, interpolant: &self.history })
+        self.advance(&Steady(field))
     }
 
     fn statistics(&self) -> &Statistics {
