@@ -1,8 +1,9 @@
 //! From recordings to a drawing: which points, lines and surfaces, in which colours and ranges.
 
-use super::verdict::PanelVerdict;
+use super::verdict::{Grounds, PanelVerdict};
 use super::{Camera, Panel, Picture, Support, View, wording};
 use crate::draw::surface;
+use twofold_analyse::attractor::Verdict;
 use twofold_analyse::{Crossing, Motion, Sample};
 use twofold_integrate::filippov::{EventKind, Mode, Side};
 use twofold_job::JobError;
@@ -156,10 +157,7 @@ fn section_panels(
 fn verdict_notes(picture: &Picture, verdicts: &[PanelVerdict]) -> Result<Vec<Vec<String>>, JobError> {
     let of = |panel: &Panel| -> Result<Vec<String>, JobError> {
         let Some(verdict) = verdicts.iter().find(|v| v.panel == panel.label) else { return Ok(Vec::new()) };
-        let mut notes = vec![
-            format!("paper: {}", verdict.claim_text),
-            format!("this run {}", if verdict.agrees { "agrees" } else { "differs" }),
-        ];
+        let mut notes = vec![format!("paper: {}", verdict.claim_text), format!("this run {}", outcome(verdict))];
         if let Some(repeats) = &panel.repeats {
             let Support { support, runs } = (repeats.count)(&repeats.panel, repeats.reading)?;
             notes.push(format!("{support} of {runs} runs agree"));
@@ -167,6 +165,19 @@ fn verdict_notes(picture: &Picture, verdicts: &[PanelVerdict]) -> Result<Vec<Vec
         Ok(notes)
     };
     picture.panels.iter().map(of).collect()
+}
+
+/// Whether a panel's run supports its claim. What is not decided, as that of a shortened run may be, is neither.
+fn outcome(verdict: &PanelVerdict) -> &'static str {
+    let section = match &verdict.evidence {
+        Grounds::Section(evidence) => Some(&evidence.verdict),
+        Grounds::Paths { .. } | Grounds::Freshness { .. } => None,
+    };
+    match section {
+        _ if verdict.agrees => "agrees",
+        Some(Verdict::Undecided { .. } | Verdict::TooFew { .. }) => "is undecided",
+        _ => "differs",
+    }
 }
 
 /// Paths in space: the same box in every panel.
