@@ -22,13 +22,14 @@ pub const FILES: [(&str, &str); 16] = [
 ];
 
 /// Name and text of every general system (folder `general`).
-pub const GENERAL: [(&str, &str); 8] = [
+pub const GENERAL: [(&str, &str); 9] = [
     ("bouncing-ball", include_str!("general/bouncing-ball.toml")),
     ("impact-oscillator", include_str!("general/impact-oscillator.toml")),
     ("relay-hysteresis", include_str!("general/relay-hysteresis.toml")),
     ("three-blocks", include_str!("general/three-blocks.toml")),
     ("sliding-mode-control", include_str!("general/sliding-mode-control.toml")),
     ("buck-ramp", include_str!("general/buck-ramp.toml")),
+    ("cuk-converter", include_str!("general/cuk-converter.toml")),
     ("rimless-wheel", include_str!("general/rimless-wheel.toml")),
     ("driven-by-data", include_str!("general/driven-by-data.toml")),
 ];

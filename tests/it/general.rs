@@ -54,13 +54,14 @@ fn near(found: f64, want: f64, within: f64) {
 }
 
 /// (system, end time, columns)
-const SHIPPED: [(&str, &str, &[&str]); 8] = [
+const SHIPPED: [(&str, &str, &[&str]); 9] = [
     ("bouncing-ball", "2", &["t", "x", "v", "event"]),
     ("impact-oscillator", "2", &["t", "x", "v", "event"]),
     ("relay-hysteresis", "20", &["t", "T", "mode", "event"]),
     ("three-blocks", "2", &["t", "x1", "x2", "x3", "v1", "v2", "v3", "signs"]),
     ("sliding-mode-control", "2", &["t", "x", "v", "signs"]),
     ("buck-ramp", "0.002", &["t", "v", "i", "signs"]),
+    ("cuk-converter", "0.0002", &["t", "i1", "v1", "i2", "v2", "signs"]),
     ("rimless-wheel", "2", &["t", "a", "w", "event"]),
     ("driven-by-data", "50", &["t", "height", "signs"]),
 ];

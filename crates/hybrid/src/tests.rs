@@ -45,7 +45,11 @@ fn every_general_system_that_ships_is_read_and_followed() {
         let model = shipped(name);
         assert_eq!(model.definition().name(), name);
         assert!(!model.definition().title().is_empty() && !model.definition().document().references.is_empty());
-        let t_end = if name == "buck-ramp" { 0.01 } else { 5.0 };
+        let t_end = match name {
+            "buck-ramp" => 0.01,
+            "cuk-converter" => 0.001,
+            _ => 5.0,
+        };
         run(&model, t_end).1.unwrap_or_else(|e| panic!("{name}: {e}"));
     }
 }
@@ -443,6 +447,51 @@ fn tangent_vectors_pass_switches_by_saltation_matrices() {
     let options = Options { start: Some(vec![0.0, 0.5]), record: section("x"), t_end: 60.0, ..Options::default() };
     if let Ok(orbit) = closed_orbit(&block, &options, &Return::Crossings(1)) {
         near(orbit.multipliers[0][0], 0.0, 1e-9);
+    }
+}
+
+/// The converter's orbit as matrix exponentials give it (SciPy's `expm`, Newton's method on the period), and its averages: E + v2 = v1 whatever the ripple,
+/// and without ripple v2 = E d/(1 - d), or E d/sqrt(K) where the diode blocks before the period ends (Cuk & Middlebrook 1977).
+#[test]
+fn a_cuk_converter_has_its_closed_orbits() {
+    use crate::motion::tangent::{Return, closed_orbit};
+    let text = twofold_system::library::general("cuk-converter").unwrap();
+    let averaged = text
+        .replace("start = [", "start = [0, 0, ")
+        .replace("states = [", "states = [\"a1\", \"a2\",")
+        .replace("f = [", "f = [\"v1/period\", \"v2/period\",");
+    let always = [0.218_389_663_520_619_75, 20.150_423_570_475_724, 0.351_820_166_631_876_3, 7.995_275_864_182_7];
+    let partly =
+        [0.002_243_986_613_041_76, 25.590_378_587_232_767, -0.002_243_986_613_041_735_8, 13.572_417_655_863_98];
+    let sizes =
+        ([0.987_751_6, 0.987_751_6, 0.963_024_94, 0.963_024_94], [0.997_151_281, 0.997_151_281, 0.995_008_467, 0.0]);
+    let averages = ([19.998_721_264_603_635, 7.998_721_264_603_72], [25.580_796_932_456_376, 13.580_796_932_456_662]);
+    let ideal = (0.4 / 0.6, 0.4 / 0.125_f64.sqrt());
+    for (load, orbit, sizes, averages, ideal) in
+        [(20.0, always, sizes.0, averages.0, ideal.0), (400.0, partly, sizes.1, averages.1, ideal.1)]
+    {
+        let model = model(text).with("load", load).unwrap();
+        // From a start beside it.
+        let start = orbit.iter().map(|x| x * 1.001).collect();
+        let options = Options { start: Some(start), ..Options::default() };
+        let found = closed_orbit(&model, &options, &Return::Period(20e-6)).unwrap();
+        found.x.iter().zip(orbit).for_each(|(x, want)| near(*x, want, 1e-8));
+        let mut of: Vec<f64> = found.multipliers.iter().map(|m| (m[0] * m[0] + m[1] * m[1]).sqrt()).collect();
+        of.sort_by(|a, b| b.total_cmp(a));
+        of.iter().zip(sizes).for_each(|(size, want)| near(*size, want, 1e-6));
+        let averaged = Model::new(Definition::from_toml(&averaged, "test.toml").unwrap()).with("load", load).unwrap();
+        let start = [0.0, 0.0].into_iter().chain(orbit).collect();
+        let options = Options { t_end: 20e-6, start: Some(start), ..Options::default() };
+        let end = follow(&averaged, &options, &mut |_| true).unwrap().x;
+        near(end[0], averages[0], 1e-8);
+        near(end[1], averages[1], 1e-8);
+        near(12.0 + end[1], end[0], 1e-8);
+        near(end[1], 12.0 * ideal, 5e-4 * end[1]);
+        end[2..].iter().zip(orbit).for_each(|(x, want)| near(*x, want, 1e-8));
+        // Sliding ends where the ramp jumps back, ten times.
+        let options = Options { t_end: 10.0 * 20e-6, start: Some(orbit.to_vec()), ..Options::default() };
+        let end = follow(&model, &options, &mut |_| true).unwrap().x;
+        end.iter().zip(orbit).for_each(|(x, want)| near(*x, want, 1e-8));
     }
 }
 

@@ -95,7 +95,14 @@ impl Follower<'_> {
         let mut accumulates = None;
         if !crossed.is_empty() {
             self.outcome.switches += 1;
+            let sides = self.config.sides.clone();
             self.settle(&zero)?;
+            let jumped = |guard: &usize| !zero.contains(guard) && sides[*guard] != self.config.sides[*guard];
+            if !self.sliding.is_empty() && self.compiled.active.iter().any(jumped) {
+                // What jumped with it may let sliding end.
+                let (slid, none) = (self.sliding.clone(), vec![false; self.slides.len()]);
+                self.decide(&slid, &none)?;
+            }
             for guard in crossed {
                 let found = self.switch_trains[guard].note(self.t, 0.0);
                 accumulates = accumulates.or(found.map(|(t, error)| (guard, t, error)));
