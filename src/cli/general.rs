@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::CliError;
 use super::flags::{RunFlags, Use};
+use super::words::Method as Named;
 use crate::hybrid::definition::is_general;
 use crate::hybrid::model::ModelError;
 use crate::hybrid::motion::{Exit as Side, Method, Record};
@@ -131,15 +132,7 @@ pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
         };
         return Err(CliError::no_effect(flag, why));
     }
-    let method = match flags.method {
-        None | Some(super::words::Method::Dopri5) => Method::Dopri5,
-        Some(super::words::Method::Radau5) => Method::Radau5,
-        Some(_) => {
-            return Err(usage(
-                "--method: general systems are followed by dopri5, or radau5 where they are stiff".into(),
-            ));
-        }
-    };
+    let method = method(flags.method)?;
     let positive = |flag: &str, value: Option<f64>| match value {
         Some(v) if !(v.is_finite() && v > 0.0) => Err(usage(format!("{flag} {v}: give a finite number above 0"))),
         other => Ok(other),
@@ -201,6 +194,23 @@ pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
         intersection: flags.intersection.as_deref().map_or(Ok(Rule::Undecided), |text| intersection(text, &model))?,
     };
     Ok(Some(GeneralRun { model, options }))
+}
+
+/// The method that the flag names.
+fn method(named: Option<Named>) -> Result<Method, CliError> {
+    let (name, why) = match named {
+        None | Some(Named::Dopri5) => return Ok(Method::Dopri5),
+        Some(Named::Radau5) => return Ok(Method::Radau5),
+        Some(Named::Taylor) => return Ok(Method::Taylor),
+        Some(Named::Lsoda) => {
+            ("lsoda", "it builds up its order over many steps, and every switch or event begins anew")
+        }
+        Some(Named::TaylorExtended) => ("taylor-extended", "switches and events are located in double precision"),
+        Some(Named::Layered) => ("layered", "it belongs to a smoothed switch"),
+    };
+    Err(usage(format!(
+        "--method {name}: general systems are followed by dopri5, radau5 where they are stiff, or taylor for many digits; {why}"
+    )))
 }
 
 /// Filippov's motion of a system with h, plus and minus, if the flags ask for it, as the run of a general one.

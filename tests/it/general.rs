@@ -256,6 +256,33 @@ fn sections_say_their_direction_and_answers_their_switching_functions() {
     assert_eq!((signs, signs.len()), ("-#+", functions.len()));
 }
 
+/// By Taylor series: the same motion, to more digits.
+#[test]
+fn a_run_by_series_has_the_last_digits() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let arguments = ["--system", "bouncing-ball", "--method", "taylor", "--rtol", "1e-15", "--t-end", "3"];
+    let (answer, _) = json(at, &arguments);
+    assert_eq!(answer["about"]["question"]["method"]["name"], "taylor");
+    let impacts: Vec<f64> = {
+        let table = run(at, &arguments);
+        let times = table.numbers("t").iter().zip(table.words("event")).filter(|(_, e)| *e == "impact");
+        times.map(|(t, _)| *t).step_by(2).collect()
+    };
+    // The flights last 2 r^k sqrt(2/g).
+    let (mut t, mut flight) = (0.0, (2.0_f64 / 9.81).sqrt());
+    for (k, impact) in impacts.iter().enumerate() {
+        t += flight;
+        flight *= if k == 0 { 1.6 } else { 0.8 };
+        near(*impact, t, 1e-14);
+    }
+    assert!(impacts.len() > 4, "{impacts:?}");
+    for (name, t_end, _) in SHIPPED {
+        let drawn = ["plot", "--quiet", "--method", "taylor", "--out", "a.png", "--system", name, "--t-end", t_end];
+        good(at, &drawn);
+    }
+}
+
 const GUST: &str = "name = 'gust'\nstates = ['x']\nstart = [0]\nf = ['wind - x']\n[tables.wind]\nfile = 'wind.csv'\ntime = 't'\ncolumn = 'speed'\n";
 
 #[test]
@@ -309,7 +336,11 @@ fn wrong_files_and_flags_are_refused() {
         ball(&[flag, value], 2, &[&format!("{flag} has no effect here")]);
     }
     ball(&["--print-spec"], 2, &["--print-spec has no effect"]);
-    ball(&["--method", "lsoda"], 2, &["dopri5"]);
+    ball(&["--method", "lsoda"], 2, &["--method lsoda: general systems", "dopri5", "over many steps"]);
+    ball(&["--method", "taylor-extended"], 2, &["dopri5", "taylor for many digits", "double precision"]);
+    ball(&["--method", "layered"], 2, &["dopri5", "smoothed"]);
+    let exponents = ["lyapunov", "--quiet", "--system", "sliding-mode-control", "--method", "taylor"];
+    refused(at, &exponents, 2, &["carried by dopri5; leave --method taylor out"]);
     ball(&["--exit", "all"], 2, &["at-once:plus or at-once:minus"]);
     ball(&["--set", "q=1"], 2, &["no parameter `q`", "g, r"]);
     ball(&["--set", "r=1"], 2, &["--set \"r=1\": `r` is 1", "below 1"]);

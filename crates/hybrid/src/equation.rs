@@ -66,7 +66,7 @@ pub struct Compiled {
     /// The same of the watched values.
     pub(crate) watched_gates: Vec<Gate>,
     pub(crate) watched_gate_arguments: Program,
-    tape: Tape,
+    pub(crate) tape: Tape,
 }
 
 /// A system's equations with its switching functions.
@@ -598,7 +598,7 @@ fn factors_of(tape: &Tape, node: usize, found: &mut Vec<usize>) {
 }
 
 /// For each value the variables that it depends on, as bits.
-fn dependencies(tape: &Tape) -> Vec<Vec<u64>> {
+pub(crate) fn dependencies(tape: &Tape) -> Vec<Vec<u64>> {
     let words = tape.variables().div_ceil(64);
     let mut of: Vec<Vec<u64>> = Vec::with_capacity(tape.operations().len());
     for operation in tape.operations() {

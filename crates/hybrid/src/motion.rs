@@ -1,6 +1,6 @@
 //! Following a general system exactly: from switch to switch, from event to event.
 //!
-//! Between switches the equations are smooth and a step of Dormand & Prince's method is made. Every step is searched for the first
+//! Between switches the equations are smooth and a step of one of the methods is made. Every step is searched for the first
 //! zero of all switching functions, events' expressions and limits of sliding; it is made again to end there, and
 //! [what happens there](crate::selection) is decided from the equations on both sides.
 
@@ -8,6 +8,7 @@ mod clock;
 mod meeting;
 mod search;
 pub mod sensitivity;
+mod series;
 mod settling;
 mod sliding;
 pub mod tangent;
@@ -26,7 +27,7 @@ use twofold_system::Expression;
 use crate::definition::{Direction, When};
 use crate::equation::{Compiled, Configuration, Equation, EquationError};
 use crate::model::Model;
-use crate::roots::{PLACES, at_fraction, first, first_of_polynomial, stays};
+use crate::roots::{PLACES, at_fraction, first, first_of_polynomial, first_of_series, stays};
 use crate::selection::{Intersection, MOST_TOGETHER, Mixture, Way, groups, mixture, nearest_of_hull, possibilities};
 use crate::step::Step;
 
@@ -66,6 +67,8 @@ pub enum Method {
     Dopri5,
     /// Radau IIA, implicit: for motion that is stiff between switches or in sliding.
     Radau5,
+    /// Taylor series of the motion, of an order that the tolerance decides: for many digits.
+    Taylor,
 }
 
 impl Method {
@@ -74,6 +77,7 @@ impl Method {
         match self {
             Method::Dopri5 => "dopri5",
             Method::Radau5 => "radau5",
+            Method::Taylor => "taylor",
         }
     }
 }
@@ -262,6 +266,9 @@ const MOST_SHORTENINGS: usize = 200;
 /// How often switches may make each other jump at one moment.
 const MOST_JUMPS: usize = 32;
 
+/// Derivatives of watched values that are smaller parts of their terms than this are zero.
+const SMALLEST_SLOPE: f64 = 1e-11;
+
 type Nested = Dual<Dual<f64, 1>, 1>;
 
 /// What a step is searched for.
@@ -387,6 +394,8 @@ struct Follower<'a> {
     /// Guards and watched expressions that left zero at the step's beginning.
     fresh_guard: Vec<bool>,
     fresh_watch: Vec<bool>,
+    /// Of each guard whose zero was slid upon until now, by how much the speeds of its two sides differ.
+    left: Vec<f64>,
     /// The event of each watched expression; none for a section.
     event_of: Vec<Option<usize>>,
     /// Whether each event's condition holds.
@@ -405,6 +414,7 @@ struct Follower<'a> {
     scale: Vec<f64>,
     room: Vec<f64>,
     samples: [Vec<f64>; 5],
+    expansions: series::Expansions,
     reached: Option<&'a dyn Fn(f64) -> bool>,
     outcome: Outcome,
 }
@@ -495,7 +505,7 @@ struct Rates {
 impl Rates {
     /// -1, 0 or +1: the sign of the first derivative, or of the second where the first is zero.
     fn direction(&self, i: usize) -> f64 {
-        let small = 1e-11 * self.terms[i];
+        let small = SMALLEST_SLOPE * self.terms[i];
         if self.first[i].abs() > small {
             self.first[i].signum()
         } else if self.second[i] != 0.0 && self.second[i].is_finite() {
@@ -576,6 +586,7 @@ impl<'a> Follower<'a> {
             watch_side: vec![0.0; watched],
             fresh_guard: vec![false; guards],
             fresh_watch: vec![false; watched],
+            left: vec![0.0; guards],
             event_of,
             holds: vec![false; events.len()],
             size: x.iter().map(|v| v.abs()).collect(),
@@ -589,6 +600,7 @@ impl<'a> Follower<'a> {
             scale: Vec::new(),
             room: Vec::new(),
             samples: Default::default(),
+            expansions: Default::default(),
             reached: None,
             outcome: Outcome {
                 ending: Ending::Finished,
@@ -682,7 +694,16 @@ impl<'a> Follower<'a> {
             if self.options.method == Method::Radau5 {
                 step.jacobian = Some(self.jacobian(step.t, &step.x));
             }
-            if h == 0.0 {
+            if self.options.method == Method::Taylor {
+                if let Err(error) = self.expand(&mut step) {
+                    if self.land_at_an_edge()? || self.comes_to_rest(self.t) {
+                        continue;
+                    }
+                    return Err(error);
+                }
+                // Where things happen often, no longer than what is between them.
+                h = self.step_of_series(&step)?.min(if h > 0.0 { h } else { f64::INFINITY });
+            } else if h == 0.0 {
                 h = self.first_step(&room);
             }
             let stop = clock.next().unwrap_or(f64::INFINITY).min(self.options.t_end);
@@ -702,7 +723,11 @@ impl<'a> Follower<'a> {
             };
             let stopped = to_stop && !rejected;
             let most = if rejected { 1.2 } else { 5.0 };
-            let h_next = wanted * if error > 0.0 { (0.9 * rough_pow(error, -0.2)).clamp(0.2, most) } else { most };
+            let h_next = match self.options.method {
+                // The next step's series says it.
+                Method::Taylor => f64::INFINITY,
+                _ => wanted * if error > 0.0 { (0.9 * rough_pow(error, -0.2)).clamp(0.2, most) } else { most },
+            };
             self.sought(&step, &mut list);
             let found = self.find(&step, &list, &parts, &mut last_values);
             let earliest = found.iter().map(|(theta, _)| *theta).fold(f64::INFINITY, f64::min);
@@ -810,7 +835,7 @@ impl<'a> Follower<'a> {
             } else if error.is_nan() {
                 0.1
             } else {
-                (0.9 * rough_pow(error, -0.2)).clamp(0.1, 0.9)
+                (0.9 * rough_pow(error, -1.0 / step.power())).clamp(0.1, 0.9)
             };
             length *= factor;
             if self.t + length == self.t {
@@ -843,6 +868,9 @@ impl<'a> Follower<'a> {
         }
         // Sums of states are polynomials, which need no evaluation.
         let polynomial = |follower: &Self, sought: Sought| {
+            if step.series.is_some() {
+                return None;
+            }
             let b = follower.polynomial_of(step, sought)?;
             b.iter().all(|b| b.is_finite()).then_some(b)
         };
@@ -859,6 +887,33 @@ impl<'a> Follower<'a> {
             }
             return found;
         }
+        // So they are in a step of a series, whatever else is sought.
+        let mut open: Vec<bool> = vec![true; list.len()];
+        let mut ends = vec![0.0; list.len()];
+        if step.series.is_some() {
+            let fresh = list.iter().any(|(sought, _)| self.is_fresh(*sought));
+            let terms = if fresh { self.rates(&self.config.clone()).1.terms } else { Vec::new() };
+            for (j, (sought, side)) in list.iter().enumerate() {
+                if let Some(c) = self.series_of(step, *sought, parts.len() <= 1) {
+                    // Of the two ends of a whole part one is left.
+                    let far = matches!(sought, Sought::Guard { guard, .. } if self.equation.guards[*guard].whole && c[0] > 0.5);
+                    let begins = (self.is_fresh(*sought) && !far).then(|| {
+                        let terms = self.place_of(*sought).and_then(|place| terms.get(place)).unwrap_or(&0.0);
+                        // What leaves sliding is tangent to the surface.
+                        let left = if let Sought::Guard { guard, .. } = sought { self.left[*guard] } else { 0.0 };
+                        SMALLEST_SLOPE * step.h * terms.max(left)
+                    });
+                    let place = first_of_series(&c, *side, begins);
+                    found.extend(place.map(|theta| (theta, *sought)));
+                    (open[j], ends[j]) = (false, c.iter().rev().sum());
+                }
+            }
+            if !open.contains(&true) {
+                *last = ends;
+                return found;
+            }
+        }
+        let known = found.iter().map(|(theta, _)| *theta).fold(f64::INFINITY, f64::min);
         let mut at = std::mem::take(&mut self.room);
         at.resize(self.n, 0.0);
         let mut values = std::mem::take(&mut self.samples);
@@ -875,6 +930,9 @@ impl<'a> Follower<'a> {
             }
             for (j, (sought, side)) in list.iter().enumerate() {
                 let mut v: [f64; 5] = std::array::from_fn(|i| values[i][j]);
+                if !open[j] {
+                    continue;
+                }
                 if from == 0.0 && (self.is_fresh(*sought) || v[0] * side < 0.0) {
                     v[0] = 0.0;
                 }
@@ -896,7 +954,7 @@ impl<'a> Follower<'a> {
                 };
                 found.extend(first(v, *side, from, to, &mut f, 0).map(|theta| (theta, *sought)));
             }
-            if !found.is_empty() {
+            if found.iter().any(|(theta, _)| *theta <= to) || known <= to {
                 break;
             }
         }
@@ -982,7 +1040,9 @@ impl<'a> Follower<'a> {
             }
             Record::Path { chord } => {
                 let mut farthest = 0.0_f64;
-                for place in [0.25, 0.5, 0.75] {
+                let few = [0.25, 0.5, 0.75];
+                let many: Vec<f64> = (1..16).map(|i| i as f64 / 16.0).collect();
+                for &place in if step.series.is_some() { &many[..] } else { &few } {
                     step.at(place, &mut at);
                     let mut off = 0.0;
                     for i in 0..self.n {

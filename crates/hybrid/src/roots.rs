@@ -143,6 +143,85 @@ pub(crate) fn first_of_polynomial(v: [f64; 5], side: f64) -> Option<f64> {
     first(v, side, 0.0, 1.0, &mut |u| at_fraction(&b, u), 0)
 }
 
+/// The first place in (0, 1] where the polynomial with these coefficients, by powers, which begins on `side` of zero, is at zero or beyond it; where it
+/// begins at zero, the first place behind that: `at_zero` is the slope that rounding makes.
+pub(crate) fn first_of_series(c: &[f64], side: f64, at_zero: Option<f64>) -> Option<f64> {
+    let mut q: Vec<f64> = c.iter().map(|c| c * side).collect();
+    let size = |q: &[f64]| q.iter().map(|c| c.abs()).sum::<f64>();
+    if at_zero.is_some() || q[0] <= 0.0 {
+        // Divided by the place, and once more where it leaves zero more slowly.
+        q.remove(0);
+        if q[0].abs() <= at_zero.unwrap_or(0.0) {
+            q[0] = 0.0;
+        }
+        let rounding = 4.0 * f64::EPSILON * size(&q);
+        let leaves = q.iter().position(|c| c.abs() > rounding)?;
+        q.drain(..leaves);
+        if q[0] < 0.0 {
+            return Some(1.0 / (1_u64 << DEEPEST) as f64);
+        }
+    }
+    let rounding = 8.0 * f64::EPSILON * size(&q);
+    let p = q.len() - 1;
+    let coefficient = |i: usize| {
+        let (mut sum, mut share) = (0.0, 1.0);
+        for k in 0..=i {
+            sum += share * q[k];
+            share *= (i - k) as f64 / (p - k).max(1) as f64;
+        }
+        sum
+    };
+    let mut open = vec![((0..=p).map(coefficient).collect::<Vec<f64>>(), 0.0, 1.0)];
+    while let Some((b, from, to)) = open.pop() {
+        if b.iter().all(|b| *b > 0.0) {
+            continue;
+        }
+        let beyond = b[p] <= 0.0;
+        let turns = b.windows(2).filter(|w| (w[0] > 0.0) != (w[1] > 0.0)).count();
+        if beyond && b[0] > 0.0 && turns == 1 {
+            return Some(root_between(&q, from, to));
+        }
+        let middle = 0.5 * (from + to);
+        if b.iter().all(|b| b.abs() <= rounding) || !(middle > from && middle < to) {
+            if beyond {
+                return Some(to);
+            }
+            continue;
+        }
+        // Both halves (de Casteljau), the first on top.
+        let (mut first, mut level) = (Vec::with_capacity(p + 1), b);
+        for n in (0..=p).rev() {
+            first.push(level[0]);
+            for i in 0..n {
+                level[i] = 0.5 * (level[i] + level[i + 1]);
+            }
+        }
+        open.push((level, middle, to));
+        open.push((first, from, middle));
+    }
+    None
+}
+
+/// The zero of a polynomial that is positive at `low` and not at `high`: Newton's method within bounds.
+fn root_between(q: &[f64], mut low: f64, mut high: f64) -> f64 {
+    let mut u = 0.5 * (low + high);
+    for _ in 0..100 {
+        let (value, slope) = q.iter().rev().fold((0.0, 0.0), |(v, s), c| (v * u + c, s * u + v));
+        if value > 0.0 {
+            low = u
+        } else {
+            high = u
+        }
+        let newton = u - value / slope;
+        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        if (next - u).abs() <= 2.0 * f64::EPSILON * u {
+            return next;
+        }
+        u = next;
+    }
+    u
+}
+
 /// How often coefficients change their sign.
 fn changes(b: &[f64; 5]) -> usize {
     let (mut changes, mut before) = (0, 0.0);
@@ -229,6 +308,42 @@ mod tests {
 
     fn find(f: impl Fn(f64) -> f64, side: f64) -> Option<f64> {
         first(PLACES.map(&f), side, 0.0, 1.0, &mut |x| f(x), 0)
+    }
+
+    #[test]
+    fn the_first_zero_of_a_series_is_found() {
+        let times = |a: &[f64], b: &[f64]| {
+            let mut out = vec![0.0; a.len() + b.len() - 1];
+            a.iter().enumerate().for_each(|(i, a)| b.iter().enumerate().for_each(|(j, b)| out[i + j] += a * b));
+            out
+        };
+        let of = |zeros: &[f64]| zeros.iter().fold(vec![1.0], |all, z| times(&all, &[-z, 1.0]));
+        for degree in [1, 4, 12] {
+            // Rounding of coefficients that sum up to 3^degree, where the slope is about (3/2)^degree times the distance of the zeros.
+            let within = f64::EPSILON * 1e4 * 2.0_f64.powi(degree as i32);
+            let near =
+                |found: Option<f64>, want: f64| assert!((found.unwrap() - want).abs() < within, "{found:?} {want}");
+            let rest = vec![2.0; degree];
+            let at = |zeros: &[f64]| of(&[zeros, &rest].concat());
+            let side = |zeros: &[f64]| if (zeros.len() + degree).is_multiple_of(2) { 1.0 } else { -1.0 };
+            for zeros in [&[0.3][..], &[0.3, 0.9], &[0.61, 0.62], &[1e-9, 0.5], &[0.5, 0.5001, 0.9]] {
+                near(first_of_series(&at(zeros), side(zeros), None), zeros[0]);
+                // From zero on.
+                let behind = [&[0.0], zeros].concat();
+                near(first_of_series(&at(&behind), -side(&behind), Some(0.0)), zeros[0]);
+            }
+            assert_eq!(first_of_series(&at(&[1.1]), side(&[1.1]), None), None);
+            assert_eq!(first_of_series(&at(&[0.0]), -side(&[0.0]), Some(0.0)), None);
+        }
+        // It leaves zero like a square, to one side and to the other.
+        assert!((first_of_series(&[0.0, 0.0, 1.0, -2.0], 1.0, Some(0.0)).unwrap() - 0.5).abs() < 1e-15);
+        assert!(first_of_series(&[0.0, 0.0, -1.0, 2.0], 1.0, Some(0.0)).unwrap() < 1e-12);
+        // A dip that does not reach zero, by much and by little; one that does.
+        assert_eq!(first_of_series(&[0.09 + 1e-6, -0.6, 1.0], 1.0, None), None);
+        assert_eq!(first_of_series(&[0.09 + 1e-13, -0.6, 1.0], 1.0, None), None);
+        let found = first_of_series(&[0.09 - 1e-12, -0.6, 1.0], 1.0, None).unwrap();
+        assert!((found - 0.3 + 1e-6).abs() < 1e-9, "{found}");
+        assert_eq!(first_of_series(&[0.0, 0.0, 0.0], 1.0, Some(0.0)), None);
     }
 
     #[test]

@@ -1,5 +1,5 @@
 //! Steps for any number of states: Dormand & Prince's method of order 5 (1980) with the continuous extension of order 4 (Hairer, Norsett & Wanner 1993,
-//! sec. II.6), and for stiff motion Radau IIA of order 5 with its collocation polynomial (Hairer & Wanner 1996, sec. IV.8).
+//! sec. II.6), for stiff motion Radau IIA of order 5 with its collocation polynomial (Hairer & Wanner 1996, sec. IV.8), and Taylor series.
 
 use twofold_num::linear::solve_any;
 
@@ -32,6 +32,33 @@ const REAL_EIGENVALUE: f64 = 3.637_834_252_744_496;
 /// Writes the derivatives at a time and state.
 pub(crate) type RightHandSide<'a> = dyn FnMut(f64, &[f64], &mut [f64]) + 'a;
 
+/// By so much of what a step's error is measured by the derivative of a series may miss the field, times the step.
+const LARGEST_DEFECT: f64 = 20.0;
+
+/// The series of the motion where a step begins.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Series {
+    /// The coefficients of each state, and of what is followed beside them, by powers of the time.
+    pub terms: Vec<Vec<f64>>,
+    /// The same by powers of the fraction of the step.
+    pub scaled: Vec<Vec<f64>>,
+    /// What rounding leaves of speeds that cancel.
+    pub noise: Vec<f64>,
+    /// What rounding leaves of what is followed beside the states.
+    pub rounding: Vec<f64>,
+    /// How far the derivative of the series is from the field in the middle and at the end, times the step.
+    defect: Vec<f64>,
+}
+
+fn horner(c: &[f64], u: f64) -> f64 {
+    c.iter().rev().fold(0.0, |sum, c| sum * u + c)
+}
+
+/// The derivative by the fraction of the step.
+fn horner_slope(c: &[f64], u: f64) -> f64 {
+    (1..c.len()).rev().fold(0.0, |sum, k| sum * u + k as f64 * c[k])
+}
+
 /// A step and the room for it.
 #[derive(Clone, Debug)]
 pub(crate) struct Step {
@@ -51,6 +78,8 @@ pub(crate) struct Step {
     pub jacobian: Option<Vec<f64>>,
     /// The error estimate of an implicit step.
     estimate: Vec<f64>,
+    /// The series where it begins: the step is then one of them.
+    pub series: Option<Series>,
 }
 
 impl Step {
@@ -66,6 +95,7 @@ impl Step {
             stage: zeros(),
             jacobian: None,
             estimate: zeros(),
+            series: None,
         }
     }
 
@@ -73,6 +103,11 @@ impl Step {
     pub fn take(&mut self, h: f64, rhs: &mut RightHandSide<'_>) {
         self.h = h;
         let n = self.x.len();
+        if let Some(mut series) = self.series.take() {
+            self.take_series(h, &mut series, rhs);
+            self.series = Some(series);
+            return;
+        }
         if let Some(jacobian) = self.jacobian.take() {
             if !self.take_implicit(h, &jacobian, rhs) {
                 self.y.fill(f64::NAN);
@@ -105,6 +140,42 @@ impl Step {
             }
             self.extension[3][i] = h * sum;
         }
+    }
+
+    /// A step of the series, with a look at the field in its middle and at its end (the defect: Enright 1989).
+    fn take_series(&mut self, h: f64, series: &mut Series, rhs: &mut RightHandSide<'_>) {
+        let n = self.x.len();
+        series.scaled.resize(series.terms.len(), Vec::new());
+        series.defect.resize(n, 0.0);
+        for (scaled, terms) in series.scaled.iter_mut().zip(&series.terms) {
+            scaled.clear();
+            let mut power = 1.0;
+            for c in terms {
+                scaled.push(c * power);
+                power *= h;
+            }
+        }
+        for i in 0..n {
+            self.y[i] = self.x[i] + horner(&series.scaled[i][1..], 1.0);
+            self.stage[i] = self.x[i] + 0.5 * horner(&series.scaled[i][1..], 0.5);
+        }
+        rhs(self.t + 0.5 * h, &self.stage, &mut self.k[1]);
+        rhs(self.t + h, &self.y, &mut self.k[6]);
+        for i in 0..n {
+            let middle = h * self.k[1][i] - horner_slope(&series.scaled[i], 0.5);
+            let end = h * self.k[6][i] - horner_slope(&series.scaled[i], 1.0);
+            // The larger one; not-a-number if one is none.
+            series.defect[i] = if middle.abs() > end.abs() { middle.abs() } else { end.abs() + 0.0 * middle };
+        }
+        for s in 2..6 {
+            let (done, open) = self.k.split_at_mut(s);
+            open[0].copy_from_slice(&done[1]);
+        }
+    }
+
+    /// What the error falls by with the step's length, as a power.
+    pub fn power(&self) -> f64 {
+        self.series.as_ref().and_then(|series| series.terms.first()).map_or(5.0, |c| (c.len() - 1) as f64)
     }
 
     /// A step of Radau IIA: simplified Newton iterations for the three stages at once; false if they do not settle.
@@ -197,6 +268,21 @@ impl Step {
     pub fn error(&self, scale: &dyn Fn(usize) -> f64) -> f64 {
         let n = self.x.len();
         let mut sum = 0.0;
+        if let Some(series) = &self.series {
+            let mut worst = 0.0_f64;
+            for (i, c) in series.scaled[..n].iter().enumerate() {
+                let noise = 4.0 * self.h * series.noise[i];
+                let last = c[c.len() - 1].abs().max(c[c.len() - 2].abs()) / (scale(i) + noise);
+                // Rounding of the field is no error of the series.
+                let rounding = 64.0 * f64::EPSILON * self.h * (self.k[1][i].abs() + self.k[6][i].abs());
+                let defect = series.defect[i] / (LARGEST_DEFECT * scale(i) + noise + rounding);
+                if !(last <= f64::MAX && defect <= f64::MAX && self.y[i].is_finite()) {
+                    return f64::NAN;
+                }
+                worst = worst.max(last).max(defect);
+            }
+            return worst;
+        }
         for i in 0..n {
             let mut e = 0.0;
             for (c, k) in E.iter().zip(&self.k) {
@@ -212,6 +298,10 @@ impl Step {
     pub fn slope_at(&self, theta: f64, out: &mut [f64]) {
         let rest = 1.0 - theta;
         let [a, b, c, d] = &self.extension;
+        if let Some(series) = &self.series {
+            out.iter_mut().zip(&series.scaled).for_each(|(out, c)| *out = horner_slope(c, theta) / self.h);
+            return;
+        }
         if self.jacobian.is_some() {
             for i in 0..out.len() {
                 out[i] = (a[i] + theta * (2.0 * b[i] + theta * 3.0 * c[i])) / self.h;
@@ -243,6 +333,12 @@ impl Step {
     pub fn at(&self, theta: f64, out: &mut [f64]) {
         let rest = 1.0 - theta;
         let [a, b, c, d] = &self.extension;
+        if let Some(series) = &self.series {
+            for (i, c) in series.scaled[..out.len()].iter().enumerate() {
+                out[i] = self.x[i] + theta * horner(&c[1..], theta);
+            }
+            return;
+        }
         if self.jacobian.is_some() {
             for i in 0..out.len() {
                 out[i] = self.x[i] + theta * (a[i] + theta * (b[i] + theta * c[i]));

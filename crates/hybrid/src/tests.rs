@@ -1,7 +1,7 @@
 //! Known results, each by formula or by an independent program.
 
 use crate::motion::Outcome;
-use crate::motion::{Exit, Record};
+use crate::motion::{Exit, Method, Record};
 use crate::{Definition, Ending, HybridError, Model, Options, follow};
 
 fn model(text: &str) -> Model {
@@ -1118,4 +1118,165 @@ fn a_late_start_is_followed() {
         near(found.x[0], 1.5, 1e-15 * t + 1e-9);
         assert!(found.steps < 100);
     }
+}
+
+fn taylor(t_end: f64, rtol: f64) -> Options {
+    Options { t_end, rtol, method: Method::Taylor, max_steps: 20_000, ..Options::default() }
+}
+
+/// Both methods follow every shipped system to the same end, with the same switches and events.
+#[test]
+fn series_agree_with_dormand_and_prince_on_all_that_ships() {
+    for name in twofold_system::library::general_names() {
+        let model = shipped(name);
+        let t_end = match name {
+            "buck-ramp" => 0.01,
+            "cuk-converter" => 0.000_99,
+            "driven-by-data" => 160.0,
+            // Before its impacts accumulate.
+            "bouncing-ball" => 3.9,
+            _ => 20.0,
+        };
+        let ends = [Method::Dopri5, Method::Taylor].map(|method| {
+            let mut events = Vec::new();
+            let options = Options { t_end, method, max_steps: 200_000, ..Options::default() };
+            let outcome = follow(&model, &options, &mut |point| {
+                events.extend(point.event.map(|e| e.to_owned()));
+                true
+            });
+            (outcome.unwrap_or_else(|e| panic!("{name}: {e}")), events)
+        });
+        let [(a, happened), (b, others)] = ends;
+        let told = format!("{name}: {} steps, then {}; {:?} {:?}", a.steps, b.steps, a.x, b.x);
+        assert_eq!((a.mode, a.switches, happened), (b.mode, b.switches, others), "{told}");
+        let start = model.start().unwrap().unwrap();
+        let size = a.x.iter().chain(&start).fold(0.0_f64, |most, x| most.max(x.abs()));
+        assert!(a.x.iter().zip(&b.x).all(|(a, b)| (a - b).abs() <= 1e-8 * size), "{told}");
+    }
+}
+
+/// The last digits, through events, sliding, contacts, whole parts and tables.
+#[test]
+fn series_reach_the_last_digits() {
+    let end = |text: &str, t_end: f64| {
+        let outcome =
+            follow(&model(text), &taylor(t_end, 1e-15), &mut |_| true).unwrap_or_else(|e| panic!("{text}\n{e}"));
+        assert_eq!(outcome.ending, Ending::Finished);
+        outcome
+    };
+    let ball = "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-2']\n\
+        [[event]]\nwhen = 'x'\ndirection = 'down'\nset = { v = '-0.5*v' }\nafter_zeno = 'stick'";
+    // Impacts at 1, 2, 2.5, ...; at 1.75 it is 1/4 - 1/16 high.
+    let outcome = end(ball, 1.75);
+    near(outcome.x[0], 0.1875, 1e-15);
+    near(outcome.x[1], -0.5, 2e-15);
+    assert!(outcome.steps < 8, "{}", outcome.steps);
+    // It rests from 3 on.
+    end(ball, 4.0).x.iter().for_each(|x| near(*x, 0.0, 1e-20));
+    // An oscillator against a wall at zero without loss.
+    let wall = "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-x']\n\
+        [[event]]\nwhen = 'x'\ndirection = 'down'\nset = { v = '-v' }";
+    let outcome = end(wall, 100.0);
+    near(outcome.x[0], 100.0_f64.cos().abs(), 1e-13);
+    // A condition that is no sum of states: x^2 passes 1/2 at pi/4.
+    let count = "states = ['x', 'v', 'n', 's']\nstart = [1, 0, 0, 0]\nf = ['v', '-x', '0', 'if(x^2 > 1/2, 1, 0)']";
+    let outcome = end(count, 10.0 * std::f64::consts::PI);
+    near(outcome.x[3], 5.0 * std::f64::consts::PI, 1e-13);
+    // Sliding with an exponential on the line, with the disturbance taken away.
+    let control = "states = ['x', 'v']\nstart = [1, -1]\nf = ['v', '0.5*sin(3*t) - 2*sign(v + x)']";
+    let outcome = end(control, 5.0);
+    near(outcome.x[0], (-5.0_f64).exp(), 1e-15);
+    // Two relays that see each other, one slid upon in each order.
+    let two = "states = ['x', 'y', 'z']\nstart = [0, 0, 0]\nf = ['cos(t) - 2*sign(x) - 0.5*sign(y)', 'sin(t) - 3*sign(y) + 0.5*sign(x)', 'cos(t) + x + y']";
+    near(end(two, 3.0).x[2], 3.0_f64.sin(), 2e-15);
+    // A staircase, and a ramp in time.
+    let stairs = "states = ['x', 'y']\nstart = [0, 0]\nf = ['floor(10*t)/10', 'mod(t, 0.3)']";
+    let outcome = end(stairs, 3.0);
+    near(outcome.x[0], 4.35, 3e-15);
+    near(outcome.x[1], 0.45, 3e-15);
+    // A block between two walls that lies on one of them while it is pressed there.
+    let lies = "states = ['x', 'v']\nstart = [0, 0]\nf = ['v', '-cos(t)']\n\
+        [[event]]\nwhen = 'x'\ndirection = 'down'\nset = { v = '-0.5*v' }\nafter_zeno = 'stick'";
+    let t = 2.5_f64;
+    let from = std::f64::consts::FRAC_PI_2;
+    let outcome = end(lies, t);
+    near(outcome.x[1], 1.0 - t.sin(), 1e-15);
+    near(outcome.x[0], t - from + t.cos(), 1e-15);
+    // Stiff, thin and of high powers: what the first terms do not show.
+    let pulse = "states = ['x']\nstart = [0]\nf = ['exp(-((t - 5)/0.01)^2)']";
+    near(end(pulse, 10.0).x[0], 0.01 * std::f64::consts::PI.sqrt(), 1e-15);
+    let power = "states = ['x']\nstart = [0]\nf = ['t^30']";
+    near(end(power, 1.0).x[0], 1.0 / 31.0, 1e-16);
+    let layer = "states = ['x']\nstart = [0]\nf = ['tanh((t - 5)/1e-3)']";
+    near(end(layer, 10.0).x[0], 0.0, 1e-13);
+}
+
+/// What has no series is refused by name.
+#[test]
+fn motion_without_a_series_is_refused() {
+    let fails = |text: &str, options: Options| follow(&model(text), &options, &mut |_| true).unwrap_err().to_string();
+    let root = "states = ['x']\nstart = [0]\nf = ['1 + x^0.5']";
+    let said = fails(root, taylor(1.0, 1e-10));
+    assert!(said.contains("no Taylor series in x, `1 + x^0.5`") && said.contains("--method dopri5"), "{said}");
+    let rule =
+        "states = ['x', 'y', 'z']\nstart = [0, 0, 0]\nf = ['-sign(x) + 0.5*sign(y)', '-sign(y)', 'sign(x)*sign(y)']";
+    let options = Options { intersection: crate::selection::Intersection::Bilinear, ..taylor(1.0, 1e-10) };
+    let said = fails(rule, options);
+    assert!(said.contains("chosen at every point anew") && said.contains("dopri5"), "{said}");
+    // Nor is a pole of what is sought crossed, though the motion goes on.
+    let said = fails(
+        "states = ['x']\nstart = [0.1]\nf = ['1']\n[[event]]\nwhen = 'tan(x) - 1'\nset = { x = 'x' }",
+        taylor(3.0, 1e-10),
+    );
+    assert!(said.contains("pole") && said.contains("t = 1.47"), "{said}");
+    // A pole is not crossed.
+    let said = fails("states = ['x']\nstart = [1]\nf = ['x^2']", taylor(2.0, 1e-10));
+    assert!(said.contains("leaves the domain") && said.contains("grows without bound"), "{said}");
+    // A thin tanh in 65 shapes.
+    let names: Vec<String> = (0..65).map(|i| format!("'x{i}'")).collect();
+    let fields: Vec<String> = (0..65).map(|i| format!("'tanh({i} - x{i})'")).collect();
+    let many = format!("states = [{}]\nstart = [{}0]\nf = [{}]", names.join(","), "0,".repeat(64), fields.join(","));
+    assert!(fails(&many, taylor(1.0, 1e-10)).contains("more than 64 different tanh"));
+}
+
+/// Switches of motion that is simpler than what decides them: steps are as short as the weights of sliding and the events ask.
+#[test]
+fn series_of_what_is_sought_bound_the_steps() {
+    let both = |text: &str, t_end: f64| {
+        let run = |method| {
+            let options = Options { t_end, method, max_steps: 20_000, ..Options::default() };
+            follow(&model(text), &options, &mut |_| true).unwrap_or_else(|e| panic!("{e}\n{text}"))
+        };
+        let (a, b) = (run(Method::Dopri5), run(Method::Taylor));
+        assert_eq!((a.switches, a.events), (b.switches, b.events), "{text} {a:?} {b:?}");
+        a.x.iter().zip(&b.x).for_each(|(a, b)| near(*b, *a, 1e-8 * (1.0 + a.abs())));
+        b
+    };
+    // On v = 0.1 the motion is a straight line, until the drive pulls it off; in large units, too.
+    for unit in [1.0, 1e12] {
+        let text = format!(
+            "states = ['x', 'v']\nstart = [{:e}, 0]\nf = ['v', '-x - {unit:e}*0.3*sign(v - {unit:e}*0.1) + {unit:e}*sin(2*t)']\n\
+             [[event]]\nwhen = 'x - {unit:e}*1.2'\ndirection = 'up'\nset = {{ v = '-0.7*v' }}",
+            0.5 * unit
+        );
+        both(&text, 20.0);
+    }
+    // Sliding that ends again and again, each time once.
+    both(
+        "states = ['x', 'y', 'z']\nstart = [1.912, 1.868, -0.014]\nf = ['-1.85*cos(3*t) - 1.71*sign(x) - 0.7*x', '0.186*tanh(2*z) - 0.472*x - 0.7*y', '-0.94*atan(x) - 0.7*z']",
+        6.0,
+    );
+    // Counted waves, a dip that is met for a moment, a curve.
+    let text = "states = ['x', 'n', 'm']\nstart = [0, 0, 0]\nf = ['1', '0', '0']\n\
+        [[event]]\nwhen = 'sin(50*x)'\ndirection = 'up'\nset = { n = 'n + 1' }\n\
+        [[event]]\nwhen = '(x - 5)^2 - 1e-8'\ndirection = 'down'\nset = { m = 't' }";
+    let outcome = both(text, 10.0);
+    near(outcome.x[1], 79.0, 0.0);
+    near(outcome.x[2], 5.0 - 1e-4, 1e-11);
+    // A curve of degree 8 with triple zeros where x = 0, at pi/2 + k pi.
+    let text = "states = ['x', 'v', 'm']\nstart = [1, 0, 0]\nf = ['v', '-x', '0']\n\
+        [[event]]\nwhen = 'x^3*v + 0.2*x^8'\ndirection = 'up'\nset = { m = 'm + t' }";
+    let outcome = follow(&model(text), &taylor(30.0, 1e-12), &mut |_| true).unwrap();
+    assert_eq!(outcome.events, 10);
+    near(outcome.x[2], 50.0 * std::f64::consts::PI, 1e-5);
 }

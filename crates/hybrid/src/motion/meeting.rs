@@ -77,9 +77,20 @@ impl Follower<'_> {
             self.fresh_watch[contact.watched] = true;
             self.trains[contact.event] = Train::default();
         }
+        self.left.fill(0.0);
         if !leave.is_empty() {
             if self.ends_inside() {
                 return Err(self.no_mixture(&self.sliding));
+            }
+            for (guard, _) in &leave {
+                let speed = |follower: &mut Self, side: f64| {
+                    let mut config = follower.config.clone();
+                    config.sides[*guard] = side;
+                    let (compiled, rates) = follower.rates(&config);
+                    compiled.place(*guard).map_or(0.0, |place| rates.first[place])
+                };
+                let (low, high) = (self.low(*guard), self.high(*guard));
+                self.left[*guard] = (speed(self, high) - speed(self, low)).abs();
             }
             self.outcome.switches += 1;
             let mut config = self.config.clone();

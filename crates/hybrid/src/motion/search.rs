@@ -56,6 +56,9 @@ impl Follower<'_> {
     /// Whether a watched value stays on its side of `boundary` in a step, as can be told without evaluating it: a sum of states is a polynomial along the
     /// step's continuous extension, and lies between its Bernstein coefficients.
     fn stays_away(&self, step: &Step, place: usize, boundary: f64, side: f64) -> bool {
+        if step.series.is_some() {
+            return false;
+        }
         let Some((b, size)) = self.polynomial(step, place, boundary) else { return false };
         let least = b.iter().fold(f64::INFINITY, |least, b| least.min(b * side));
         least > 1e-12 * size && crate::roots::keeps_away(&b, side)
@@ -82,6 +85,14 @@ impl Follower<'_> {
     pub(super) fn polynomial_of(&self, step: &Step, sought: Sought) -> Option<[f64; 5]> {
         let place = self.plain_place(sought)?;
         self.polynomial(step, place, 0.0).map(|(b, _)| b)
+    }
+
+    /// The place of a guard or watched value.
+    pub(super) fn place_of(&self, sought: Sought) -> Option<usize> {
+        match sought {
+            Sought::Guard { guard, .. } => self.compiled.place(guard),
+            other => self.plain_place(other),
+        }
     }
 
     /// The place of a sign or a watched value.
@@ -162,9 +173,7 @@ impl Follower<'_> {
                 Sought::Leave { place, plus } => {
                     let weight =
                         if plus { others.get(place).map_or(1.0 - weights[place], |w| *w) } else { weights[place] };
-                    let rounding =
-                        if self.along[self.sliding[place]] == if plus { 1.0 } else { -1.0 } { ALONG } else { 0.0 };
-                    weight + rounding
+                    weight + self.rounding_along(place, plus)
                 }
                 Sought::Repelling => determinant,
                 // A surface pushes and does not pull.
@@ -192,19 +201,55 @@ impl Follower<'_> {
     /// Parts of a step in each of which what is sought is smooth: no operation in it is flat at five places and steep between them. None if they
     /// are too many to be searched.
     pub(super) fn parts(&mut self, step: &Step) -> Option<Vec<(f64, f64)>> {
-        let compiled = self.compiled.clone();
-        if compiled.watched_gates.is_empty() {
+        if step.series.is_none() {
+            return self.smooth_parts(step, 1, false);
+        }
+        if !self.is_followed(step) {
+            return None;
+        }
+        // Weights of sliding and forces of contacts are made of the fields.
+        let fields = !(self.sliding.is_empty() && self.contacts.is_empty());
+        let mut whole = true;
+        for of_field in [false, true] {
+            whole &= (of_field && !fields) || self.smooth_parts(step, 1, of_field)?.len() <= 1;
+        }
+        if whole {
             return Some(Vec::new());
         }
-        let arguments = |follower: &mut Self, theta: f64| {
-            follower.arguments(&compiled.watched_gate_arguments, compiled.watched_gates.len(), step, theta)
+        let equal = self.searched(step);
+        let mut cuts: Vec<f64> = Vec::new();
+        for of_field in [false, true] {
+            if !of_field || fields {
+                let parts = self.smooth_parts(step, equal, of_field)?;
+                cuts.extend(parts.iter().flat_map(|(a, b)| [*a, *b]));
+            }
+        }
+        cuts.sort_by(f64::total_cmp);
+        cuts.dedup();
+        Some(cuts.windows(2).map(|w| (w[0], w[1])).collect())
+    }
+
+    /// Parts of `equal` parts of a step in which no gate of the watched values, or of the field, hides anything.
+    fn smooth_parts(&mut self, step: &Step, equal: usize, of_field: bool) -> Option<Vec<(f64, f64)>> {
+        let compiled = self.compiled.clone();
+        let (gates, program) = match of_field {
+            true => (&compiled.gates, &compiled.gate_arguments),
+            false => (&compiled.watched_gates, &compiled.watched_gate_arguments),
         };
-        let mut open = vec![(0.0, 1.0, 0, arguments(self, 0.0), arguments(self, 1.0))];
+        if gates.is_empty() && equal == 1 {
+            return Some(Vec::new());
+        }
+        let arguments = |follower: &mut Self, theta: f64| follower.arguments(program, gates.len(), step, theta);
+        let mut open = Vec::new();
+        for i in (0..equal).rev() {
+            let [a, b] = [i, i + 1].map(|i| i as f64 / equal as f64);
+            open.push((a, b, 0, arguments(self, a), arguments(self, b)));
+        }
         let mut parts = Vec::new();
         while let Some((a, b, depth, first, last)) = open.pop() {
             let middle = 0.5 * (a + b);
             let between = arguments(self, middle);
-            let quiet = are_quiet(&compiled.watched_gates, &first, &between, &last);
+            let quiet = are_quiet(gates, &first, &between, &last);
             if parts.len() + open.len() >= MOST_PARTS {
                 return None;
             }
@@ -519,6 +564,11 @@ impl Follower<'_> {
             Sought::Watched(i) => self.fresh_watch[i],
             _ => false,
         }
+    }
+
+    /// What is allowed to the weight of a field that runs along a surface.
+    pub(super) fn rounding_along(&self, place: usize, plus: bool) -> f64 {
+        if self.along[self.sliding[place]] == if plus { 1.0 } else { -1.0 } { ALONG } else { 0.0 }
     }
 
     /// A field that ran along the surface and does so no more is one as others.

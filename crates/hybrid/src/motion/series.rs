@@ -1,0 +1,572 @@
+//! Taylor series of the motion between switches (Jorba & Zou 2005): the field that moves the state, sliding and contacts included, as one function on a tape.
+
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use twofold_num::elementary::{ln, rough_pow};
+use twofold_num::series::{Constants, Solution};
+use twofold_num::tape::{Program, Recorded, Replay, Tape};
+use twofold_num::{Arithmetic, Elementary};
+
+use super::*;
+
+/// Most equations whose series are kept ready.
+const MOST_KNOWN: usize = 256;
+/// More tanh in one equation are not told apart by [`Solution`].
+const MOST_TANH: usize = 64;
+/// Jorba & Zou (2005), sec. 3: the step is shortened by exp(-0.7/(p - 1)) for safety.
+const SAFETY_EXPONENT: f64 = -0.7;
+/// A step of the motion is searched in parts about as long as a step of order 5 would be at this tolerance, at the least.
+const LEAST_SEARCHED: f64 = 1e-8;
+const MOST_SEARCHED: f64 = 64.0;
+/// By so much of its size a function that is followed beside the states may be off its series.
+const LARGEST_MISS: f64 = 1e-6;
+/// What is followed beside the states may ask for steps shorter than theirs down to this part; a pole asks for shorter ones still.
+const LEAST_FOLLOWED: f64 = 1e-7;
+
+/// What decides the equation that moves the state.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+struct Key {
+    compiled: usize,
+    /// The answers of signs; whole parts are variables.
+    signs: Vec<bool>,
+    sliding: Vec<usize>,
+    contacts: Vec<(usize, usize)>,
+    pivots: Vec<usize>,
+}
+
+/// What a step is searched for beside sums of states: its series is made along with those of the states.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Followed {
+    /// A guard or watched value, by its place.
+    Value(usize),
+    /// The weight of a positive side in sliding.
+    Weight(usize),
+    /// What is positive while sliding attracts.
+    Attraction,
+    /// What a contact pushes with.
+    Push(usize),
+}
+
+/// An equation ready for expansion.
+#[derive(Debug)]
+struct Known {
+    /// Kept, so that its address names it.
+    _compiled: Rc<Compiled>,
+    /// Which variable each of the equation's own is; the states come first.
+    inputs: Vec<usize>,
+    /// What is followed beside the states, and its values; their variables come last.
+    followed: Vec<Followed>,
+    values: Program,
+    solution: Solution<f64>,
+}
+
+/// The equations whose series were needed.
+#[derive(Debug, Default)]
+pub(super) struct Expansions {
+    known: HashMap<Key, Known>,
+    /// The one that the present step is of.
+    present: Option<Key>,
+}
+
+/// The order at which the work for a unit of time is least (Jorba & Zou 2005, sec. 3).
+pub(super) fn order(options: &Options) -> usize {
+    let least = options.rtol.min(options.atol.unwrap_or(options.rtol)).clamp(f64::EPSILON / 16.0, 1e-2);
+    (1.0 - 0.5 * ln(least)).ceil() as usize
+}
+
+impl Follower<'_> {
+    /// Gives a step the series of the motion from where it begins.
+    ///
+    /// # Errors
+    /// If the motion has none there, or is a mixture that is chosen anew at every point.
+    pub(super) fn expand(&mut self, step: &mut Step) -> Result<(), HybridError> {
+        let n = self.n;
+        let stuck = |why: String| HybridError::Stuck { t: step.t, x: step.x.clone(), why };
+        if !self.corners.is_empty() {
+            return Err(stuck("the motion follows a mixture of more fields than their surfaces decide, which is chosen at every point anew and has no Taylor series: follow it by --method dopri5".into()));
+        }
+        let low = {
+            self.variables[..n].copy_from_slice(&step.x);
+            self.variables[n] = step.t;
+            let mut low = vec![0.0; n];
+            self.compiled.field.evaluate(&self.variables, &mut low);
+            low
+        };
+        let mut noise = vec![0.0; n];
+        let rounding = 8.0 * f64::EPSILON;
+        let mut orders = Vec::new();
+        if self.separate.is_some() {
+            let (_, _, high) = self.separate_weights(step.t, &step.x, &low);
+            for i in 0..n {
+                if high[i] != low[i] {
+                    noise[i] += rounding * (low[i].abs() + (high[i] - low[i]).abs());
+                }
+            }
+        } else if !self.sliding.is_empty() {
+            let (_, matrix) = self.sliding_equations(step.t, &step.x, &low);
+            orders.extend(pivots(matrix, self.sliding.len()));
+            for place in 0..self.sliding.len() {
+                let high = self.positive_field(place, step.t, &step.x);
+                for i in 0..n {
+                    if high[i] != low[i] {
+                        noise[i] += rounding * (low[i].abs() + (high[i] - low[i]).abs());
+                    }
+                }
+            }
+        }
+        if !self.contacts.is_empty() {
+            let mut out = low;
+            self.rhs(step.t, &step.x, &mut out);
+            let forces = self.contact_forces(&out);
+            orders.extend(pivots(self.grips(&out), self.contacts.len()));
+            for (contact, force) in self.contacts.iter().zip(forces) {
+                noise[contact.state] += rounding * (out[contact.state].abs() + force.abs());
+            }
+        }
+        let signs = self.config.sides.iter().zip(&self.equation.guards);
+        let key = Key {
+            compiled: Rc::as_ptr(&self.compiled) as usize,
+            signs: signs.map(|(side, guard)| guard.whole || *side > 0.0).collect(),
+            sliding: self.sliding.clone(),
+            contacts: self.contacts.iter().map(|c| (c.state, c.watched)).collect(),
+            pivots: orders,
+        };
+        if !self.expansions.known.contains_key(&key) {
+            let known = self.equation_of_motion(&key.pivots).map_err(stuck)?;
+            if self.expansions.known.len() >= MOST_KNOWN {
+                self.expansions.known.clear();
+            }
+            self.expansions.known.insert(key.clone(), known);
+        }
+        self.variables[..n].copy_from_slice(&step.x);
+        self.variables[n] = step.t;
+        let Some(known) = self.expansions.known.get_mut(&key) else { return Ok(()) };
+        let mut start: Vec<f64> = known.inputs.iter().map(|i| self.variables[*i]).collect();
+        let mut values = vec![0.0; known.followed.len()];
+        known.values.evaluate(&self.variables, &mut values);
+        start.extend(values);
+        known.solution.expand(&start);
+        let series = step.series.get_or_insert_default();
+        series.noise = noise;
+        let components = (0..n).chain(known.inputs.len()..start.len());
+        series.terms.resize(n + known.followed.len(), Vec::new());
+        for (terms, i) in series.terms.iter_mut().zip(components) {
+            terms.clear();
+            terms.extend_from_slice(known.solution.component(i));
+        }
+        let followed = known.followed.clone();
+        self.expansions.present = Some(key);
+        series.rounding = followed.into_iter().map(|what| self.rounding_of(what)).collect();
+        let broken = |terms: &Vec<f64>| !terms.iter().all(|c| c.is_finite());
+        match series.terms[..n].iter().position(broken) {
+            None => Ok(()),
+            // Numbers too large, as before a pole.
+            Some(i) if series.terms[i][2].is_finite() => Err(self.left_domain(step.t, &step.x)),
+            Some(i) => {
+                let definition = self.model.definition();
+                let (name, field) = (&definition.states[i].name, &definition.modes[self.config.mode].field[i]);
+                Err(stuck(format!(
+                    "the motion has no Taylor series in {name}, `{field}`, as at a root of zero: follow it by --method dopri5 or radau5"
+                )))
+            }
+        }
+    }
+
+    /// What rounding leaves of a function that is followed where its terms cancel.
+    fn rounding_of(&self, what: Followed) -> f64 {
+        let active = self.compiled.active.len();
+        let size = match what {
+            Followed::Value(place) if place < active => {
+                self.magnitude(&self.equation.guards[self.compiled.active[place]].expression)
+            }
+            Followed::Value(place) => self.magnitude(&self.equation.watched[place - active]),
+            Followed::Weight(_) => 10.0,
+            Followed::Attraction | Followed::Push(_) => 0.0,
+        };
+        64.0 * f64::EPSILON * size
+    }
+
+    /// The longest step from here that the series allows; infinite where they end.
+    ///
+    /// # Errors
+    /// If what is sought has a pole ahead, or no series.
+    pub(super) fn step_of_series(&self, step: &Step) -> Result<f64, HybridError> {
+        let Some(series) = &step.series else { return Ok(f64::INFINITY) };
+        let span = self.options.t_end - self.options.t_start;
+        let (mut longest, mut others, mut first) = (f64::INFINITY, f64::INFINITY, 0);
+        let rtol = self.options.rtol;
+        for (i, c) in series.terms.iter().enumerate() {
+            let is_state = i < self.n;
+            if !is_state && !c.iter().all(|c| c.is_finite()) {
+                return Err(self.not_followed(step, i - self.n));
+            }
+            let p = c.len() - 1;
+            let last = [p - 1, p];
+            let before = [p.saturating_sub(3).max(1), p.saturating_sub(2).max(1)];
+            let places = if last.iter().any(|k| c[*k] != 0.0) { last } else { before };
+            for k in places {
+                if c[k] == 0.0 {
+                    continue;
+                }
+                // What is smaller than numbers are counts for nothing, as in the scale of a step.
+                let by =
+                    |size: f64, power: usize| rough_pow((size + f64::MIN_POSITIVE) / c[k].abs(), 1.0 / power as f64);
+                let mut h = if is_state {
+                    let size = c[0].abs().max(0.01 * self.size[i]).max(1e-6 * span * c[1].abs());
+                    by(self.options.atol.unwrap_or(0.0) + rtol * size, k)
+                } else {
+                    by((rtol * c[0].abs()).max(series.rounding[i - self.n]), k)
+                };
+                if is_state && k > 1 {
+                    h = h.max(by(series.noise[i], k - 1));
+                }
+                if !is_state || self.options.atol.is_none() {
+                    // By what it moves, as in the scale of a step.
+                    for j in 1..k.min(4) {
+                        h = h.max(rough_pow(0.1 * rtol * (c[j] / c[k]).abs(), 1.0 / (k - j) as f64));
+                    }
+                }
+                if is_state {
+                    longest = longest.min(h);
+                } else if h < others {
+                    (others, first) = (h, i - self.n);
+                }
+            }
+        }
+        if others < LEAST_FOLLOWED * longest.min(span) {
+            return Err(self.not_followed(step, first));
+        }
+        let longest = longest.min(others);
+        Ok(longest * twofold_num::elementary::exp(SAFETY_EXPONENT / (order(self.options) - 1) as f64))
+    }
+
+    /// What is said where a series of what is sought ends.
+    fn not_followed(&self, step: &Step, place: usize) -> HybridError {
+        let active = self.compiled.active.len();
+        let what = match self.followed().get(place) {
+            Some(Followed::Value(place)) if *place < active => {
+                format!("`{}`", self.equation.guards[self.compiled.active[*place]].expression)
+            }
+            Some(Followed::Value(place)) => format!("`{}`", self.equation.watched[place - active]),
+            Some(Followed::Push(_)) => "the force of a contact".into(),
+            _ => format!("the sliding motion on {}", self.names(&self.sliding)),
+        };
+        let why = format!(
+            "{what} has no Taylor series that reaches far enough, as near a pole or at a root of zero: follow it by --method dopri5 or radau5"
+        );
+        HybridError::Stuck { t: step.t, x: step.x.clone(), why }
+    }
+
+    /// How many parts of a step are searched each by itself.
+    pub(super) fn searched(&self, step: &Step) -> usize {
+        let Some(series) = &step.series else { return 1 };
+        let tolerance = self.options.rtol.max(LEAST_SEARCHED);
+        let mut most = 1.0_f64;
+        for c in series.scaled.iter().filter(|c| c.iter().all(|c| c.is_finite())) {
+            let size = c.iter().fold(0.0_f64, |most, c| most.max(c.abs()));
+            for k in 6..c.len() {
+                // Of k = 6 alone little is seen where it vanishes.
+                most = most.max(rough_pow(c[k].abs() / (tolerance * size + f64::MIN_POSITIVE), 1.0 / k as f64));
+            }
+        }
+        most.min(MOST_SEARCHED).ceil() as usize
+    }
+
+    /// What is followed beside the states in the present step.
+    fn followed(&self) -> &[Followed] {
+        let known = self.expansions.present.as_ref().and_then(|key| self.expansions.known.get(key));
+        known.map_or(&[], |known| &known.followed)
+    }
+
+    /// Whether the series of what is followed beside the states are what it is in the middle of a step and at its end.
+    pub(super) fn is_followed(&mut self, step: &Step) -> bool {
+        let Some(series) = &step.series else { return true };
+        let known = self.expansions.present.as_ref().and_then(|key| self.expansions.known.get(key));
+        let Some(known) = known.filter(|known| !known.followed.is_empty()) else { return true };
+        let mut values = vec![0.0; known.followed.len()];
+        for theta in [0.5, 1.0] {
+            step.at(theta, &mut self.variables[..self.n]);
+            self.variables[self.n] = step.t + theta * step.h;
+            known.values.evaluate(&self.variables, &mut values);
+            for ((value, c), rounding) in values.iter().zip(&series.scaled[self.n..]).zip(&series.rounding) {
+                let size = c.iter().fold(0.0_f64, |most, c| most.max(c.abs()));
+                let series = c.iter().rev().fold(0.0, |sum, c| sum * theta + c);
+                if (value - series).abs() > LARGEST_MISS * size + rounding {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    /// The coefficients, by powers of the fraction of a step, of what is sought. `followed`: also if it is no sum of states.
+    pub(super) fn series_of(&self, step: &Step, sought: Sought, followed: bool) -> Option<Vec<f64>> {
+        let series = step.series.as_ref()?;
+        let own = |wanted: Followed| {
+            let place = self.followed().iter().position(|f| followed && *f == wanted)?;
+            let c = series.scaled[self.n + place].clone();
+            c.iter().all(|c| c.is_finite()).then_some(c)
+        };
+        let (place, boundary, way) = match sought {
+            Sought::Guard { guard, upper } => {
+                let place = self.compiled.place(guard)?;
+                match (self.equation.guards[guard].whole, upper) {
+                    (false, _) => (place, 0.0, 1.0),
+                    (true, false) => (place, self.config.sides[guard], 1.0),
+                    (true, true) => (place, self.config.sides[guard] + 1.0, -1.0),
+                }
+            }
+            Sought::Watched(i) => (self.compiled.active.len() + i, 0.0, 1.0),
+            Sought::Leave { place, plus } => {
+                let mut c = own(Followed::Weight(place))?;
+                if plus {
+                    c.iter_mut().for_each(|c| *c = -*c);
+                    c[0] += 1.0;
+                }
+                c[0] += self.rounding_along(place, plus);
+                return Some(c);
+            }
+            Sought::Pole(_) => return None,
+            Sought::Repelling => return own(Followed::Attraction),
+            Sought::Release(place) => return own(Followed::Push(place)),
+        };
+        let Some(sum) = self.compiled.affine[place].as_ref() else {
+            let mut c = own(Followed::Value(place))?;
+            c[0] -= boundary;
+            c.iter_mut().for_each(|c| *c *= way);
+            return Some(c);
+        };
+        let mut out = vec![0.0; series.scaled.first().map_or(2, |c| c.len().max(2))];
+        out[0] = sum.constant - boundary;
+        for (variable, factor) in &sum.factors {
+            match *variable {
+                i if i < self.n => out.iter_mut().zip(&series.scaled[i]).for_each(|(out, c)| *out += factor * c),
+                i if i == self.n => {
+                    out[0] += factor * step.t;
+                    out[1] += factor * step.h;
+                }
+                i => out[0] += factor * self.variables[i],
+            }
+        }
+        out.iter_mut().for_each(|c| *c *= way);
+        out.iter().all(|c| c.is_finite()).then_some(out)
+    }
+
+    /// The equation that moves the state as the answers are, written for expansion.
+    fn equation_of_motion(&self, pivots: &[usize]) -> Result<Known, String> {
+        let n = self.n;
+        let mut followed = Vec::new();
+        let whole = Tape::record(self.equation.variables(), |v| self.written_field(v, pivots, &mut followed));
+        if whole.tanh_count() > MOST_TANH {
+            return Err(format!(
+                "the equations have more than {MOST_TANH} different tanh, which --method taylor does not follow: use dopri5 or radau5"
+            ));
+        }
+        let depends = crate::equation::dependencies(&whole);
+        let asked = |v: &usize| depends.iter().any(|bits| bits[v / 64] & (1 << (v % 64)) != 0);
+        let inputs: Vec<usize> = (0..n).chain((n..whole.variables()).filter(asked)).collect();
+        let zero = Recorded::zero;
+        let others = whole.select(n..n + followed.len());
+        let tape = Tape::record(inputs.len() + followed.len(), |u| {
+            let mut v = vec![zero(); whole.variables()];
+            inputs.iter().zip(u).for_each(|(i, u)| v[*i] = *u);
+            let mut replay = Replay::new(&whole, &v);
+            let mut out: Vec<Recorded> = (0..n).map(|i| replay.output(i)).collect();
+            let mut direction: Vec<Option<Recorded>> = vec![None; whole.variables()];
+            direction.iter_mut().zip(&out).for_each(|(d, f)| *d = Some(*f));
+            direction[n] = Some(Recorded::one());
+            out.extend(inputs[n..].iter().map(|i| if *i == n { Recorded::one() } else { zero() }));
+            // What is followed is a state whose derivative is its own along the motion.
+            let slopes = Replay::new(&others, &v).derivatives(&direction);
+            out.extend(slopes.into_iter().map(|slope| slope.unwrap_or(zero())));
+            out
+        });
+        let solution = Solution::new(order(self.options), &tape, Constants::Binary);
+        Ok(Known { _compiled: self.compiled.clone(), inputs, followed, values: Program::new(&others), solution })
+    }
+
+    /// The derivatives of the states on the tape that is being recorded, as [`Follower::rhs`], and behind them what is `followed`.
+    fn written_field(&self, v: &[Recorded], pivots: &[usize], followed: &mut Vec<Followed>) -> Vec<Recorded> {
+        let n = self.n;
+        // Signs are numbers, and a mixture has those of both sides.
+        let answers = |high: &[usize]| -> Vec<Recorded> {
+            let mut v = v.to_vec();
+            for (i, guard) in self.equation.guards.iter().enumerate() {
+                let place = n + 1 + i;
+                match (guard.whole, high.contains(&i)) {
+                    (false, true) => v[place] = Recorded::one(),
+                    (false, false) => v[place] = Recorded::from_f64(self.config.sides[i]),
+                    (true, true) => v[place] += Recorded::one(),
+                    (true, false) => {}
+                }
+            }
+            v
+        };
+        let field = |compiled: &Compiled, v: &[Recorded]| -> Vec<Recorded> {
+            let mut replay = Replay::new(&compiled.tape, v);
+            (0..n).map(|i| replay.output(i)).collect()
+        };
+        let direction = |field: &[Recorded]| -> Vec<Option<Recorded>> {
+            let mut direction = vec![None; v.len()];
+            direction.iter_mut().zip(field).for_each(|(d, f)| *d = Some(*f));
+            direction[n] = Some(Recorded::one());
+            direction
+        };
+        let rate = |compiled: &Compiled, v: &[Recorded], field: &[Recorded], guard: usize| -> Recorded {
+            let Some(place) = compiled.place(guard) else { return Recorded::from_f64(f64::NAN) };
+            let function = compiled.tape.select([n + place]);
+            Replay::new(&function, v).derivatives(&direction(field))[0].unwrap_or(Recorded::zero())
+        };
+        let below = answers(&[]);
+        let low = field(&self.compiled, &below);
+        let mut out = low.clone();
+        let mut others = Vec::new();
+        let places = (0..self.compiled.outputs).filter(|place| {
+            let slides = self.compiled.active.get(*place).is_some_and(|guard| self.slides[*guard]);
+            let rests = self.contacts.iter().any(|c| self.compiled.active.len() + c.watched == *place);
+            !slides && !rests && self.compiled.affine[*place].is_none()
+        });
+        for place in places {
+            followed.push(Followed::Value(place));
+            others.push(Replay::new(&self.compiled.tape, &below).output(n + place));
+        }
+        if let Some(owners) = &self.separate {
+            let above = answers(&self.sliding);
+            let high = field(&self.compiled, &above);
+            let weight = |guard: &usize| {
+                let a = rate(&self.compiled, &below, &low, *guard);
+                -a / (rate(&self.compiled, &above, &high, *guard) - a)
+            };
+            let weights: Vec<Recorded> = self.sliding.iter().map(weight).collect();
+            followed.extend((0..weights.len()).map(Followed::Weight));
+            others.extend(&weights);
+            for (i, owner) in owners.iter().enumerate() {
+                if let Some(place) = owner.filter(|_| high[i] != low[i]) {
+                    out[i] = low[i] + weights[place] * (high[i] - low[i]);
+                }
+            }
+        } else if !self.sliding.is_empty() {
+            let k = self.sliding.len();
+            let a: Vec<Recorded> = self.sliding.iter().map(|g| rate(&self.compiled, &below, &low, *g)).collect();
+            let mut matrix = vec![Recorded::zero(); k * k];
+            let mut fields = Vec::new();
+            for column in 0..k {
+                let compiled = &self.base[column].0;
+                let above = answers(&self.sliding[column..=column]);
+                let high = field(compiled, &above);
+                for row in 0..k {
+                    matrix[row * k + column] = rate(compiled, &above, &high, self.sliding[row]) - a[row];
+                }
+                fields.push(high);
+            }
+            let (weights, determinant) = solved(matrix, a.iter().map(|a| -*a).collect(), &pivots[..k]);
+            followed.extend((0..k).map(Followed::Weight));
+            others.extend(&weights);
+            followed.push(Followed::Attraction);
+            others.push(determinant);
+            for i in 0..n {
+                for (weight, high) in weights.iter().zip(&fields) {
+                    if high[i] != low[i] {
+                        out[i] += *weight * (high[i] - low[i]);
+                    }
+                }
+            }
+        }
+        if !self.contacts.is_empty() {
+            let forces = self.write_forces(&below, &mut out, &direction, pivots);
+            followed.extend((0..forces.len()).map(Followed::Push));
+            others.extend(forces);
+        }
+        out.extend(others);
+        out
+    }
+
+    /// Adds the contacts' forces, as [`Follower::contact_forces`], and gives what each pushes with.
+    fn write_forces(
+        &self,
+        v: &[Recorded],
+        out: &mut [Recorded],
+        direction: &dyn Fn(&[Recorded]) -> Vec<Option<Recorded>>,
+        pivots: &[usize],
+    ) -> Vec<Recorded> {
+        let (n, k) = (self.n, self.contacts.len());
+        let fields = self.compiled.tape.select(0..n);
+        let watched = self.contacts.iter().map(|c| n + self.compiled.active.len() + c.watched);
+        let functions = self.compiled.tape.select(watched);
+        // Their first derivatives along any field.
+        let first = Tape::record(v.len() + n, |all| {
+            let (v, field) = all.split_at(v.len());
+            let slopes = Replay::new(&functions, v).derivatives(&direction(field));
+            slopes.into_iter().map(|s| s.unwrap_or(Recorded::zero())).collect()
+        });
+        let at: Vec<Recorded> = v.iter().chain(out.iter()).copied().collect();
+        let second = |direction: Vec<Option<Recorded>>| -> Vec<Recorded> {
+            let slopes = Replay::new(&fields, v).derivatives(&direction);
+            let all: Vec<Option<Recorded>> = direction.into_iter().chain(slopes).collect();
+            let found = Replay::new(&first, &at).derivatives(&all);
+            found.into_iter().map(|s| s.unwrap_or(Recorded::zero())).collect()
+        };
+        let pulls = second(direction(out)).into_iter().map(|r| -r).collect();
+        let mut grips = vec![Recorded::zero(); k * k];
+        for (column, contact) in self.contacts.iter().enumerate() {
+            let mut unit = vec![None; v.len()];
+            unit[contact.state] = Some(Recorded::one());
+            for (row, grip) in second(unit).into_iter().enumerate() {
+                grips[row * k + column] = grip;
+            }
+        }
+        let own: Vec<Recorded> = (0..k).map(|place| grips[place * k + place]).collect();
+        let (forces, _) = solved(grips, pulls, &pivots[pivots.len() - k..]);
+        self.contacts.iter().zip(&forces).for_each(|(contact, force)| out[contact.state] += *force);
+        // The grip counts by its sign, and that does not change while there is a contact.
+        let push = |((contact, force), own): ((&Contact, Recorded), Recorded)| {
+            Recorded::from_f64(contact.above) * (own / (own * own).sqrt()) * force
+        };
+        self.contacts.iter().zip(forces).zip(own).map(push).collect()
+    }
+}
+
+/// The rows that elimination with pivots takes.
+fn pivots(mut a: Vec<f64>, k: usize) -> Vec<usize> {
+    let mut taken = Vec::with_capacity(k);
+    for c in 0..k {
+        let size = |i: &usize| a[*i * k + c].abs();
+        let pivot = (c..k).max_by(|i, j| size(i).total_cmp(&size(j))).unwrap_or(c);
+        (0..k).for_each(|j| a.swap(c * k + j, pivot * k + j));
+        for row in c + 1..k {
+            let factor = a[row * k + c] / a[c * k + c];
+            (c..k).for_each(|j| a[row * k + j] -= factor * a[c * k + j]);
+        }
+        taken.push(pivot);
+    }
+    taken
+}
+
+/// The solution of a x = b by elimination that takes these rows, and the determinant of -a.
+fn solved(mut a: Vec<Recorded>, mut b: Vec<Recorded>, pivots: &[usize]) -> (Vec<Recorded>, Recorded) {
+    let k = b.len();
+    let mut determinant = Recorded::one();
+    for c in 0..k {
+        if pivots[c] != c {
+            determinant = -determinant;
+        }
+        determinant = determinant * -a[pivots[c] * k + c];
+        (0..k).for_each(|j| a.swap(c * k + j, pivots[c] * k + j));
+        b.swap(c, pivots[c]);
+        for row in c + 1..k {
+            let factor = a[row * k + c] / a[c * k + c];
+            for j in c + 1..k {
+                a[row * k + j] = a[row * k + j] - factor * a[c * k + j];
+            }
+            b[row] = b[row] - factor * b[c];
+        }
+    }
+    for r in (0..k).rev() {
+        for j in r + 1..k {
+            b[r] = b[r] - a[r * k + j] * b[j];
+        }
+        b[r] = b[r] / a[r * k + r];
+    }
+    (b, determinant)
+}
