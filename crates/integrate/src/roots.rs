@@ -94,6 +94,40 @@ impl CrossingFinder {
         Self { side: if positive { 1.0 } else { -1.0 } }
     }
 
+    /// The crossings in `step`, in order, of a surface whose `g` need not be of a low degree in the state, such as sin(x). Between two of the places where `g`
+    /// is asked there is at most one zero of the polynomials that [`first_zero`] reasons about.
+    pub fn in_curved_step<const N: usize>(
+        &mut self,
+        step: &Step<'_, N>,
+        g: impl Fn(&SVector<f64, N>) -> f64,
+    ) -> Vec<Crossing> {
+        let value = |theta: f64| g(&step.at(theta));
+        let mut places = Vec::new();
+        separated(&value, 0.0, 1.0, 0, &mut places);
+        let (mut found, mut last) = (Vec::new(), (0.0, value(0.0)));
+        if last.1 != 0.0 {
+            self.side = last.1.signum();
+        }
+        for theta in places {
+            let point = (theta, value(theta));
+            found.extend(self.come_to(point, last, &value));
+            last = point;
+        }
+        found
+    }
+
+    /// The crossing between two neighbouring points, if there is one.
+    fn come_to(&mut self, point: (f64, f64), last: (f64, f64), value: &dyn Fn(f64) -> f64) -> Option<Crossing> {
+        if point.1 == 0.0 {
+            return None;
+        }
+        let before = std::mem::replace(&mut self.side, point.1.signum());
+        (before != 0.0 && before != self.side).then(|| Crossing {
+            theta: if last.1 == 0.0 { last.0 } else { brent(value, last.0, point.0, last.1, point.1) },
+            upward: self.side > 0.0,
+        })
+    }
+
     /// The crossings in `step`, in order. Nothing is allocated unless there is one.
     ///
     /// `g` is sampled at two points more than the interpolant's degree; between samples that keep their sign, a smallest |g| in the
@@ -120,14 +154,7 @@ impl CrossingFinder {
         }
         let mut last = before;
         let mut next = |point: (f64, f64)| {
-            if point.1 != 0.0 {
-                let side = point.1.signum();
-                if side != self.side && self.side != 0.0 {
-                    let theta = if last.1 == 0.0 { last.0 } else { brent(value, last.0, point.0, last.1, point.1) };
-                    found.push(Crossing { theta, upward: side > 0.0 });
-                }
-                self.side = side;
-            }
+            found.extend(self.come_to(point, last, value));
             last = point;
         };
         let mut here = sample(1);
@@ -474,6 +501,48 @@ fn scan<const N: usize>(
 }
 
 fn first_in(q: &dyn Fn(f64) -> f64, a: f64, b: f64, depth: usize) -> Option<Zero> {
+    let (coefficients, size, sound) = polynomial(q, a, b);
+    if !sound && depth < DEEPEST {
+        let middle = 0.5 * (a + b);
+        return first_in(q, a, middle, depth + 1).or_else(|| first_in(q, middle, b, depth + 1));
+    }
+    isolate(q, &coefficients, a, b, 0, size)
+}
+
+/// How often an interval is halved on which `q` is no such polynomial.
+const DEEPEST: usize = 10;
+
+/// Places in (a, b], the last of them b, that leave at most one zero of `q` between neighbours.
+fn separated(q: &dyn Fn(f64) -> f64, a: f64, b: f64, depth: usize, places: &mut Vec<f64>) {
+    let (coefficients, size, sound) = polynomial(q, a, b);
+    if !sound && depth < DEEPEST {
+        let middle = 0.5 * (a + b);
+        separated(q, a, middle, depth + 1, places);
+        separated(q, middle, b, depth + 1, places);
+    } else {
+        separate(&coefficients, a, b, 0, 64.0 * f64::EPSILON * size, places);
+    }
+}
+
+fn separate(c: &Coefficients, a: f64, b: f64, depth: usize, rounding: f64, places: &mut Vec<f64>) {
+    if sign_changes(c) <= 1 || depth >= 45 || c.iter().all(|v| v.abs() <= rounding) {
+        places.push(b);
+        return;
+    }
+    let (left, right) = halves(c);
+    let middle = 0.5 * (a + b);
+    separate(&left, a, middle, depth + 1, rounding, places);
+    separate(&right, middle, b, depth + 1, rounding, places);
+}
+
+/// By the variation-diminishing property not fewer than the zeros inside.
+fn sign_changes(c: &Coefficients) -> usize {
+    let signs = c.iter().filter(|v| **v != 0.0).map(|v| *v > 0.0);
+    signs.clone().zip(signs.skip(1)).filter(|(x, y)| x != y).count()
+}
+
+/// The Bernstein coefficients of the polynomial that is `q` at the nodes, the largest of them, and whether it is `q` between the nodes, too.
+fn polynomial(q: &dyn Fn(f64) -> f64, a: f64, b: f64) -> (Coefficients, f64, bool) {
     let basis = bernstein_basis();
     let at = |u: f64| q(if u >= 1.0 { b } else { a + (b - a) * u });
     let values: Coefficients = std::array::from_fn(|j| at(basis.nodes[j]));
@@ -486,16 +555,11 @@ fn first_in(q: &dyn Fn(f64) -> f64, a: f64, b: f64, depth: usize) -> Option<Zero
         let u = 0.5 * (basis.nodes[j] + basis.nodes[j + 1]);
         (at(u) - bernstein(&coefficients, u)).abs() <= 1e-6 * size
     });
-    if !sound && depth < 10 {
-        let middle = 0.5 * (a + b);
-        return first_in(q, a, middle, depth + 1).or_else(|| first_in(q, middle, b, depth + 1));
-    }
-    isolate(q, &coefficients, a, b, 0, size)
+    (coefficients, size, sound)
 }
 
 fn isolate(q: &dyn Fn(f64) -> f64, c: &Coefficients, a: f64, b: f64, depth: usize, size: f64) -> Option<Zero> {
-    let signs = c.iter().filter(|v| **v != 0.0).map(|v| *v > 0.0);
-    let changes = signs.clone().zip(signs.skip(1)).filter(|(x, y)| x != y).count();
+    let changes = sign_changes(c);
     let rounding = 64.0 * f64::EPSILON * size;
     if changes == 0 {
         // At the right end a zero is found here; one at the left end belongs to the interval before.
@@ -716,6 +780,31 @@ mod tests {
         let found = zeros([0.0906, -0.602, 1.0, 0.0]);
         assert_eq!(found.len(), 2, "{found:?}");
         assert!((found[0] - 0.3).abs() < 1e-12 && (found[1] - 0.302).abs() < 1e-12, "{found:?}");
+    }
+
+    /// Many zeros of no polynomial, and pairs however close: each is found, in order.
+    #[test]
+    fn every_zero_of_a_curved_surface_is_found() {
+        use twofold_num::elementary::sin;
+        let p = Cubic([0.3, 1.0, 0.0, 0.0]);
+        let step = Step { t0: 0.0, t1: 1.0, x0: p.at(0.0), x1: p.at(1.0), interpolant: &p };
+        for many in [1.0, 6.0, 40.0, 177.0] {
+            let turn = std::f64::consts::PI / many;
+            let found = CrossingFinder::default().in_curved_step(&step, |x| sin(many * x[0]));
+            let expected: Vec<f64> =
+                (1..100).map(|k| f64::from(k) * turn - 0.3).filter(|s| *s > 0.0 && *s <= 1.0).collect();
+            assert_eq!(found.len(), expected.len(), "{many}: {found:?}");
+            for (f, e) in found.iter().zip(&expected) {
+                let upward = sin(many * (e + 0.3) + 0.5) > 0.0;
+                assert!((f.theta - e).abs() < 1e-14 && f.upward == upward, "{many}: {f:?} {e}");
+            }
+        }
+        for gap in [1e-2, 1e-5, 1e-7] {
+            let pair = |x: &SVector<f64, 1>| (x[0] - 0.737) * (x[0] - 0.737 - gap) * (x[0] * x[0] + 1.0);
+            let found = CrossingFinder::starting(true).in_curved_step(&step, pair);
+            assert_eq!(found.iter().map(|f| f.upward).collect::<Vec<_>>(), [false, true], "{gap}: {found:?}");
+            assert!((found[0].theta - 0.437).abs() < 1e-9, "{gap}: {found:?}");
+        }
     }
 
     #[test]

@@ -225,7 +225,7 @@ impl<'a, P> Sides<'a, P> {
     {
         match self.plane {
             Some(coordinate) => passages.through_plane(step, coordinate, level),
-            None => passages.in_step(step, |x| self.h(x) - level),
+            None => passages.in_curved_step(step, |x| self.h(x) - level),
         }
     }
 }
