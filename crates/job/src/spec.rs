@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::rest::switching;
 
 pub use twofold_integrate::Method;
-use twofold_integrate::delay::{History, Inside, LateSwitch, SHARP_METHODS, SMOOTH_METHODS};
+use twofold_integrate::delay::{History, Inside, LEAST_DELAY, LateSwitch, SHARP_METHODS, SMOOTH_METHODS};
 use twofold_integrate::filippov::ExitRule;
 use twofold_integrate::{PRECISIONS, Schedule, StepCap, Tolerance, layered};
 use twofold_num::elementary::exp10;
@@ -350,6 +350,10 @@ impl RunSpec {
         positive("delay", delay)?;
         if delay >= self.t_end {
             let rule = "the switch would never see the run: give a delay below the end time, or a later end";
+            return wrong("delay", delay, rule);
+        }
+        if delay < LEAST_DELAY * self.t_end {
+            let rule = "times near the end are too coarse in f64 to tell apart what happens in one delay: give a longer delay, or an earlier end";
             return wrong("delay", delay, rule);
         }
         self.validate_one_surface("delayed")?;
@@ -823,6 +827,8 @@ mod tests {
             (|r| r.switch = SwitchSpec::delayed(0.0), "delay", "above zero"),
             (|r| r.switch = SwitchSpec::delayed(f64::NAN), "delay", "finite"),
             (|r| r.t_end = 1e-3, "delay", "below the end time"),
+            (|r| r.switch = SwitchSpec::delayed(1e-17), "delay", "too coarse"),
+            (|r| r.t_end = 1e10, "delay", "too coarse"),
             (|r| r.system = two_surfaces(), "switch", "this one has two"),
             (|r| smooth(r, Some(0.0), Some(Transition::Erf)), "eps", "above zero"),
             (|r| smooth(r, Some(1e-3), None), "transition", "both"),

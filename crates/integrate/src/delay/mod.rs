@@ -266,6 +266,21 @@ pub(super) trait Cuttable<const N: usize> {
 /// Times nearer to each other than this part of them are one.
 const ONE_TIME: f64 = 4.0 * f64::EPSILON;
 
+/// The least delay, as a part of the time at which a run ends: f64 tells the times of one delay apart to a part in a thousand.
+pub const LEAST_DELAY: f64 = 1024.0 * f64::EPSILON;
+
+/// Whether times until `t_end` can be told apart within a delay.
+///
+/// # Errors
+///
+/// If they cannot.
+fn resolves<const N: usize>(delay: f64, t: f64, x: &SVector<f64, N>, t_end: f64) -> Result<(), Failure> {
+    if delay > 0.0 && delay < LEAST_DELAY * t_end {
+        return Err(Failure::StepUnderflow { t, h: delay, state: x.as_slice().to_vec() });
+    }
+    Ok(())
+}
+
 /// Whether `t` has come to `due`, as far as a step could tell.
 fn is_due(due: f64, t: f64) -> bool {
     due - t <= ONE_TIME * due.abs()

@@ -5,8 +5,10 @@ use std::collections::VecDeque;
 use nalgebra::SVector;
 
 use super::tangent::{Carry, Shift, TangentStepper, shortened, square};
-use super::{Backwards, Cuttable, DelayError, Delayed, History, LateSwitch, ONE_TIME, Sides, is_due};
-use crate::roots::CrossingFinder;
+use super::{
+    Backwards, Cuttable, DelayError, Delayed, History, LEAST_DELAY, LateSwitch, ONE_TIME, Sides, is_due, resolves,
+};
+use crate::roots::{Crossing, CrossingFinder};
 use crate::step::{Failure, Statistics, Step, Stepper};
 use crate::taylor::Precision;
 use twofold_num::elementary::sqrt;
@@ -116,7 +118,7 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M: Cuttable<N>, const N: usize> Sharp<'a
 impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
     /// Follows the orbit without delay backwards from the start for one delay: the switches that its passages cause, and the first mode.
     fn look_back(&mut self) -> Result<(), DelayError> {
-        let none = |t: f64, what: String| DelayError::NoHistory { t: -t, what };
+        let none = |t: f64, what: String| DelayError::NoHistory { t: 0.0 - t, what };
         let delay = M::Number::from_f64(self.delay);
         let mut from = self.reached;
         let (x0, mut positive) = (from.1.map(M::Number::to_f64), self.positive);
@@ -210,6 +212,18 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
         self.carry.map_or_else(Shift::default, |carry| carry.shift(&at(), self.plus))
     }
 
+    /// Passages of the edge in the last step. An orbit that begins the step beyond the edge has passed it: where a passage and a switch come at one
+    /// time, rounding may put it behind the end of the step before.
+    fn passages(&self) -> Vec<Crossing> {
+        let step = self.methods[usize::from(self.plus)].last();
+        let mut found = self.sides.passages(&mut CrossingFinder::starting(self.positive), &step, self.edge());
+        let beyond = self.sides.h(&step.x0) - self.edge();
+        if beyond != 0.0 && (beyond > 0.0) != self.positive {
+            found.insert(0, Crossing { theta: 0.0, upward: !self.positive });
+        }
+        found
+    }
+
     /// Begins where the orbit has come to, towards the next switch or the end.
     fn begin(&mut self, longest: f64) -> Result<(), Failure> {
         let i = usize::from(self.plus);
@@ -228,7 +242,10 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
         while let Some(next) = self.queue.front()
             && is_due(next.at.to_f64(), t)
         {
-            self.lasted[usize::from(self.plus)] = t - self.since;
+            // A mode between two passages that rounding has made of one says nothing of the next.
+            if t - self.since > LEAST_DELAY * t {
+                self.lasted[usize::from(self.plus)] = t - self.since;
+            }
             if let Some(carry) = self.carry.filter(|_| next.plus != self.plus) {
                 let x = carry.switched(&self.reached.1.map(M::Number::to_f64), next.plus, next.shift);
                 self.reached.1 = self.methods[0].exactly(t, x).1;
@@ -255,8 +272,7 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
         loop {
             let i = usize::from(self.plus);
             self.methods[i].advance(self.sides.field(self.plus))?;
-            let mut passages = CrossingFinder::starting(self.positive);
-            let mut found = self.sides.passages(&mut passages, &self.methods[i].last(), self.edge());
+            let mut found = self.passages();
             if self.band > 0.0 {
                 // Beyond a switch the step is not the orbit's.
                 found.truncate(1);
@@ -315,6 +331,7 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Stepper<N> for Sharp
         t_end: f64,
         max_step: f64,
     ) -> Result<(), Failure> {
+        resolves(self.delay, t, &x, t_end)?;
         // The past stays: it is part of the equation's state, not of the method's. Who moves the state across the surface moves it for the switch, too.
         let (h, edge) = (self.sides.h(&x), self.edge());
         let positive = h > edge || (h == edge && edge < 0.0);

@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::past::{Look, Past};
 use super::tangent::{Carry, TangentStepper, shortened, square, square_of_past};
-use super::{Backwards, DelayError, Delayed, History, ONE_TIME, Sides, is_due};
+use super::{Backwards, DelayError, Delayed, History, ONE_TIME, Sides, is_due, resolves};
 use crate::driver::{DriveOptions, Observer, drive};
 use crate::guard::Redoable;
 use crate::roots::CrossingFinder;
@@ -225,6 +225,7 @@ impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N> + Redoable<N>, const N: usize> S
         t_end: f64,
         max_step: f64,
     ) -> Result<(), Failure> {
+        resolves(self.delay, t, &x, t_end)?;
         // The past stays: it is part of the equation's state, not of the method's. A jump of the state is one of the field a delay later, and of each next
         // derivative at each next delay.
         if t > 0.0 && x != self.reached.1 {

@@ -267,6 +267,75 @@ fn passages_wait_in_line() {
     }
 }
 
+/// A passage at the very time of a switch, on whichever side of it rounding puts it: h = sin(f u) passes 0 every pi/f, and the delay is an odd multiple of
+/// that. What w' = +-1 makes of it is the integral of the sign of h one delay earlier.
+#[test]
+fn a_passage_at_the_time_of_a_switch_is_seen() {
+    let pi = std::f64::consts::PI;
+    let triangle = |y: f64| y.cos().acos();
+    for (f, u0, t_end) in
+        [(1.0, 0.1, 77.7), (1.0, 0.1, 50.5), (2.0, 0.5, 50.5), (3.0, 0.5 / 3.0, 77.7), (7.0, 1.0 / 7.0, 77.7)]
+    {
+        let data = system(&format!("states = ['u', 'w']\nh = 'sin({f}*u)'\nplus = ['1', '1']\nminus = ['1', '-1']"));
+        for odd in [1.0, 3.0] {
+            let delay = odd * pi / f;
+            let expected = delay + (triangle(f * (u0 + t_end - delay)) - triangle(f * u0)) / f;
+            for (method, tolerance) in
+                SHARP.into_iter().chain([(Method::Dopri5, 1e-7), (Method::TaylorExtended, 1e-13)])
+            {
+                let how = How { method, tolerance, ..How::sharp(delay, t_end) };
+                let w = how.run(&data, [u0, 0.0]).unwrap().1.x[1];
+                assert!((w - expected).abs() < 1e-6, "{f} {odd} {method:?} {tolerance}: {w}, not {expected}");
+            }
+        }
+    }
+}
+
+/// Below the spacing of the times a switch is lost, and with it the orbit: such a delay is refused, and one above it swings as it should.
+#[test]
+fn a_delay_that_times_cannot_tell_apart_is_refused() {
+    let run = |delay: f64, smooth| {
+        let (data, x0) = (relay(1.0, 1.0), vector![0.5]);
+        let bound: Bound<1> = data.bind().unwrap();
+        let switch = LateSwitch::Delayed { delay, smooth, history: History::Constant };
+        let delayed = Delayed { sides: Sides::new(&bound, &data), switch, x0 };
+        delayed.with_stepper(Method::Dopri5, None, tolerance(1e-10), Far { x0, t_end: 0.5 + 1e3 * delay }).unwrap()
+    };
+    for smooth in [None, Some((Transition::Tanh, 1e-2))] {
+        for delay in [1e-17, 1e-16, 1e-15, 1e-14] {
+            let found = run(delay, smooth);
+            assert!(matches!(found, Err(Failure::StepUnderflow { h, .. }) if h == delay), "{delay} {found:?}");
+        }
+    }
+    for delay in [2e-13, 1e-11, 1e-8] {
+        let far = run(delay, None).unwrap();
+        assert!((far / delay - 1.0).abs() < 3e-3, "{delay}: {far}");
+    }
+}
+
+/// How far from the surface an orbit is after 0.5, at a step's end.
+struct Far {
+    x0: SVector<f64, 1>,
+    t_end: f64,
+}
+
+impl WithStepper<1> for Far {
+    type Answer = Result<f64, Failure>;
+    fn with<M: Stepper<1>>(self, mut stepper: M) -> Self::Answer {
+        struct Farthest(f64);
+        impl Observer<1> for Farthest {
+            fn step(&mut self, step: &Step<'_, 1>) -> Flow {
+                if step.t0 > 0.5 {
+                    self.0 = self.0.max(step.x1[0].abs());
+                }
+                Flow::Continue
+            }
+        }
+        let mut farthest = Farthest(0.0);
+        drive(&Own, self.x0, &DriveOptions::to(self.t_end), &mut stepper, &mut farthest, &()).map(|_| farthest.0)
+    }
+}
+
 /// The start's own zero: on the surface the switch is f-'s, and an orbit that leaves to the other side has passed it at once.
 #[test]
 fn a_start_on_the_surface_counts_as_not_above() {
