@@ -11,6 +11,7 @@ use crate::roots::CrossingFinder;
 use crate::step::{Driven, DrivenStepper, Failure, Flow, Statistics, Step, Stepper, Tolerance};
 use crate::{Dopri5, Guarded};
 use twofold_num::elementary::sqrt;
+use twofold_system::filippov::gradient;
 use twofold_system::{Blended, PiecewiseSmooth, Smoothed, Transition, VectorField, jacobian};
 
 /// The stepper of the smooth rule.
@@ -40,6 +41,9 @@ const SEEN: u32 = 5;
 const LONGEST: f64 = 0.999;
 /// The layer's half-width in eps: tanh differs from 1 by 4e-9 there.
 const LAYER: f64 = 10.0;
+/// A change of h smaller than this part of eps ends no step: phi feels it less than any step does. Where h is at rest, rounding turns it in every step, and
+/// every turn would end a step one delay later, which would turn again.
+const STILL: f64 = 1e-9;
 /// Places in a step at which its distance from the layer is looked at.
 const LOOKS: usize = 8;
 
@@ -158,6 +162,14 @@ impl<const N: usize> Observer<N> for Each<'_, N> {
     }
 }
 
+/// What rounding makes of h at `x`, where h is a sum or a product of coordinates.
+fn rounding<P: PiecewiseSmooth<N>, const N: usize>(sides: &Sides<'_, P>, x: &SVector<f64, N>) -> f64 {
+    if sides.plane.is_some() {
+        return 0.0;
+    }
+    64.0 * f64::EPSILON * gradient(sides.system, x).component_mul(x).abs().sum()
+}
+
 /// When the orbit passes the surface in `step`, or comes nearest to it within the layer.
 fn in_layer<P: PiecewiseSmooth<N>, const N: usize>(
     sides: &Sides<'_, P>,
@@ -174,10 +186,14 @@ fn in_layer<P: PiecewiseSmooth<N>, const N: usize>(
     }
     let fraction = |k: usize| k as f64 / LOOKS as f64;
     let looks: [f64; LOOKS + 1] = std::array::from_fn(|k| sides.h(&step.at(fraction(k))));
+    let still = (STILL * eps).max(rounding(sides, &step.x0));
+    if looks.iter().all(|h| h.abs() <= still) {
+        return Vec::new();
+    }
     for k in 1..LOOKS {
         let [a, b, c] = [looks[k - 1], looks[k], looks[k + 1]].map(f64::abs);
         let one_side = looks[k - 1] * looks[k] > 0.0 && looks[k] * looks[k + 1] > 0.0;
-        if one_side && b <= a && b <= c {
+        if one_side && b <= a && b <= c && a.max(c) - b > still {
             // The vertex of the parabola through the three.
             let (slope, bend) = (0.5 * (c - a), c - 2.0 * b + a);
             let shift = if bend > 0.0 { (-slope / bend).clamp(-1.0, 1.0) } else { 0.0 };

@@ -409,6 +409,28 @@ fn a_history_on_the_flow_has_its_switches() {
 
 /// x' = -x(t - 1) from the constant 1: on [k - 1, k] a polynomial of degree k (Bellman 1961): sum over j of (-1)^j (t - j + 1)^j / j!, j <= k.
 /// As a switch: phi = (1 + x/9)/2 where h = x/sqrt(81 - x^2) and phi(h) is the algebraic transition of width 1, f+- = -+9.
+/// A switch at rest inside its layer, r^2 = 1 and x = 0: what rounding makes of h there ends no steps. A step takes some part of a delay.
+#[test]
+fn a_switch_at_rest_ends_no_steps() {
+    let ring = system(
+        "states = ['p', 'q']\nh = 'p*p + q*q - 1'\nplus = ['-0.4*p - q', 'p - 0.4*q']\nminus = ['0.3*p - q', 'p + 0.3*q']",
+    );
+    let line = system("states = ['p', 'q']\nh = 'p'\nplus = ['-1', '1']\nminus = ['1', '1']");
+    for (data, x0, coordinate) in [(&ring, [1.2, 0.0], 1), (&line, [0.3, 0.0], 0)] {
+        for (method, tolerance) in [(Method::Dopri5, 1e-8), (Method::Dopri5, 1e-11), (Method::Radau5, 1e-10)] {
+            let smooth = Some((Transition::Tanh, 0.05));
+            let how = How { smooth, method, tolerance, coordinate, ..How::sharp(0.05, 12.0) };
+            let (seen, end) = how.run(data, x0).unwrap();
+            assert!(seen.ends.len() < 6_000, "{method:?} {tolerance}: {} steps", seen.ends.len());
+            // At rest 0.3 (1 - phi) = 0.4 phi on the ring, and phi = 1 - phi on the line.
+            let h = if coordinate == 1 { end.x[0] * end.x[0] + end.x[1] * end.x[1] - 1.0 } else { end.x[0] };
+            let phi = 0.5 * (1.0 + (h / 0.05).tanh());
+            let rest = if coordinate == 1 { 3.0 / 7.0 } else { 0.5 };
+            assert!((phi - rest).abs() < 1e-4, "{method:?} {tolerance}: {phi}");
+        }
+    }
+}
+
 fn linear() -> System {
     system("states = ['x']\nh = 'x/sqrt(81 - x*x)'\nplus = ['-9']\nminus = ['9']")
 }
