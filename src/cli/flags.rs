@@ -535,10 +535,11 @@ impl RunFlags {
         table.into_iter().find_map(|(flag, given, by)| if given { Some((flag, by?)) } else { None })
     }
 
-    /// --eps also gives eps' and the size of kicks where those have no flag of their own.
+    /// --eps also gives eps' and the size of kicks where those have no flag of their own, and says that a delayed switch is the smooth one.
     fn eps_is_replaced(&self, axes: &[Axis]) -> Option<String> {
         let used_elsewhere = (self.kicked() && self.kick_size.is_none())
-            || (self.switch() == Switch::Hysteretic && self.eps_prime.is_none());
+            || (self.switch() == Switch::Hysteretic && self.eps_prime.is_none())
+            || self.switch() == Switch::Delayed;
         let varied = axes.iter().any(|axis| axis.coordinate == Coordinate::Eps);
         (varied && !used_elsewhere).then(|| Coordinate::Eps.to_string())
     }

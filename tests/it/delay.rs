@@ -379,6 +379,9 @@ fn wrong_questions_are_refused() {
         ("--delay 0.1 --restart 0.1", "longer than the delay"),
         ("--delay 0.1 --kick-every 0.05 --kick-size 0.1", "longer than the delay"),
         ("--delay 0.1 --method taylor-extended --precision 192", "106"),
+        ("--delay 0.1 --method taylor-extended --horizon", "106"),
+        ("--delay 1e-17", "too coarse"),
+        ("--delay 1e-17 --eps 0.1", "too coarse"),
         ("--delay 0.5 --history flow --start=0.2,-1,-1", "constant history"),
         ("--delay 0.1 --system relay-square --start=1,1", "one switching surface"),
     ] {
@@ -386,4 +389,10 @@ fn wrong_questions_are_refused() {
         assert!(code == Some(2) && said.contains(word), "{arguments}: {code:?} {said}");
     }
     assert_eq!(told("--delay 0.1").0, Some(0));
+    // Where an axis varies eps, --eps says that the switch is the smooth one.
+    let sweep =
+        |eps: &str| self::told(&["sweep", "--switch", "delayed", "--delay", "0.1", "--t-end", "1", "--quiet"], eps);
+    assert_eq!(sweep("--eps 0.1 --over eps=0.1,0.2").0, Some(0));
+    let (code, said) = sweep("--over eps=0.1,0.2");
+    assert!(code == Some(2) && said.contains("give the run one"), "{said}");
 }

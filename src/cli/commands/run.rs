@@ -72,6 +72,10 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         let why = "--horizon: other methods' errors are those of their tolerance; leave it out, or use --method taylor-extended";
         return Err(CliError::Usage(why.into()));
     }
+    if arguments.horizon && matches!(spec.switch, SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. }) {
+        let why = "--horizon: it compares with the next precision, and such a switch is followed with 106 bits at most; leave it out, or compare two tolerances";
+        return Err(CliError::Usage(why.into()));
+    }
     let progress = Progress::with_grace(arguments.delivery.quiet);
     let run = Run(spec);
     let exit = record(&run, format, out, &progress)?;
