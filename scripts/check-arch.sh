@@ -12,13 +12,14 @@
 # COMPILER=debian: another compiler, that of Debian's unstable suite, in a root of its own (ROOT, 5 GB; needs root and debootstrap; `scripts/check-arch.sh clean` removes
 # it), with the emulator of that suite. Crates are those of Cargo.lock (cargo vendor). Not said: rustup's where it can build for that target, Debian's where it cannot.
 #
-# RUN: what is run, "check fig1 fig2 fig3 fig4 fig5 fig6" if nothing is said; "check" is all figures (hours under emulation). LEVEL: optimisation (1). THREADS (1).
+# RUN: what is run, "check fig1 fig2 fig3 fig4 fig5 fig6 delay" if nothing is said, and then the exponents of tests/data/late-exponents.txt, too; "check" is all figures
+# (hours under emulation). LEVEL: optimisation (1). THREADS (1).
 # ONLY=build, ONLY=run: half of it (to run what was built needs a root of 0.5 GB only). MIRROR: Debian's. PYTHON: one that has wasmtime. The results are added to target/arch/report.txt.
 set -u
 work=${WORK:-$PWD/target/arch}
 root=${ROOT:-$work/root}
 mirror=${MIRROR:-http://deb.debian.org/debian}
-run=${RUN:-check fig1 fig2 fig3 fig4 fig5 fig6}
+run=${RUN:-check fig1 fig2 fig3 fig4 fig5 fig6 delay}
 level=${LEVEL:-1}
 threads=${THREADS:-1}
 only=${ONLY:-}
@@ -156,6 +157,16 @@ on_it() {
     fi
 }
 
+# Exponents of switches with a past, digit by digit: none is in a figure. A line is the question's flags and the answer's facts.
+exponents() {
+    while IFS='|' read -r question facts; do
+        # shellcheck disable=SC2086
+        said=$(on_it lyapunov $question --quiet --format json < /dev/null 2>> "$work/$target.said" | sed 's/.*"facts"://; s/,"made_by".*//')
+        [ "$said" = "$facts" ] || { echo "lyapunov $question: not the same: $said"; return 1; }
+    done < "$here/../tests/data/late-exponents.txt"
+    echo "exponents the same"
+}
+
 bad=0
 for target in "$@"; do
     case $target in
@@ -181,8 +192,10 @@ for target in "$@"; do
     # shellcheck disable=SC2086
     on_it $run --quiet --threads "$threads" > "$work/$target.txt" 2> "$work/$target.said"
     found=$?
-    took=$(($(date +%s) - begun))
     [ "$found" -eq 0 ] || bad=1
+    also=
+    [ -n "${RUN:-}" ] || also=", $(exponents)" || bad=1
+    took=$(($(date +%s) - begun))
     case $run in
         check*)
             # The first that is not the same, and which layer of it.
@@ -191,6 +204,6 @@ for target in "$@"; do
             ;;
         *) result="exit code $found: $(grep . "$work/$target.txt" | tail -n 1)$(tail -n 1 "$work/$target.said")" ;;
     esac
-    echo "$(date -u +%F) | $target | $(cat "$work/$target-$compiler/compiler") | $threads thread | $run | $result | $took s" | tee -a "$work/report.txt"
+    echo "$(date -u +%F) | $target | $(cat "$work/$target-$compiler/compiler") | $threads thread | $run | $result$also | $took s" | tee -a "$work/report.txt"
 done
 exit "$bad"

@@ -360,6 +360,21 @@ fn a_relay_is_refused_by_name_where_it_cannot_be_followed() {
     assert!(table.lines().next().unwrap().contains("band") && table.contains("0.02"), "{table}");
 }
 
+/// Exponents to the last digit, which scripts/check-arch.sh compares on other machines.
+#[test]
+fn committed_exponents_come_out_the_same() {
+    for line in include_str!("../data/late-exponents.txt").lines() {
+        let (question, facts) = line.split_once('|').unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_twofold"))
+            .args(["lyapunov", "--quiet", "--format", "json"])
+            .args(question.split_whitespace())
+            .output()
+            .unwrap();
+        let answer = String::from_utf8(output.stdout).unwrap();
+        assert!(answer.contains(&format!("\"facts\":{facts},\"made_by\"")), "{question}: {answer}");
+    }
+}
+
 /// What is wrong is said before anything is computed, with exit code 2.
 #[test]
 fn wrong_questions_are_refused() {
