@@ -109,7 +109,8 @@ fn dip(v: &[f64; 5], side: f64, from: f64, to: f64, f: &mut dyn FnMut(f64) -> f6
             return None;
         }
         let value = f(place) * side;
-        if value <= 0.0 {
+        // Zero itself may be where it is only touched.
+        if value < 0.0 {
             return Some((place, value * side));
         }
         // A parabola through three points that is right in a fourth has no lower ones.

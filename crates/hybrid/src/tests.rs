@@ -1280,3 +1280,17 @@ fn series_of_what_is_sought_bound_the_steps() {
     assert_eq!(outcome.events, 10);
     near(outcome.x[2], 50.0 * std::f64::consts::PI, 1e-5);
 }
+
+/// An event at a zero of third order fires once: Newton's method ends before it.
+#[test]
+fn a_flat_zero_is_met_once() {
+    // x = cos t passes zero ten times in 30; the event's expression rises there each time.
+    let text = "states = ['x', 'v', 'm']\nstart = [1, 0, 0]\nf = ['v', '-x', '0']\n[[event]]\nwhen = 'x^3*v + 0.2*x^8'\ndirection = 'up'\nset = { m = 'm + t' }";
+    near(end(text, 30.0)[2], 50.0 * std::f64::consts::PI, 1e-6);
+    let cubes = "states = ['x', 'n']\nstart = [-1, 0]\nf = ['1', '0']\n[[event]]\nwhen = '(x + 0.5)^5*(x - 0.5)^3'\ndirection = 'both'\nset = { n = 'n + 1' }";
+    near(last(cubes, 2.0), 2.0, 0.0);
+    // What is touched is not passed, even where it is zero to the last digit.
+    let touched = "states = ['x', 'v', 'y']\nstart = [1, 0, 0]\nf = ['v', '-x', 'if(x^2*(2 + v) > 0, 1, 0)']";
+    near(end(touched, 20.0)[2], 20.0, 1e-9);
+    near(last("states = ['x', 'y']\nstart = [-1, 0]\nf = ['1', 'sign(3*x^2)']", 2.0), 2.0, 1e-12);
+}

@@ -526,14 +526,10 @@ impl Follower<'_> {
         }
         // A field that leads to its own side for a short time leads away.
         let brief = 1e-4 * moves.iter().map(|i| self.size[*i] / fastest[*i]).fold(left, f64::min);
-        for (vertex, f) in fields.iter().enumerate() {
+        for vertex in 0..fields.len() {
             let config = of_sides(vertex, self);
-            let ahead = |by: f64, slope: &[f64]| -> Vec<f64> { x.iter().zip(slope).map(|(x, f)| x + by * f).collect() };
-            let k2 = velocity(&config, &ahead(0.5 * brief, f), self);
-            let k3 = velocity(&config, &ahead(0.5 * brief, &k2), self);
-            let k4 = velocity(&config, &ahead(brief, &k3), self);
-            let mean: Vec<f64> = (0..n).map(|i| (f[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]) / 6.0).collect();
-            let (there, mut v) = (ahead(brief, &mean), self.load(&config));
+            let there = a_little_later(&mut |_, x| velocity(&config, x, self), t, &x, brief);
+            let mut v = self.load(&config);
             v[..n].copy_from_slice(&there);
             let compiled = self.equation.compiled(&config);
             let mut watched = vec![0.0; compiled.outputs];

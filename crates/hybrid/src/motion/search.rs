@@ -395,6 +395,36 @@ impl Follower<'_> {
             }
             length = wanted;
         }
+        if !matches!(sought, Sought::Pole(_)) {
+            self.land_beyond(step, longest, sought, low, slope);
+        }
+    }
+
+    /// A zero of higher order is flat, and Newton's method ends before it: where the function's slope has gone from what it is nearby, and its value is still
+    /// on the side of `before`, the step is made longer until it is not.
+    fn land_beyond(&mut self, step: &mut Step, longest: f64, sought: Sought, before: f64, nearby: f64) {
+        const FLAT: f64 = 0.1;
+        const MOST_DOUBLINGS: usize = 48;
+        let Some(place) = self.place_of(sought) else { return };
+        let (t, x, mut field) = (step.t + step.h, step.y.clone(), vec![0.0; self.n]);
+        self.rhs(t, &x, &mut field);
+        let slope = Self::along(&self.compiled, &self.variables, &field)[place];
+        if slope.abs() > FLAT * nearby.abs() || !(self.value_of(sought, t, &x) * before > 0.0) {
+            return;
+        }
+        let mut later = f64::EPSILON * t.abs().max(longest);
+        for _ in 0..MOST_DOUBLINGS {
+            if step.h + later > longest {
+                return;
+            }
+            let there: Vec<f64> = x.iter().zip(&field).map(|(x, f)| x + later * f).collect();
+            if !(self.value_of(sought, t + later, &there) * before > 0.0) {
+                let length = step.h + later;
+                step.take(length, &mut |t, x, out| self.rhs(t, x, out));
+                return;
+            }
+            later *= 2.0;
+        }
     }
 
     /// Tells zeros of watched expressions at a place of a step from poles, which they change their sign at, too: towards a pole they grow.

@@ -548,7 +548,31 @@ impl Follower<'_> {
         }
         let config = self.config.clone();
         let (_, rates) = self.rates(&config);
-        self.watch_side[i] = rates.direction(place);
+        let direction = rates.direction(place);
+        self.watch_side[i] = if direction == 0.0 { self.side_ahead(place) } else { direction };
+    }
+
+    /// The side to which a watched value of third order or more leaves zero: it grows by more than a square. 0 if it stays.
+    fn side_ahead(&mut self, place: usize) -> f64 {
+        const BRIEF: f64 = 0.005;
+        let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
+        self.rhs(t, &x, &mut field);
+        let moves = field.iter().zip(&self.size).filter(|(f, size)| **f != 0.0 && **size != 0.0);
+        let brief = BRIEF * moves.map(|(f, size)| size / f.abs()).fold(self.options.t_end - t, f64::min);
+        let [near, far] = [brief, 2.0 * brief].map(|h| {
+            let mut rhs = |t: f64, x: &[f64]| {
+                let mut out = vec![0.0; x.len()];
+                self.rhs(t, x, &mut out);
+                out
+            };
+            let there = a_little_later(&mut rhs, t, &x, h);
+            self.variables[..self.n].copy_from_slice(&there);
+            self.variables[self.n] = t + h;
+            let mut values = vec![0.0; self.compiled.outputs];
+            self.compiled.watched.evaluate(&self.variables, &mut values);
+            values[place]
+        });
+        if near * far > 0.0 && far.abs() > 5.0 * near.abs() { far.signum() } else { 0.0 }
     }
 
     /// Whether a watched expression has no speed at the present point.
