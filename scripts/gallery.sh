@@ -35,6 +35,7 @@ filippov="--switch filippov --exit at-once:plus"
     plot three-blocks --t-end 40 --kind series --axes x1,x2,v1
     plot sliding-mode-control --t-end 6
     plot buck-ramp --set input=33 --t-end 0.02
+    plot cuk-converter --t-end 0.02
     plot rimless-wheel --t-end 20
     plot driven-by-data --t-end 160
 }

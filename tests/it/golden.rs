@@ -41,11 +41,11 @@ fn golden_quick_figures_have_the_committed_hashes() {
 /// The long figures, shortened to t = 300: a digest of what is asked, found and drawn. A picture that changes on purpose gets its new line here; the
 /// test prints it.
 const SHORTENED: [(&str, &str); 6] = [
-    ("fig7-printed-shortened", "66795433ca72c2ae52df41c16e109e8de44729cf6c61e472e5e9c3d16e6eefa0"),
-    ("fig7-reconstructed-shortened", "1f0a79ee7e2e24df15230b5a5c64b79fe30be226890b05fe47747319ab0d1fcc"),
-    ("fig8-printed-shortened", "b948bffb9b36e59f3929608bdd79d912c638bf56412d39ffef39e22a690654c7"),
-    ("fig8-reconstructed-shortened", "d3c9398d90342a794d868c4c5835178cad1c2bc390238f9aa3a6c003685a4749"),
-    ("fig9-printed-shortened", "d0d2c8d8891e896943dabc706a4838cd1ac98e07559bd08e3172eaec3aabe639"),
+    ("fig7-printed-shortened", "26c5296d330eed2247d0dcb380ae39d3ffb94b99d3c3407ce128aee68856bdb7"),
+    ("fig7-reconstructed-shortened", "64d926489a8b7a62e35a99aeec56365b493f7aaf6f4ccda42f67b6c430069eac"),
+    ("fig8-printed-shortened", "f1043bc650fc4cef226effdaadfa40f1b85a060cc330f0a1b0b275484fb40bfa"),
+    ("fig8-reconstructed-shortened", "26ad9bb4ba7ba38168282161cfc8503aa56bcf34598cb5fe5d6c83d8eb49fb29"),
+    ("fig9-printed-shortened", "7f9ce82d06d93b991546d134df765faa99e7e39e646d4e93718605cd02f590d9"),
     ("fig9-reconstructed-shortened", "df554d4f444ef2d4ea2409e47fa1d6461f1516142300aa2c0f1a61724986391b"),
 ];
 

@@ -7,16 +7,26 @@ use twofold::integrate::{
 };
 use twofold::system::{Caricature, Smoothed, Transition};
 
-/// Samples, minima and roots on every step, with nothing left out: version 0.1.0's search, word for word.
+/// Samples, minima and roots on every step, with nothing left out: version 0.1.0's search, and beside the step's ends, too.
 fn whole_search(step: &Step<'_, 3>, g: impl Fn(&nalgebra::SVector<f64, 3>) -> f64) -> Vec<f64> {
     let n = step.interpolant.degree() + 2;
     let value = |theta: f64| g(&step.at(theta));
     let mut found = Vec::new();
     let samples: Vec<(f64, f64)> = (0..=n).map(|i| i as f64 / n as f64).map(|s| (s, value(s))).collect();
     let mut refined: Vec<(f64, f64)> = Vec::with_capacity(samples.len() + 2);
+    // A function that falls from an end towards its neighbour, and is larger there, has its least value between.
+    let beside = |(s0, g0): (f64, f64), (s1, g1): (f64, f64)| {
+        let falls = (g0 > 0.0) == (g1 > 0.0) && g0.abs() <= g1.abs() && value(s0 + 1e-6 * (s1 - s0)).abs() < g0.abs();
+        let (s, v) = if falls { smallest(&value, s0.min(s1), s0.max(s1), g0.signum()) } else { (s0, g0) };
+        ((v > 0.0) != (g0 > 0.0)).then_some((s, v))
+    };
     refined.push(samples[0]);
+    refined.extend(beside(samples[0], samples[1]));
     for w in 1..samples.len() {
         let (s1, g1) = samples[w];
+        if w == n {
+            refined.extend(beside(samples[n], samples[n - 1]));
+        }
         if w + 1 < samples.len() {
             let ((s0, g0), (s2, g2)) = (samples[w - 1], samples[w + 1]);
             let same = (g0 > 0.0) == (g1 > 0.0) && (g1 > 0.0) == (g2 > 0.0);
