@@ -277,7 +277,7 @@ bench-cost: ## cost against end time, layer and tolerance: benches/cost.csv, cos
 
 .PHONY: bench-hybrid
 HYBRID := target/hybrid-peers
-bench-hybrid: ## hybrid systems by us, SciPy and CVODE: error, seconds and lines into benches/hybrid (needs Python 3.11 or newer and PyPI; some minutes)
+bench-hybrid: ## hybrid systems by us, SciPy, CVODE and nosnoc: error, seconds and lines into benches/hybrid (needs Python 3.11 or newer and PyPI; ten minutes)
 	@$(PYTHON) -m venv $(HYBRID)
 	@$(HYBRID)/bin/python -m pip install --quiet --disable-pip-version-check -r benches/hybrid/requirements.txt
 	@[ -n "$$TWOFOLD" ] || $(CARGO) build --release --locked --bin twofold

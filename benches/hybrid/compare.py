@@ -1,16 +1,17 @@
-"""Hybrid systems by `twofold run`, SciPy and CVODE beside each other (make bench-hybrid): results.json, and the tables in README.md.
+"""Hybrid systems by `twofold run`, SciPy, CVODE and nosnoc beside each other (make bench-hybrid): results.json, and the tables in README.md.
 
     python compare.py               TWOFOLD names the program [target/release/twofold]
     python compare.py --no-times    values and lines only; seconds are marked as not measured
     python compare.py --page        README.md anew from results.json
     python compare.py NAME METHOD   one cell, as JSON
 
-Every cell of SciPy and CVODE is a process of its own, ended after LIMIT seconds.
+Every cell of SciPy, CVODE and nosnoc is a process of its own, ended after LIMIT seconds.
 """
 
 import contextlib
 import csv
 import datetime
+import importlib.metadata
 import inspect
 import json
 import os
@@ -38,7 +39,10 @@ METHODS = {
     "plain": "SciPy, right-hand side as it is",
     "scipy": "SciPy, events and modes by hand",
     "cvode": "CVODE, the same by its root finding",
+    "nosnoc": "nosnoc (FESD)",
 }
+# Steps that nosnoc itself says it did not solve, of one run.
+UNSOLVED = []
 
 
 def solve(f, y, end):
@@ -92,6 +96,29 @@ def by_cvode(f, t, y, end, *events):
     return float(answer.t[-1]), answer.y[-1].tolist(), hit
 
 
+def by_nosnoc(x, x0, c, F, end, steps, stages=3, elements=2, signs=None, p=None, values=None, **inclusion):
+    """States and times at the ends of the finite elements, by FESD with Radau IIA."""
+    import nosnoc
+    import numpy
+
+    opts = nosnoc.NosnocOpts()
+    opts.n_s, opts.N_finite_elements, opts.comp_tol, opts.sigma_N = stages, elements, 1e-9, 1e-9
+    opts.step_equilibration = nosnoc.StepEquilibrationMode.HEURISTIC_MEAN
+    opts.terminal_time = end / steps
+    if F is None:
+        opts.pss_mode = nosnoc.PssMode.STEP
+    else:
+        inclusion |= {"F": F, "S": signs or [numpy.array([[1], [-1]])] * len(c)}
+    if p is not None:
+        inclusion |= {"p_global": p, "p_global_val": values[0]}
+    model = nosnoc.NosnocModel(x=x, x0=numpy.array(x0, float), c=c, **inclusion)
+    looper = nosnoc.NosnocSimLooper(nosnoc.NosnocSolver(opts, model), model.x0, steps, p_values=values)
+    looper.run()
+    answer = looper.get_results()
+    UNSOLVED[:] = [i for i, status in enumerate(answer["status"]) if status != nosnoc.Status.SUCCESS]
+    return answer["X_sim"].tolist(), answer["t_grid"].tolist()
+
+
 def timed(work):
     """A value and the median of its seconds."""
     seconds = []
@@ -103,28 +130,37 @@ def timed(work):
 
 
 def one(name, method):
-    """A cell by SciPy or CVODE, in this process."""
+    """A cell by SciPy, CVODE or nosnoc, in this process."""
     system = systems.SYSTEMS[name]
     # Imports are not timed.
     import scipy.integrate  # noqa: F401
 
     if method == "cvode":
         import sksundae.cvode  # noqa: F401
+    if method == "nosnoc":
+        import nosnoc  # noqa: F401
     work = {
         "plain": lambda: system.plain(solve),
         "scipy": lambda: system.by_hand(by_scipy),
         "cvode": lambda: system.by_hand(by_cvode),
+        "nosnoc": lambda: system.nosnoc(by_nosnoc),
     }
     try:
-        return timed(work[method])
+        return timed(work[method]) | ({"unsolved": len(UNSOLVED)} if UNSOLVED else {})
     except Exception as error:  # what a user would see of it is the cell's answer
         return {"failed": f"{type(error).__name__}: {error}"}
 
 
+def written(name, method):
+    """What the user writes for SciPy, CVODE or nosnoc, or None."""
+    by = {"plain": "plain", "nosnoc": "nosnoc"}.get(method, "by_hand")
+    return getattr(systems.SYSTEMS[name], by, None)
+
+
 def peer(name, method):
-    """A cell by SciPy or CVODE, in a process of its own."""
-    if method == "plain" and systems.SYSTEMS[name].plain is None:
-        return {"none": "no resets, no modes"}
+    """A cell by SciPy, CVODE or nosnoc, in a process of its own."""
+    if written(name, method) is None:
+        return {"none": getattr(systems.SYSTEMS[name], "why", "no resets, no modes")}
     try:
         done = subprocess.run([sys.executable, __file__, name, method], capture_output=True, text=True, timeout=LIMIT)
     except subprocess.TimeoutExpired:
@@ -164,7 +200,7 @@ def lines(name, method):
         # The name of an event is one of its lines.
         text = re.sub(r"\[\[event\]\]\nname", "[[event]]\nevent name", text)
     else:
-        function = systems.SYSTEMS[name].plain if method == "plain" else systems.SYSTEMS[name].by_hand
+        function = written(name, method)
         if function is None:
             return None
         # The line `def plain(solve)` belongs to the comparison.
@@ -201,7 +237,7 @@ def answer_of(cell):
         return "refused, with the reason" if cell["verdict"] == "right" else "**stops, with the reason**"
     if "error" not in cell:
         return f"**does not say: {cell['value']:.2g}**"
-    said = f"{cell['error']:.1e}"
+    said = f"{cell['error']:.1e}" + (f" ({cell['unsolved']} steps not solved)" if "unsolved" in cell else "")
     return said if cell["verdict"] == "right" else f"**wrong: {said}**"
 
 
@@ -252,8 +288,10 @@ def page(record):
     results = record["systems"]
     made = record["made"]
     asked = {name: cells["asked"] for name, cells in results.items()}
+    stated = {m: sum(r[m]["verdict"] != "none" for r in results.values()) for m in METHODS}
     counts = ["| right | " + " | ".join(
-        f"{sum(r[m]['verdict'] == 'right' for r in results.values())} of {len(results)}" for m in METHODS) + " |"]
+        f"{sum(r[m]['verdict'] == 'right' for r in results.values())} of {len(results)}"
+        + (f" ({stated[m]} stated)" if stated[m] < len(results) else "") for m in METHODS) + " |"]
     total = ["| lines in all | " + " | ".join(str(sum(r[m]["lines"] or 0 for r in results.values())) for m in METHODS) + " |"]
     both = [n for n, r in results.items() if all(r[m].get("seconds") and r[m]["verdict"] == "right" for m in ("twofold", "scipy"))]
     slower = [n for n in both if results[n]["twofold"]["seconds"] > results[n]["scipy"]["seconds"]]
@@ -266,7 +304,8 @@ def page(record):
         speed = "Seconds are not measured in this run: `make bench-hybrid` fills them in."
     return "\n".join([
         f"{made['date']}, {made['machine']}; {made['twofold']}, SciPy {made['scipy']}, SUNDIALS {made['sundials']} (scikit-sundae",
-        f"{made['scikit-sundae']}), NumPy {made['numpy']}, Python {made['python']}; `{made['command']}`.",
+        f"{made['scikit-sundae']}), nosnoc {made['nosnoc']} (CasADi {made['casadi']}), NumPy {made['numpy']}, Python {made['python']};",
+        f"`{made['command']}`.",
         "",
         "Error of each program; what is not right is bold.",
         "",
@@ -280,7 +319,8 @@ def page(record):
         f"Of these it has the smaller error in {len(closer)}: {names(closer)}.",
         "",
         "Milliseconds / lines that the user writes; of SciPy and CVODE by hand without the wrapper of one integration,",
-        f"`by_scipy` ({wrapper(by_scipy)} lines) or `by_cvode` ({wrapper(by_cvode)}).",
+        f"`by_scipy` ({wrapper(by_scipy)} lines) or `by_cvode` ({wrapper(by_cvode)}), and of nosnoc without its options and loop,",
+        f"`by_nosnoc` ({wrapper(by_nosnoc)}).",
         "",
         *table(results, METHODS, lambda cells, m: cost_of(cells[m])),
         *total,
@@ -308,6 +348,8 @@ def main(times):
         "scipy": version("scipy"),
         "scikit-sundae": version("sksundae"),
         "sundials": sundials(),
+        "nosnoc": importlib.metadata.version("nosnoc"),
+        "casadi": version("casadi"),
         "numpy": version("numpy"),
         "python": platform.python_version(),
     }

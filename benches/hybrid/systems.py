@@ -2,14 +2,21 @@
 
 Every system has a file NAME.toml for `twofold run`. `ours` takes the number from the rows that it writes. `plain` hands the discontinuous right-hand
 side to a solver. `by_hand` is a program with events and modes of the user's own; `until` is one integration that ends at its first event, by SciPy or
-by CVODE (compare.py): until(f, t, y, end, (g, direction), ...) gives the time, the state, and the number of the event or None.
+by CVODE (compare.py): until(f, t, y, end, (g, direction), ...) gives the time, the state, and the number of the event or None. `nosnoc` hands a
+Filippov system to FESD: run(x, x0, c, F, end, steps) gives the states at the ends of the finite elements and their times. Column 1 of F[i] is added
+where c[i] > 0, column 2 where c[i] < 0; `signs` of run names the sides if c[i] is a vector. `why` says why nosnoc cannot state a system.
 """
 
+import contextlib
 import math
 import re
 from bisect import bisect_right
 
 import numpy as np
+
+with contextlib.suppress(ImportError):
+    import casadi
+    from casadi import horzcat, vertcat
 
 # The systems in the order of the table.
 SYSTEMS = {}
@@ -82,6 +89,17 @@ class GrazingImpact:
         impact = (lambda t, s: s[0] - a * (1 - 1e-6), 1)
         t, s, hit = until(f, 0, [a * math.cos(phi), a * w * math.sin(phi)], 30, impact)
         return t
+
+    def nosnoc(run):
+        w, zeta = 2.8, 0.05
+        a = 1 / math.sqrt((1 - w**2) ** 2 + (2 * zeta * w) ** 2)
+        phi = math.atan2(2 * zeta * w, 1 - w**2)
+        x = casadi.SX.sym("x", 3)
+        f = vertcat(x[1], casadi.cos(w * x[2]) - x[0] - 2 * zeta * x[1], 1)
+        wall = x[0] - a * (1 - 1e-6)
+        states, times = run(x, [a * math.cos(phi), a * w * math.sin(phi), 0], [wall], [horzcat(f, f)], 30, 600)
+        met = [t for s, t in zip(states, times) if s[0] - a * (1 - 1e-6) > -1e-8]
+        return met[0] if met else times[-1]
 
 
 @system
@@ -193,6 +211,11 @@ class DryFriction:
             t, s, hit = until(f, t, [s[0], 0], 30, (lambda t, s: s[1], -sign))
         return s[0]
 
+    def nosnoc(run):
+        x = casadi.SX.sym("x", 2)
+        F = horzcat(vertcat(x[1], -x[0] - 0.5), vertcat(x[1], -x[0] + 0.5))
+        return run(x, [5.3, 0], [x[1]], [F], 30, 150)[0][-1][0]
+
 
 @system
 class SlidingMode:
@@ -217,6 +240,12 @@ class SlidingMode:
         t, s, hit = until(reach, 0, [1, 0], 5, (lambda t, s: s[0] + s[1], -1))
         slide = lambda t, s: [-s[0], s[0]]  # the control 0.5 sin(3t) + v, by hand
         return until(slide, t, [s[0], -s[0]], 5)[1][0]
+
+    def nosnoc(run):
+        x = casadi.SX.sym("x", 3)  # the last is time
+        f = vertcat(x[1], 0.5 * casadi.sin(3 * x[2]), 1)
+        F = horzcat(f - vertcat(0, 2, 0), f + vertcat(0, 2, 0))
+        return run(x, [1, 0, 0], [x[0] + x[1]], [F], 5, 100)[0][-1][0]
 
 
 @system
@@ -244,10 +273,18 @@ class ThreeRelays:
         signs = [0 if abs(x) < 1e-8 else 1 for x in s[:3]]  # that all three may slide is decided by hand
         return until(f, t, s, 3)[1][3]
 
+    def nosnoc(run):
+        x = casadi.SX.sym("x", 4)
+        f = vertcat(0, 0, 0, 1 + x[0] + x[1] + x[2])
+        A, B, C = vertcat(-1, 0, 0.3, 0), vertcat(0.3, -1, 0, 0), vertcat(0, 0.3, -1, 0)
+        F = [horzcat(f + A, f - A), horzcat(B, -B), horzcat(C, -C)]
+        return run(x, [0.7, 0.7, 0.7, 0], [x[0], x[1], x[2]], F, 3, 60)[0][-1][3]
+
 
 @system
 class Staircase:
     name, t_end = "staircase", 30
+    why = "no floor"
     asked = "integral of floor(10 t) to t = 30"
     ours = last("y")
 
@@ -286,6 +323,12 @@ class PulseWidth:
             t, s, hit = until(lambda t, s: [-s[0] / 5], k + 0.05, s, k + 1)
         return s[0]
 
+    def nosnoc(run):
+        x = casadi.SX.sym("x", 2)  # the last is time; mod(t, 1) < 0.05 by a cosine
+        pulse = casadi.cos(2 * math.pi * (x[1] - 0.025)) - math.cos(0.05 * math.pi)
+        F = horzcat(vertcat((1 - x[0]) / 5, 1), vertcat(-x[0] / 5, 1))
+        return run(x, [0, 0], [pulse], [F], 100, 500, elements=3)[0][-1][0]
+
 
 @system
 class ThinPulse:
@@ -313,6 +356,13 @@ class ThinPulse:
             t, s, hit = until(f, t, s, 30, (edge, direction))
             inside = not inside
         return s[2]
+
+    def nosnoc(run):
+        x = casadi.SX.sym("x", 3)
+        f, pulse = vertcat(x[1], -x[0], 0), vertcat(0, 0, 1e6)
+        c = vertcat(x[0] - 0.3 + 1e-6, 0.3 + 1e-6 - x[0])
+        signs = np.array([[1, 1], [1, -1], [-1, 1]])
+        return run(x, [0, 1, 0], [c], [horzcat(f + pulse, f, f)], 30, 600, signs=[signs])[0][-1][2]
 
 
 @system
@@ -352,6 +402,12 @@ class Tank:
                 over ^= hit is not None
         return s[0]
 
+    def nosnoc(run):
+        h, inflow = casadi.SX.sym("h"), casadi.SX.sym("inflow")
+        F = horzcat(inflow - 0.1 * h - 2 * (h - 3), inflow - 0.1 * h)
+        rates = np.repeat([0.2, 0.9, 0.1, 0.5], [20, 20, 40, 20])[:, None]  # one a step
+        return run(h, [0.5], [h - 3], [F], 50, 100, p=inflow, values=rates)[0][-1][0]
+
 
 @system
 class Rotation:
@@ -374,6 +430,13 @@ class Rotation:
         t, s, hit = until(f, 0, [math.exp(-1), 0], 1.5, (lambda t, s: s[0] ** 2 + s[1] ** 2 - 1, 1))
         turn = -2 * math.pi
         return until(f, t, s, 1.5)[1][0]
+
+    def nosnoc(run):
+        x = casadi.SX.sym("x", 2)
+        out = vertcat(x[0] - 2 * math.pi * x[1], x[1] + 2 * math.pi * x[0])
+        inside = vertcat(x[0] + 2 * math.pi * x[1], x[1] - 2 * math.pi * x[0])
+        F = horzcat(out, inside)
+        return run(x, [math.exp(-1), 0], [x[0] ** 2 + x[1] ** 2 - 1], [F], 1.5, 29)[0][-1][0]
 
 
 @system
@@ -402,6 +465,12 @@ class Spiral:
             s[axis] = 0
             x, y = (-x, y) if axis == 0 else (x, -y)
         return s[2]
+
+    def nosnoc(run):
+        x = casadi.SX.sym("x", 3)
+        A, B = vertcat(-1, -2, x[0]), vertcat(2, -1, x[1])
+        F = [horzcat(A, -A), horzcat(B, -B)]
+        return run(x, [-1, 1, 0], [x[0], x[1]], F, 2, 40)[0][-1][2]
 
 
 @system
@@ -475,6 +544,14 @@ class PulseTrain:
             t, s, hit = until(lambda t, s: [1000], max(t, k - half), s, k + half)
         return s[0]
 
+    def nosnoc(run):
+        x = casadi.SX.sym("x", 2)  # the last is time
+        sine = casadi.sin(math.pi * x[1])
+        c = vertcat(1e-3 - sine, 1e-3 + sine)
+        F = horzcat(vertcat(1000, 1), vertcat(0, 1), vertcat(0, 1))
+        signs = np.array([[1, 1], [1, -1], [-1, 1]])
+        return run(x, [0, 0], [c], [F], 10.5, 210, signs=[signs])[0][-1][0]
+
 
 @system
 class Undecided:
@@ -494,3 +571,176 @@ class Undecided:
         t, s, hit = until(f, 0, [0.1], 3, (lambda t, s: s[0], -1))
         sign = 0  # that it slides, and how long, is decided by hand
         return until(f, t, [0], 3)[1][0]
+
+    def nosnoc(run):
+        x = casadi.SX.sym("x", 2)  # the last is time
+        F = horzcat(vertcat(x[1] - 1, 1), vertcat(1 - x[1], 1))
+        return run(x, [0.1, 0], [x[0]], [F], 3, 60)[0][-1][0]
+
+
+@system
+class SimplestSwitch:
+    name, t_end = "simplest-switch", 2
+    asked = "x(2) = 3 (2 - sqrt(2)), nosnoc's example of a crossing"
+    ours = last("x")
+
+    def reference():
+        return 3 * (2 - math.sqrt(2))
+
+    def plain(solve):
+        return solve(lambda t, s: [1 if s[0] < 0 else 3], [-math.sqrt(2)], 2)[0]
+
+    def by_hand(until):
+        t, s, hit = until(lambda t, s: [1], 0, [-math.sqrt(2)], 2, (lambda t, s: s[0], 1))
+        return until(lambda t, s: [3], t, s, 2)[1][0]
+
+    def nosnoc(run):
+        x = casadi.SX.sym("x")
+        return run(x, [-math.sqrt(2)], [x], [horzcat(3, 1)], 2, 3, stages=2, elements=3)[0][-1][0]
+
+
+@system
+class SimplestSliding:
+    name, t_end = "simplest-sliding", 2
+    asked = "integral of x, -1/3, nosnoc's example of sliding, from sqrt(2)/3 on"
+    ours = last("sum")
+
+    def reference():
+        return -1 / 3
+
+    def plain(solve):
+        return solve(lambda t, s: [3 if s[0] < 0 else -1, s[0]], [-math.sqrt(2), 0], 2)[1]
+
+    def by_hand(until):
+        reach = lambda t, s: [3, s[0]]
+        t, s, hit = until(reach, 0, [-math.sqrt(2), 0], 2, (lambda t, s: s[0], 1))
+        return until(lambda t, s: [0, 0], t, [0, s[1]], 2)[1][1]
+
+    def nosnoc(run):
+        x = casadi.SX.sym("x", 2)
+        F = horzcat(vertcat(-1, x[0]), vertcat(3, x[0]))
+        return run(x, [-math.sqrt(2), 0], [x[0]], [F], 2, 7, stages=2)[0][-1][1]
+
+
+@system
+class TwoGene:
+    name, t_end = "two-gene", 1
+    asked = "integral of x + y, nosnoc's example (Acary et al. 2014), by the exponentials"
+    ours = last("sum")
+
+    def reference():
+        to = lambda t, x, rest, rate: rest + (x - rest) * math.exp(-rate * t)
+        when = lambda x, end, rest, rate: math.log((x - rest) / (end - rest)) / rate
+        area = lambda t, x, rest, rate: rest * t + (x - rest) * (1 - math.exp(-rate * t)) / rate
+        # y grows to 8, where it slides; x falls until y = 4, grows from then on to 8, where it slides.
+        grown, four = when(3, 8, 80 / 3, 1.5), when(3, 4, 80 / 3, 1.5)
+        low = to(four, 9, 0, 4.5)
+        back = when(low, 8, 80 / 9, 4.5)
+        x = area(four, 9, 0, 4.5) + area(back, low, 80 / 9, 4.5) + 8 * (1 - four - back)
+        return x + area(grown, 3, 80 / 3, 1.5) + 8 * (1 - grown)
+
+    def plain(solve):
+        def f(t, s):
+            x, y = s[:2]
+            return [40 * (x < 8 and y > 4) - 4.5 * x, 40 * (x > 4 and y < 8) - 1.5 * y, x + y]
+        return solve(f, [9, 3, 0], 1)[2]
+
+    def by_hand(until):
+        a, b = 0, 1  # on or off; None while it slides
+        def f(t, s):
+            x, y = s[:2]
+            return [0 if a is None else 40 * a - 4.5 * x, 0 if b is None else 40 * b - 1.5 * y, x + y]
+        t, s, hit = until(f, 0, [9, 3, 0], 1, (lambda t, s: s[1] - 4, 1))
+        a = 1
+        t, s, hit = until(f, t, s, 1, (lambda t, s: s[0] - 8, 1))
+        a = None
+        t, s, hit = until(f, t, s, 1, (lambda t, s: s[1] - 8, 1))
+        b = None  # the order of these events is found by hand
+        return until(f, t, s, 1)[1][2]
+
+    def nosnoc(run):
+        x, alpha = casadi.SX.sym("x", 3), casadi.SX.sym("alpha", 4)
+        a, b = (1 - alpha[1]) * alpha[2], alpha[0] * (1 - alpha[3])
+        f = vertcat(40 * a - 4.5 * x[0], 40 * b - 1.5 * x[1], x[0] + x[1])
+        c = vertcat(x[0] - 4, x[0] - 8, x[1] - 4, x[1] - 8)
+        return run(x, [9, 3, 0], [c], None, 1, 20, elements=3, alpha=[alpha], f_x=[f])[0][-1][2]
+
+
+@system
+class RelayFeedback:
+    name, t_end = "relay-feedback", 10
+    asked = "z(10), nosnoc's example (Piiroinen & Kuznetsov 2008, eq. 32), by matrix exponentials"
+    ours = last("z")
+
+    def reference():
+        from scipy.linalg import expm
+
+        A, b = np.array([[-3.5, 1, 0], [-627.5, 0, 1], [-625, 0, 0]]), np.array([1, -2, 1])
+        slide = np.array([[0, 0, 0], [0, 2, 1], [0, -1, 0]])
+        t, s, step = 0, np.array([0, -0.001, -0.02]), 1e-3
+        while True:
+            side = 0 if abs(s[1]) < 1 else math.copysign(1, s[1])
+            matrix, rest = (A, np.linalg.solve(A, b * side)) if side else (slide, np.zeros(3))
+            to = lambda time: rest + expm(matrix * time) @ (s - rest)
+            gone = lambda s: s[0] * side < 0 if side else abs(s[1]) > 1
+            low, high, whole, state = 0, step, expm(matrix * step), to(step)
+            while not gone(state) and t + high < 10:
+                low, high, state = high, high + step, rest + whole @ (state - rest)
+            if t + high >= 10 and not gone(to(10 - t)):
+                return to(10 - t)[2]
+            while low < (middle := (low + high) / 2) < high:
+                low, high = (low, middle) if gone(to(middle)) else (middle, high)
+            t, s = t + high, to(high)
+            # On the surface, and where sliding ends, exactly.
+            s = np.array([0, s[1] if side else math.copysign(1, s[1]), s[2]])
+
+    def plain(solve):
+        w, xi = 25, 0.05
+        def f(t, s):
+            (x, y, z), u = s, np.sign(s[0])
+            return [-(2 * xi * w + 1) * x + y - u, -(2 * xi * w + w**2) * x + z + 2 * u, -(w**2) * x - u]
+        return solve(f, [0, -0.001, -0.02], 10)[2]
+
+    def by_hand(until):
+        w, xi = 25, 0.05
+        t, s, hit = 0, [0, -0.001, -0.02], 0
+        def f(t, s):
+            x, y, z = s
+            return [-(2 * xi * w + 1) * x + y - u, -(2 * xi * w + w**2) * x + z + 2 * u, -(w**2) * x - u]
+        while hit is not None:
+            if abs(s[1]) < 1:  # slides
+                slide = lambda t, s: [0, 2 * s[1] + s[2], -s[1]]
+                t, s, hit = until(slide, t, s, 10, (lambda t, s: s[1] - 1, 1), (lambda t, s: s[1] + 1, -1))
+                s = [0, s[1] if hit is None else (1, -1)[hit], s[2]]
+            else:
+                u = math.copysign(1, s[1])
+                t, s, hit = until(f, t, s, 10, (lambda t, s: s[0], -u))
+                s = [s[0] if hit is None else 0, s[1], s[2]]
+        return s[2]
+
+    def nosnoc(run):
+        w, xi = 25, 0.05
+        x, b = casadi.SX.sym("x", 3), vertcat(1, -2, 1)
+        A = np.array([[-(2 * xi * w + 1), 1, 0], [-(2 * xi * w + w**2), 0, 1], [-(w**2), 0, 0]])
+        F = horzcat(A @ x - b, A @ x + b)
+        return run(x, [0, -0.001, -0.02], [x[0]], [F], 10, 200)[0][-1][2]
+
+
+@system
+class Spontaneous:
+    name, t_end = "spontaneous", 2
+    asked = "whether it says that x' = sign(x) from x = 0 is not determined (nosnoc's example)"
+    ours = last("x")
+
+    def reference():
+        return None
+
+    def plain(solve):
+        return solve(lambda t, s: [np.sign(s[0])], [0], 2)[0]
+
+    def by_hand(until):
+        return until(lambda t, s: [0], 0, [0], 2)[1][0]  # that it stays is decided by hand
+
+    def nosnoc(run):
+        x = casadi.SX.sym("x")
+        return run(x, [0], [x], [horzcat(1, -1)], 2, 3, stages=2, elements=3)[0][-1][0]
