@@ -118,7 +118,7 @@ capture: ## go on with the study of the times of capture, the map of the paramet
 	@$(RUN) --example visits > $(K)/visits.csv
 
 .PHONY: capture-rest
-capture-rest: ## what the study of methods leaves out for its cost: Radau IIA in the reconstructed reading (twenty minutes)
+capture-rest: ## the longest runs of the study of methods: Radau IIA in the reconstructed reading (twenty minutes)
 	@$(CARGO) build --release --locked --bin twofold
 	@$(SWEEP) $(CAPTURE) 2015 --method radau5 $(RECONSTRUCTED) $(STARTS) --random 200 --out $(K)/radau5-reconstructed.csv
 
