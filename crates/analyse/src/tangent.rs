@@ -15,6 +15,7 @@ pub struct Tangent<'a, F, const W: usize>(pub &'a F);
 macro_rules! tangent {
     ($($n:literal, $w:literal);*) => { $(
         impl<F: VectorField<$n>> VectorField<{ $n * ($w + 1) }> for Tangent<'_, F, $w> {
+        const INTERPRETED: bool = F::INTERPRETED;
             #[inline]
             fn eval<S: Elementary>(&self, state: &SVector<S, { $n * ($w + 1) }>) -> SVector<S, { $n * ($w + 1) }> {
                 let x = SVector::<Dual<S, $w>, $n>::from_fn(|i, _| Dual {

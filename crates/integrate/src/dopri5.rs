@@ -213,7 +213,7 @@ impl<const N: usize> Dopri5<N> {
         sum / N as f64
     }
 
-    fn first_step(&mut self, field: &dyn Driven<N>) -> f64 {
+    fn first_step<D: Driven<N> + ?Sized>(&mut self, field: &D) -> f64 {
         let (t, x) = (self.t, self.x);
         let longest = self.max_step.min(self.t_end - t);
         let norm = |v: &SVector<f64, N>| self.norm(v, |i| x[i].abs());
@@ -221,58 +221,9 @@ impl<const N: usize> Dopri5<N> {
         self.statistics.evaluations += 1;
         h
     }
-}
 
-impl<const N: usize> Stepper<N> for Dopri5<N> {
-    fn restart<F: VectorField<N>>(
-        &mut self,
-        field: &F,
-        t: f64,
-        x: SVector<f64, N>,
-        t_end: f64,
-        max_step: f64,
-    ) -> Result<(), Failure> {
-        self.restart_driven(&Steady(field), t, x, t_end, max_step)
-    }
-
-    fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
-        self.step_driven(&Steady(field))
-    }
-
-    fn statistics(&self) -> &Statistics {
-        &self.statistics
-    }
-}
-
-impl<const N: usize> DrivenStepper<N> for Dopri5<N> {
-    fn restart_driven(
-        &mut self,
-        field: &dyn Driven<N>,
-        t: f64,
-        x: SVector<f64, N>,
-        t_end: f64,
-        max_step: f64,
-    ) -> Result<(), Failure> {
-        self.t = t;
-        self.x = x;
-        self.t_end = t_end;
-        self.max_step = max_step;
-        self.last_log = control::LEAST_LOG;
-        self.fsal = field.eval(t, &x);
-        self.statistics.evaluations += 1;
-        self.statistics.restarts += 1;
-        if !finite(&x) || !finite(&self.fsal) {
-            return Err(Failure::NotFinite { t, state: Failure::state(&x) });
-        }
-        self.h = self.first_step(field).min(max_step);
-        if t + self.h == t {
-            // The shortest step that advances the time: the error test then decides.
-            self.h = (2.0 * f64::EPSILON * t.abs()).min(max_step);
-        }
-        Ok(())
-    }
-
-    fn step_driven(&mut self, field: &dyn Driven<N>) -> Result<Step<'_, N>, Failure> {
+    /// [`Stepper::step`].
+    fn advance<D: Driven<N> + ?Sized>(&mut self, field: &D) -> Result<Step<'_, N>, Failure> {
         let (t0, x0, k1) = (self.t, self.x, self.fsal);
         let mut rejected_before = false;
         loop {
@@ -336,6 +287,60 @@ impl<const N: usize> DrivenStepper<N> for Dopri5<N> {
             let factor = rough_exp2(0.5 * control::ALPHA * log) / control::SAFETY;
             self.h = h / factor.min(1.0 / control::SHRINK);
         }
+    }
+}
+
+impl<const N: usize> Stepper<N> for Dopri5<N> {
+    fn restart<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
+        self.restart_driven(&Steady(field), t, x, t_end, max_step)
+    }
+
+    fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
+        if F::INTERPRETED { self.step_driven(&Steady(field)) } else { self.advance(&Steady(field)) }
+    }
+
+    fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+}
+
+impl<const N: usize> DrivenStepper<N> for Dopri5<N> {
+    fn restart_driven(
+        &mut self,
+        field: &dyn Driven<N>,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
+        self.t = t;
+        self.x = x;
+        self.t_end = t_end;
+        self.max_step = max_step;
+        self.last_log = control::LEAST_LOG;
+        self.fsal = field.eval(t, &x);
+        self.statistics.evaluations += 1;
+        self.statistics.restarts += 1;
+        if !finite(&x) || !finite(&self.fsal) {
+            return Err(Failure::NotFinite { t, state: Failure::state(&x) });
+        }
+        self.h = self.first_step(field).min(max_step);
+        if t + self.h == t {
+            // The shortest step that advances the time: the error test then decides.
+            self.h = (2.0 * f64::EPSILON * t.abs()).min(max_step);
+        }
+        Ok(())
+    }
+
+    fn step_driven(&mut self, field: &dyn Driven<N>) -> Result<Step<'_, N>, Failure> {
+        self.advance(field)
     }
 }
 

@@ -248,7 +248,7 @@ impl<const N: usize> Radau5<N> {
     }
 
     /// Solves Z = h A F(x + Z) by simplified Newton iteration in the coordinates that split A^-1 (eq. IV.8.12-13).
-    fn solve(&mut self, field: &dyn Driven<N>, h: f64, weights: &SVector<f64, N>) -> Option<Solved<N>> {
+    fn solve<D: Driven<N> + ?Sized>(&mut self, field: &D, h: f64, weights: &SVector<f64, N>) -> Option<Solved<N>> {
         self.factorise(h)?;
         let (_, matrices) = self.matrices.as_ref()?;
         let t = &self.tableau;
@@ -320,85 +320,9 @@ impl<const N: usize> Radau5<N> {
         }
         None
     }
-}
 
-/// Root mean square of v_i w_i.
-fn norm<const N: usize>(v: &SVector<f64, N>, weights: &SVector<f64, N>) -> f64 {
-    let mut sum = 0.0;
-    for i in 0..N {
-        let q = v[i] * weights[i];
-        sum += q * q;
-    }
-    sqrt(sum / N as f64)
-}
-
-fn combine<const N: usize>(z: &[SVector<f64, N>; 3], row: &[f64; 3]) -> SVector<f64, N> {
-    z[0] * row[0] + z[1] * row[1] + z[2] * row[2]
-}
-
-fn combine_complex<const N: usize>(z: &[SVector<f64, N>; 3], row: &[Complex<f64>; 3]) -> SVector<Complex<f64>, N> {
-    let re = combine(z, &row.map(|c| c.re));
-    let im = combine(z, &row.map(|c| c.im));
-    SVector::from_fn(|i, _| Complex::new(re[i], im[i]))
-}
-
-impl<const N: usize> Stepper<N> for Radau5<N> {
-    fn restart<F: VectorField<N>>(
-        &mut self,
-        field: &F,
-        t: f64,
-        x: SVector<f64, N>,
-        t_end: f64,
-        max_step: f64,
-    ) -> Result<(), Failure> {
-        self.restart_driven(&Steady(field), t, x, t_end, max_step)
-    }
-
-    fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
-        self.step_driven(&Steady(field))
-    }
-
-    fn statistics(&self) -> &Statistics {
-        &self.statistics
-    }
-}
-
-impl<const N: usize> DrivenStepper<N> for Radau5<N> {
-    fn restart_driven(
-        &mut self,
-        field: &dyn Driven<N>,
-        t: f64,
-        x: SVector<f64, N>,
-        t_end: f64,
-        max_step: f64,
-    ) -> Result<(), Failure> {
-        self.t = t;
-        self.x = x;
-        self.t_end = t_end;
-        self.max_step = max_step;
-        self.derivative = field.eval(t, &x);
-        self.statistics.evaluations += 1;
-        self.statistics.restarts += 1;
-        self.statistics.highest_order = 5;
-        self.jacobian_is_new = false;
-        self.renew_jacobian = true;
-        self.matrices = None;
-        self.last = None;
-        self.rejected_before = false;
-        self.eta = 1.0;
-        self.dense = None;
-        if !finite(&x) || !finite(&self.derivative) {
-            return Err(Failure::NotFinite { t, state: Failure::state(&x) });
-        }
-        self.h = self.first_step(field).min(max_step);
-        if t + self.h == t {
-            // The shortest step that advances the time: the error test then decides.
-            self.h = (2.0 * f64::EPSILON * t.abs()).min(max_step);
-        }
-        Ok(())
-    }
-
-    fn step_driven(&mut self, field: &dyn Driven<N>) -> Result<Step<'_, N>, Failure> {
+    /// [`Stepper::step`].
+    fn advance<D: Driven<N> + ?Sized>(&mut self, field: &D) -> Result<Step<'_, N>, Failure> {
         let (t0, x0) = (self.t, self.x);
         let weights = self.weights();
         let mut failures = 0;
@@ -501,6 +425,87 @@ impl<const N: usize> DrivenStepper<N> for Radau5<N> {
             let dense = self.dense.insert(Collocation { x0, p, h });
             return Ok(Step { t0, t1: self.t, x0, x1, interpolant: dense });
         }
+    }
+}
+
+/// Root mean square of v_i w_i.
+fn norm<const N: usize>(v: &SVector<f64, N>, weights: &SVector<f64, N>) -> f64 {
+    let mut sum = 0.0;
+    for i in 0..N {
+        let q = v[i] * weights[i];
+        sum += q * q;
+    }
+    sqrt(sum / N as f64)
+}
+
+fn combine<const N: usize>(z: &[SVector<f64, N>; 3], row: &[f64; 3]) -> SVector<f64, N> {
+    z[0] * row[0] + z[1] * row[1] + z[2] * row[2]
+}
+
+fn combine_complex<const N: usize>(z: &[SVector<f64, N>; 3], row: &[Complex<f64>; 3]) -> SVector<Complex<f64>, N> {
+    let re = combine(z, &row.map(|c| c.re));
+    let im = combine(z, &row.map(|c| c.im));
+    SVector::from_fn(|i, _| Complex::new(re[i], im[i]))
+}
+
+impl<const N: usize> Stepper<N> for Radau5<N> {
+    fn restart<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
+        self.restart_driven(&Steady(field), t, x, t_end, max_step)
+    }
+
+    fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
+        if F::INTERPRETED { self.step_driven(&Steady(field)) } else { self.advance(&Steady(field)) }
+    }
+
+    fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+}
+
+impl<const N: usize> DrivenStepper<N> for Radau5<N> {
+    fn restart_driven(
+        &mut self,
+        field: &dyn Driven<N>,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
+        self.t = t;
+        self.x = x;
+        self.t_end = t_end;
+        self.max_step = max_step;
+        self.derivative = field.eval(t, &x);
+        self.statistics.evaluations += 1;
+        self.statistics.restarts += 1;
+        self.statistics.highest_order = 5;
+        self.jacobian_is_new = false;
+        self.renew_jacobian = true;
+        self.matrices = None;
+        self.last = None;
+        self.rejected_before = false;
+        self.eta = 1.0;
+        self.dense = None;
+        if !finite(&x) || !finite(&self.derivative) {
+            return Err(Failure::NotFinite { t, state: Failure::state(&x) });
+        }
+        self.h = self.first_step(field).min(max_step);
+        if t + self.h == t {
+            // The shortest step that advances the time: the error test then decides.
+            self.h = (2.0 * f64::EPSILON * t.abs()).min(max_step);
+        }
+        Ok(())
+    }
+
+    fn step_driven(&mut self, field: &dyn Driven<N>) -> Result<Step<'_, N>, Failure> {
+        self.advance(field)
     }
 }
 

@@ -304,6 +304,7 @@ impl<const N: usize> BoundField<N> {
 }
 
 impl<const N: usize> VectorField<N> for BoundField<N> {
+    const INTERPRETED: bool = true;
     #[inline]
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
         run(&self.program, x)

@@ -50,6 +50,7 @@ pub struct Hysteretic<P> {
 macro_rules! hysteretic_in_dimension {
     ($n:literal, $m:literal) => {
         impl<P: PiecewiseSmooth<$n>> VectorField<$m> for Hysteretic<P> {
+            const INTERPRETED: bool = P::INTERPRETED;
             #[inline]
             fn eval<S: Elementary>(&self, state: &SVector<S, $m>) -> SVector<S, $m> {
                 let x = SVector::<S, $n>::from_fn(|i, _| state[i]);

@@ -404,6 +404,7 @@ pub(super) fn run<S: Elementary, const N: usize, const M: usize>(
 }
 
 impl<const N: usize> PiecewiseSmooth<N> for Bound<N> {
+    const INTERPRETED: bool = true;
     #[inline]
     fn switching<S: Elementary>(&self, x: &SVector<S, N>) -> S {
         run::<S, N, 1>(&self.functions.switching, x)[0]

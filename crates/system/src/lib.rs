@@ -56,6 +56,10 @@ pub use wheel::Wheel;
 
 /// An autonomous ordinary differential equation x' = f(x) in `N` dimensions.
 pub trait VectorField<const N: usize>: Sync {
+    /// Whether [`VectorField::eval`] interprets a program. A method then calls it through a pointer,
+    /// which costs nothing beside the interpreter, and is compiled once for all such equations.
+    #[doc(hidden)]
+    const INTERPRETED: bool = false;
     /// The right-hand side f(x).
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
     /// How many bundles of registers [`VectorField::eval_in_registers`] wants for what lies between: a power of two, or none.
@@ -93,6 +97,9 @@ pub trait VectorField<const N: usize>: Sync {
 
 /// A system that switches between two smooth vector fields on the surface h = 0 (the paper's eq. 3).
 pub trait PiecewiseSmooth<const N: usize>: Sync {
+    /// As [`VectorField::INTERPRETED`].
+    #[doc(hidden)]
+    const INTERPRETED: bool = false;
     /// The switching function h(x). The surface h = 0 must be regular: grad h not zero on it.
     fn switching<S: Elementary>(&self, x: &SVector<S, N>) -> S;
     /// The vector field f+ that holds where h > 0; smooth and defined on both sides.

@@ -11,6 +11,7 @@ use twofold_num::Elementary;
 pub struct Reversed<P>(pub P);
 
 impl<P: PiecewiseSmooth<N>, const N: usize> PiecewiseSmooth<N> for Reversed<P> {
+    const INTERPRETED: bool = P::INTERPRETED;
     fn switching<S: Elementary>(&self, x: &SVector<S, N>) -> S {
         self.0.switching(x)
     }

@@ -17,6 +17,7 @@ pub struct Smoothed<P> {
 }
 
 impl<P: PiecewiseSmooth<N>, const N: usize> VectorField<N> for Smoothed<P> {
+    const INTERPRETED: bool = P::INTERPRETED;
     #[inline(always)]
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
         let phi = self.transition.eval(self.system.switching(x), self.eps);
@@ -50,6 +51,7 @@ pub struct Blended<'a, P> {
 }
 
 impl<P: PiecewiseSmooth<N>, const N: usize> VectorField<N> for Blended<'_, P> {
+    const INTERPRETED: bool = P::INTERPRETED;
     #[inline(always)]
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
         blend(self.system, x, S::from_f64(self.phi))

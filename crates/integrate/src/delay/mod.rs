@@ -124,6 +124,7 @@ pub const SMOOTH_METHODS: [Method; 2] = [Method::Dopri5, Method::Radau5];
 pub struct Own;
 
 impl<const N: usize> VectorField<N> for Own {
+    const INTERPRETED: bool = true;
     fn eval<S: Elementary>(&self, _: &SVector<S, N>) -> SVector<S, N> {
         SVector::from_element(S::zero())
     }
@@ -139,6 +140,7 @@ struct OneSide<'a, P> {
 }
 
 impl<P: PiecewiseSmooth<N>, const N: usize> VectorField<N> for OneSide<'_, P> {
+    const INTERPRETED: bool = P::INTERPRETED;
     #[inline(always)]
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
         if self.plus { self.system.plus(x) } else { self.system.minus(x) }
@@ -152,6 +154,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> VectorField<N> for OneSide<'_, P> {
 struct Backwards<'a, F>(&'a F);
 
 impl<F: VectorField<N>, const N: usize> VectorField<N> for Backwards<'_, F> {
+    const INTERPRETED: bool = F::INTERPRETED;
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
         self.0.eval(x).map(|c| -c)
     }

@@ -61,6 +61,7 @@ pub trait Carry<const N: usize>: Sync {
 macro_rules! varied {
     ($($n:literal)*) => { $(
         impl<P: PiecewiseSmooth<$n>> PiecewiseSmooth<{ 2 * $n }> for Varied<'_, P> {
+        const INTERPRETED: bool = P::INTERPRETED;
             fn switching<S: Elementary>(&self, z: &SVector<S, { 2 * $n }>) -> S {
                 self.0.switching(&SVector::<S, $n>::from_fn(|i, _| z[i]))
             }

@@ -37,6 +37,7 @@ impl<P> Sided<'_, P> {
 }
 
 impl<P: PiecewiseSmooth<N>, const N: usize> PiecewiseSmooth<N> for Sided<'_, P> {
+    const INTERPRETED: bool = P::INTERPRETED;
     fn switching<S: Elementary>(&self, x: &SVector<S, N>) -> S {
         self.system.switching(x)
     }
@@ -56,6 +57,7 @@ pub(super) struct FreeFlow<'a, P> {
 }
 
 impl<P: PiecewiseSmooth<N>, const N: usize> VectorField<N> for FreeFlow<'_, P> {
+    const INTERPRETED: bool = P::INTERPRETED;
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
         match self.side {
             Side::Plus => self.system.plus(x),
@@ -88,6 +90,7 @@ pub struct SlidingFlow<'a, P, const N: usize> {
 macro_rules! sliding_in_dimension {
     ($n:literal, $m:literal) => {
         impl<P: PiecewiseSmooth<$n>> VectorField<$m> for SlidingFlow<'_, P, $n> {
+            const INTERPRETED: bool = P::INTERPRETED;
             fn eval<S: Elementary>(&self, state: &SVector<S, $m>) -> SVector<S, $m> {
                 let x = SVector::<S, $n>::from_fn(|i, _| state[i]);
                 let (field, rate) = desingularised(&self.system, &x);

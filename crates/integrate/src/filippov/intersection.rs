@@ -143,6 +143,7 @@ pub(super) struct AlongIntersection<'a, P, const N: usize> {
 }
 
 impl<P: PiecewiseSmooth<N>, const N: usize> VectorField<N> for AlongIntersection<'_, P, N> {
+    const INTERPRETED: bool = P::INTERPRETED;
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
         self.mixture.velocity(self.faces, x)
     }
