@@ -1,41 +1,52 @@
 //! Rests: states that do not move, in the fields and on switching surfaces.
 //!
-//! An equilibrium is a zero of a field on its own side of all switching functions. A *pseudo-equilibrium* is a zero of the sliding field: a point of a
-//! surface where a mixture of both fields vanishes (Filippov 1988, sec. 17; Kuznetsov, Rinaldi & Gragnani 2003). Newton's method looks for both from many
-//! places of a box.
+//! An equilibrium is a zero of a field on its own side of all switching functions. A *pseudo-equilibrium* is a zero of the sliding field: a point of
+//! one surface, or of several at once, where a mixture of the fields around it vanishes (Filippov 1988, sec. 17; Kuznetsov, Rinaldi & Gragnani
+//! 2003). On several surfaces the weights are products, one factor a surface (Alexander & Seidman 1998). Newton's method looks for both from many
+//! places of a box. It takes the least step where the equations leave a direction open; rests that fill a curve, such as a block that sticks within
+//! friction, are followed to both ends.
 
 use twofold_num::Dual;
+use twofold_num::elementary::sqrt;
 use twofold_num::linear::{eigenvalues, solve_any};
 
 use crate::equation::{Configuration, Equation, EquationError};
 use crate::model::Model;
 
-/// Where a rest lies.
+/// A switching surface on which a rest lies.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Place {
-    /// In a field.
-    Field,
-    /// On a switching surface, by the switching function's text.
-    Surface {
-        /// The switching function.
-        surface: String,
-        /// The weight of the field on its positive side.
-        weight: f64,
-        /// Whether the surface attracts there.
-        attracting: bool,
-    },
+pub struct On {
+    /// The switching function's text.
+    pub surface: String,
+    /// The weight of the fields on its positive side.
+    pub weight: f64,
+}
+
+/// Rests that are not isolated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Family {
+    /// The dimension of the set of rests.
+    pub dimension: usize,
+    /// The two ends of a curve, in the box; nothing if it closes or its dimension is not 1.
+    pub ends: Option<[Vec<f64>; 2]>,
+    /// Points of the curve, in order.
+    points: Vec<Vec<f64>>,
 }
 
 /// A state that does not move.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rest {
-    /// The state.
+    /// The state; of a curve one in the middle, of a set of more dimensions any.
     pub x: Vec<f64>,
     /// The mode's number.
     pub mode: usize,
-    /// Where it lies.
-    pub place: Place,
-    /// Eigenvalues of the linearised motion, on a surface along the surface: real and imaginary parts.
+    /// The switching surfaces on which it lies; none in a field.
+    pub on: Vec<On>,
+    /// Whether motion near by comes to all of these surfaces, however fast each of them switches; nothing where that decides.
+    pub attracting: Option<bool>,
+    /// The set of rests to which it belongs, if it is not isolated.
+    pub family: Option<Family>,
+    /// Eigenvalues of the linearised motion, on surfaces along them: real and imaginary parts.
     pub eigenvalues: Vec<[f64; 2]>,
     /// By how much an eigenvalue may be off, the state being known to 1e-9 of the box: at a double root none has a sign.
     pub blur: f64,
@@ -44,22 +55,38 @@ pub struct Rest {
 }
 
 impl Rest {
-    /// "stable node", "saddle", ... from the eigenvalues; on a surface that repels everything is unstable.
+    /// "stable node", "saddle", ... from the eigenvalues; on a surface that repels everything is unstable. Of a curve of rests, what they are all
+    /// along it is not asked.
     pub fn kind(&self) -> String {
-        let size = self.eigenvalues.iter().map(|e| e[0].abs().max(e[1].abs())).fold(0.0, f64::max);
-        let zero = (1e-9 * size).max(self.blur);
         if let Some(surface) = &self.boundary {
             return format!(
                 "boundary equilibrium: the equations change on {surface} = 0, and one side does not decide"
             );
         }
-        let turns = self.eigenvalues.iter().any(|e| e[1].abs() > zero);
-        let (out, into) = (self.eigenvalues.iter().any(|e| e[0] > zero), self.eigenvalues.iter().any(|e| e[0] < -zero));
-        let neutral = self.eigenvalues.iter().any(|e| e[0].abs() <= zero);
+        // Along a set of rests nothing moves: as many eigenvalues are zero.
+        let along = self.family.as_ref().map_or(0, |f| f.dimension);
+        let modulus = |e: &[f64; 2]| e[0] * e[0] + e[1] * e[1];
+        let mut values = self.eigenvalues.clone();
+        values.sort_by(|a, b| modulus(a).total_cmp(&modulus(b)));
+        let values = &values[along.min(values.len())..];
+        let size = values.iter().map(|e| e[0].abs().max(e[1].abs())).fold(0.0, f64::max);
+        let zero = (1e-9 * size).max(self.blur);
+        let turns = values.iter().any(|e| e[1].abs() > zero);
+        let (out, into) = (values.iter().any(|e| e[0] > zero), values.iter().any(|e| e[0] < -zero));
+        let neutral = values.iter().any(|e| e[0].abs() <= zero);
         let shape = if turns { "focus" } else { "node" };
-        let repels = matches!(self.place, Place::Surface { attracting: false, .. });
+        let [repels, open] = [Some(false), None].map(|a| !self.on.is_empty() && self.attracting == a);
         match (out, into) {
-            _ if self.eigenvalues.is_empty() => if repels { "unstable" } else { "stable" }.into(),
+            _ if along > 0 => match (out, neutral || open) {
+                _ if repels => "unstable: neighbours leave the set",
+                (true, _) => "unstable: neighbours leave the set",
+                (false, true) => "not decided by the linearised motion",
+                (false, false) => "stable: neighbours come to the set",
+            }
+            .into(),
+            (true, _) if open => "unstable".into(),
+            _ if open => "decided by how fast each surface switches".into(),
+            _ if values.is_empty() => if repels { "unstable" } else { "stable" }.into(),
             (true, true) => "saddle".into(),
             (false, _) if neutral => "not decided by the linearised motion".into(),
             (true, false) if neutral => "unstable".into(),
@@ -84,9 +111,14 @@ pub enum RestError {
     Box(String),
 }
 
-/// Starts of Newton's method.
+/// Starts of Newton's method: for each set of surfaces of one size, as many as there are places for all of them together, but so many at least.
 const STARTS: usize = 400;
+const LEAST_STARTS: usize = 20;
 const MOST_ITERATIONS: usize = 60;
+/// Surfaces on which a rest can lie at once.
+const MOST_TOGETHER: usize = 4;
+/// Larger sets of surfaces are not looked at if there are more of one size than this.
+const MOST_SETS: usize = 256;
 
 /// The rests of a system in a box, by the smallest coordinates first.
 ///
@@ -94,14 +126,19 @@ const MOST_ITERATIONS: usize = 60;
 /// If the equations are not complete or depend on the time, or the box is none.
 ///
 /// ```
-/// use twofold_hybrid::{Definition, Model, rests::{Place, rests}};
+/// use twofold_hybrid::{Definition, Model, rests::rests};
 /// // A cubic's zeros, and sliding to a pseudo-equilibrium where both fields cancel.
 /// let cubic = Model::new(Definition::from_toml("states = ['x']\nf = ['x - x^3']", "f")?);
 /// let found: Vec<f64> = rests(&cubic, &[(-3.0, 3.0)])?.iter().map(|r| r.x[0]).collect();
 /// assert!(found.iter().zip([-1.0, 0.0, 1.0]).all(|(a, b)| (a - b).abs() < 1e-12));
 /// let relay = Model::new(Definition::from_toml("states = ['x']\nf = ['0.5 - sign(x)']", "f")?);
 /// let rest = &rests(&relay, &[(-1.0, 1.0)])?[0];
-/// assert!(matches!(rest.place, Place::Surface { weight, attracting: true, .. } if (weight - 0.75).abs() < 1e-12));
+/// assert!(rest.attracting == Some(true) && (rest.on[0].weight - 0.75).abs() < 1e-12);
+/// // A block that dry friction holds: x from -1/2 to 1/2.
+/// let block = Model::new(Definition::from_toml("states = ['x', 'v']\nf = ['v', '-x - 0.5*sign(v)']", "f")?);
+/// let stuck = rests(&block, &[(-3.0, 3.0), (-1.0, 1.0)])?[0].family.clone().unwrap();
+/// let [from, to] = stuck.ends.unwrap();
+/// assert!((from[0] + 0.5).abs() < 1e-9 && (to[0] - 0.5).abs() < 1e-9);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn rests(model: &Model, within: &[(f64, f64)]) -> Result<Vec<Rest>, RestError> {
@@ -115,39 +152,34 @@ pub fn rests(model: &Model, within: &[(f64, f64)]) -> Result<Vec<Rest>, RestErro
     if equation.depends_on_time() {
         return Err(RestError::Driven);
     }
-    let search = Search { equation, n, widths: within.iter().map(|(a, b)| b - a).collect() };
+    let search = Search { equation, n, widths: within.iter().map(|(a, b)| b - a).collect(), within };
     let mut found: Vec<Rest> = Vec::new();
     for mode in 0..model.definition().modes().len() {
-        for start in 0..STARTS {
-            let x: Vec<f64> = within
-                .iter()
-                .enumerate()
-                .map(|(i, (a, b))| {
-                    if start == 0 {
-                        0.5 * (a + b)
-                    } else {
-                        a + (b - a) * radical_inverse(start, PRIMES[i % PRIMES.len()])
-                    }
-                })
-                .collect();
-            let config = search.configuration(mode, &x);
-            let mut add = |rest: Option<Rest>| {
-                let Some(rest) = rest else { return };
-                let inside = rest.x.iter().zip(within).all(|(v, (a, b))| (a..=b).contains(&v));
-                let known =
-                    found.iter().any(|r| r.mode == rest.mode && r.place_is(&rest) && search.near(&r.x, &rest.x));
-                if inside && !known {
-                    found.push(rest);
-                }
-            };
-            add(search.in_field(&config, &x));
-            for guard in search.equation.compiled(&config).active.clone() {
-                if !search.equation.guards[guard].whole {
-                    add(search.on_surface(&config, guard, &x));
+        let places: Vec<Vec<f64>> = (0..STARTS).map(|start| search.place(start)).collect();
+        let configs: Vec<Configuration> = places.iter().map(|x| search.configuration(mode, x)).collect();
+        let mut active: Vec<usize> = Vec::new();
+        for config in &configs {
+            active.extend(search.equation.compiled(config).active.iter());
+        }
+        active.sort_unstable();
+        active.dedup();
+        active.retain(|g| !search.equation.guards[*g].whole);
+        for together in 0..=MOST_TOGETHER.min(search.n) {
+            let sets = subsets(&active, together);
+            if sets.len() > MOST_SETS {
+                break;
+            }
+            let starts = (STARTS / sets.len().max(1)).max(LEAST_STARTS);
+            for on in &sets {
+                for (x, config) in places.iter().zip(&configs).take(starts) {
+                    search.add(config, on, x, &mut found);
                 }
             }
         }
     }
+    // The end of a curve of rests is a zero of a field, too.
+    let families: Vec<Rest> = found.iter().filter(|r| r.family.is_some()).cloned().collect();
+    found.retain(|r| r.boundary.is_none() || !families.iter().any(|f| f.mode == r.mode && search.passes(f, &r.x)));
     found.sort_by(|a, b| {
         let by_state = a.x.iter().zip(&b.x).map(|(p, q)| p.total_cmp(q)).find(|o| o.is_ne());
         a.mode.cmp(&b.mode).then(by_state.unwrap_or(std::cmp::Ordering::Equal))
@@ -155,12 +187,17 @@ pub fn rests(model: &Model, within: &[(f64, f64)]) -> Result<Vec<Rest>, RestErro
     Ok(found)
 }
 
-impl Rest {
-    fn place_is(&self, other: &Rest) -> bool {
-        match (&self.place, &other.place) {
-            (Place::Field, Place::Field) => true,
-            (Place::Surface { surface: a, .. }, Place::Surface { surface: b, .. }) => a == b,
-            _ => false,
+/// Subsets of so many numbers.
+fn subsets(of: &[usize], size: usize) -> Vec<Vec<usize>> {
+    match (size, of.split_first()) {
+        (0, _) => vec![Vec::new()],
+        (_, None) => Vec::new(),
+        (_, Some((first, rest))) => {
+            let with = subsets(rest, size - 1).into_iter().map(|mut s| {
+                s.insert(0, *first);
+                s
+            });
+            with.chain(subsets(rest, size)).take(MOST_SETS + 1).collect()
         }
     }
 }
@@ -178,23 +215,139 @@ fn radical_inverse(mut i: usize, base: usize) -> f64 {
     value
 }
 
-struct Search {
+struct Search<'a> {
     equation: Equation,
     n: usize,
     widths: Vec<f64>,
+    within: &'a [(f64, f64)],
 }
 
-/// A field, its Jacobian row by row, and the value and gradient of a guard.
+/// A field with its Jacobian, row by row.
 struct Local {
     field: Vec<f64>,
     jacobian: Vec<f64>,
-    value: f64,
-    gradient: Vec<f64>,
 }
 
-impl Search {
+/// The mixture of the fields around some surfaces, by weights: its value, its derivatives by the states and by the weights (row by row), and the
+/// surfaces' functions and gradients.
+struct Mixture {
+    local: Local,
+    by_weight: Vec<f64>,
+    values: Vec<f64>,
+    gradients: Vec<f64>,
+    /// The largest size of each component in any of the fields.
+    sizes: Vec<f64>,
+}
+
+/// A zero: the state, the weights, and the directions in which the equations do not fix them (the state's part a unit vector in widths of the box).
+struct Zero {
+    x: Vec<f64>,
+    weights: Vec<f64>,
+    open: Vec<Vec<f64>>,
+}
+
+/// Rows that depend on the others to this share are taken for dependent, if a walk along the open direction finds further zeros.
+const DEPENDENT: f64 = 1e-8;
+/// The same where no such walk does.
+const ROUNDING: f64 = 1e-15;
+/// Length of that walk in widths of the box, and of a step along a curve of rests.
+const WALK: f64 = 1e-4;
+const STRIDE: f64 = 0.02;
+/// A curve of rests is given up after so many steps to each side.
+const MOST_STRIDES: usize = 2000;
+
+impl Search<'_> {
     fn near(&self, a: &[f64], b: &[f64]) -> bool {
         a.iter().zip(b).zip(&self.widths).all(|((a, b), w)| (a - b).abs() <= 1e-7 * w)
+    }
+
+    fn is_inside(&self, x: &[f64]) -> bool {
+        x.iter().zip(self.within).all(|(v, (a, b))| (a..=b).contains(&v))
+    }
+
+    /// A place of the box to start from: the middle, then Halton's points.
+    fn place(&self, start: usize) -> Vec<f64> {
+        let share = |i: usize| if start == 0 { 0.5 } else { radical_inverse(start, PRIMES[i % PRIMES.len()]) };
+        self.within.iter().enumerate().map(|(i, (a, b))| a + (b - a) * share(i)).collect()
+    }
+
+    /// Adds the rest that Newton's method comes to, if it is one and new.
+    fn add(&self, config: &Configuration, on: &[usize], start: &[f64], found: &mut Vec<Rest>) {
+        let middle = vec![0.5; on.len()];
+        let Some(mut zero) = self.settle(config, on, start, &middle, DEPENDENT) else { return };
+        if !self.is_valid(config, on, &zero) || self.is_known(config, on, &zero.x, found) {
+            return;
+        }
+        let continues = |zero: &Zero, direction: &[f64]| {
+            [WALK, -WALK].iter().any(|by| {
+                let (aim, weights) = self.moved(zero, direction, *by);
+                let there = self.settle(config, on, &aim, &weights, DEPENDENT);
+                there.is_some_and(|there| self.distance(&there.x, &aim) <= 0.1 * WALK)
+            })
+        };
+        let (along, spurious): (Vec<_>, Vec<_>) = zero.open.clone().into_iter().partition(|d| continues(&zero, d));
+        let dimension = along.len();
+        let rest = if dimension > 0 {
+            zero.open = along;
+            self.family(config, on, zero, dimension)
+        } else if spurious.is_empty() {
+            self.rest(config, on, zero)
+        } else {
+            let isolated = self.settle(config, on, &zero.x, &zero.weights, ROUNDING);
+            isolated.filter(|z| self.is_valid(config, on, z)).and_then(|z| self.rest(config, on, z))
+        };
+        if let Some(rest) = rest
+            && !self.is_known(config, on, &rest.x, found)
+        {
+            found.push(rest);
+        }
+    }
+
+    /// Whether a zero of a mixture is a rest: in the box, on its own side of all other surfaces, with weights of a mixture.
+    fn is_valid(&self, config: &Configuration, on: &[usize], zero: &Zero) -> bool {
+        let mixes = zero.weights.iter().all(|w| *w > 0.0 && *w < 1.0);
+        mixes && self.is_inside(&zero.x) && self.is_its_own(config, &zero.x, on)
+    }
+
+    fn is_known(&self, config: &Configuration, on: &[usize], x: &[f64], found: &[Rest]) -> bool {
+        let names: Vec<String> = on.iter().map(|g| self.equation.guards[*g].expression.to_string()).collect();
+        found.iter().any(|r| {
+            let same = r.mode == config.mode && r.on.iter().map(|on| &on.surface).eq(names.iter());
+            same && match &r.family {
+                Some(Family { dimension, .. }) if *dimension > 1 => true,
+                Some(_) => self.passes(r, x),
+                None => self.near(&r.x, x),
+            }
+        })
+    }
+
+    /// Whether a curve of rests passes a state, to within a thousandth of the box.
+    fn passes(&self, rest: &Rest, x: &[f64]) -> bool {
+        let Some(family) = &rest.family else { return false };
+        family.points.windows(2).any(|ends| {
+            let [a, b] = [&ends[0], &ends[1]].map(|p| self.scaled(p, x));
+            let along: Vec<f64> = b.iter().zip(&a).map(|(b, a)| b - a).collect();
+            let square: f64 = dot(&along, &along);
+            let share = if square > 0.0 { (-dot(&a, &along) / square).clamp(0.0, 1.0) } else { 0.0 };
+            a.iter().zip(&along).map(|(a, d)| (a + share * d) * (a + share * d)).sum::<f64>() <= 1e-6
+        })
+    }
+
+    /// a - b in widths of the box.
+    fn scaled(&self, a: &[f64], b: &[f64]) -> Vec<f64> {
+        a.iter().zip(b).zip(&self.widths).map(|((a, b), w)| (a - b) / w).collect()
+    }
+
+    fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
+        let apart = self.scaled(a, b);
+        sqrt(dot(&apart, &apart))
+    }
+
+    /// The state and the weights at a distance along a direction.
+    fn moved(&self, zero: &Zero, direction: &[f64], by: f64) -> (Vec<f64>, Vec<f64>) {
+        let (states, weights) = direction.split_at(self.n);
+        let x = zero.x.iter().zip(states).zip(&self.widths).map(|((x, d), w)| x + by * d * w).collect();
+        (x, zero.weights.iter().zip(weights).map(|(w, d)| w + by * d).collect())
     }
 
     fn configuration(&self, mode: usize, x: &[f64]) -> Configuration {
@@ -214,12 +367,16 @@ impl Search {
         Configuration { mode, sides: self.equation.guards.iter().map(side).collect(), pieces: Vec::new() }
     }
 
-    fn local(&self, config: &Configuration, guard: Option<usize>, x: &[f64]) -> Local {
+    fn local(&self, config: &Configuration, x: &[f64]) -> Local {
+        self.with_guards(config, &[], x).0
+    }
+
+    /// A field and its Jacobian, with values and gradients of guards that it asks (NaN of others).
+    fn with_guards(&self, config: &Configuration, guards: &[usize], x: &[f64]) -> (Local, Vec<f64>, Vec<f64>) {
         let n = self.n;
         let compiled = self.equation.compiled(config);
-        let place = guard.and_then(|g| compiled.active.iter().position(|a| *a == g));
-        let mut local =
-            Local { field: vec![0.0; n], jacobian: vec![0.0; n * n], value: f64::NAN, gradient: vec![0.0; n] };
+        let mut local = Local { field: vec![0.0; n], jacobian: vec![0.0; n * n] };
+        let (mut values, mut gradients) = (vec![f64::NAN; guards.len()], vec![f64::NAN; guards.len() * n]);
         let mut v: Vec<Dual<f64, 1>> = x.iter().map(|v| Dual::constant(*v)).collect();
         v.push(Dual::constant(0.0));
         v.extend(config.sides.iter().map(|s| Dual::constant(*s)));
@@ -231,45 +388,109 @@ impl Search {
                 local.field[i] = f[i].value;
                 local.jacobian[i * n + j] = f[i].partials[0];
             }
-            if let Some(place) = place {
+            if !guards.is_empty() {
                 compiled.watched.evaluate(&v, &mut g);
-                local.value = g[place].value;
-                local.gradient[j] = g[place].partials[0];
+            }
+            for (k, guard) in guards.iter().enumerate() {
+                if let Some(place) = compiled.active.iter().position(|a| a == guard) {
+                    values[k] = g[place].value;
+                    gradients[k * n + j] = g[place].partials[0];
+                }
             }
             v[j].partials = [0.0];
         }
-        local
+        (local, values, gradients)
     }
 
     /// Whether a state's own answers, but for those in `free`, are those of a configuration.
-    fn is_its_own(&self, config: &Configuration, x: &[f64], free: Option<usize>) -> bool {
+    fn is_its_own(&self, config: &Configuration, x: &[f64], free: &[usize]) -> bool {
         let own = self.configuration(config.mode, x);
         let compiled = self.equation.compiled(config);
-        compiled.active.iter().all(|g| Some(*g) == free || own.sides[*g] == config.sides[*g])
+        compiled.active.iter().all(|g| free.contains(g) || own.sides[*g] == config.sides[*g])
     }
 
-    fn in_field(&self, config: &Configuration, start: &[f64]) -> Option<Rest> {
-        let mut x = start.to_vec();
+    /// The mixture on the surfaces `on`, by weights of their positive sides.
+    fn mixture(&self, config: &Configuration, on: &[usize], x: &[f64], weights: &[f64]) -> Mixture {
+        let (n, k) = (self.n, on.len());
+        let mut mixture = Mixture {
+            local: Local { field: vec![0.0; n], jacobian: vec![0.0; n * n] },
+            by_weight: vec![0.0; n * k],
+            values: vec![f64::NAN; k],
+            gradients: vec![f64::NAN; k * n],
+            sizes: vec![0.0; n],
+        };
+        let mut corner = config.clone();
+        for bits in 0..1_usize << k {
+            let is_above = |i: usize| bits >> i & 1 == 1;
+            for (i, guard) in on.iter().enumerate() {
+                corner.sides[*guard] = if is_above(i) { 1.0 } else { -1.0 };
+            }
+            let (local, values, gradients) = self.with_guards(&corner, on, x);
+            for i in 0..k {
+                // A guard may be asked on one side of another one only.
+                if mixture.values[i].is_nan() {
+                    mixture.values[i] = values[i];
+                    mixture.gradients[i * n..][..n].copy_from_slice(&gradients[i * n..][..n]);
+                }
+            }
+            let factor = |i: usize| if is_above(i) { weights[i] } else { 1.0 - weights[i] };
+            let product: f64 = (0..k).map(factor).product();
+            for (sum, v) in mixture.local.field.iter_mut().zip(&local.field) {
+                *sum += product * v;
+            }
+            for (sum, v) in mixture.local.jacobian.iter_mut().zip(&local.jacobian) {
+                *sum += product * v;
+            }
+            for j in 0..k {
+                let others: f64 = (0..k).filter(|i| *i != j).map(factor).product();
+                let slope = if is_above(j) { others } else { -others };
+                for i in 0..n {
+                    mixture.by_weight[i * k + j] += slope * local.field[i];
+                }
+            }
+            for (size, v) in mixture.sizes.iter_mut().zip(&local.field) {
+                *size = size.max(v.abs());
+            }
+        }
+        mixture
+    }
+
+    /// Newton's method for a state and weights at which a mixture vanishes and the state lies on its surfaces; the least step where the equations
+    /// depend on each other.
+    fn settle(
+        &self,
+        config: &Configuration,
+        on: &[usize],
+        start: &[f64],
+        weights: &[f64],
+        dependent: f64,
+    ) -> Option<Zero> {
+        let (n, k) = (self.n, on.len());
+        let (mut x, mut weights) = (start.to_vec(), weights.to_vec());
         for _ in 0..MOST_ITERATIONS {
-            let local = self.local(config, None, &x);
-            let step = solve_any(&local.jacobian, &local.field, 0.0)?;
-            x.iter_mut().zip(&step).for_each(|(x, s)| *x -= s);
-            let settled = step.iter().zip(&self.widths).all(|(s, w)| s.abs() <= 1e-13 * w)
-                || step.iter().zip(&x).all(|(s, x)| s.abs() <= 4.0 * f64::EPSILON * x.abs());
-            if !x.iter().all(|v| v.is_finite()) {
+            let m = self.mixture(config, on, &x, &weights);
+            // Unknowns in widths of the box, equations in units of their own gradients.
+            let field = (0..n).map(|i| {
+                let row = (0..n).map(|j| m.local.jacobian[i * n + j] * self.widths[j]);
+                let row: Vec<f64> = row.chain(m.by_weight[i * k..][..k].iter().copied()).collect();
+                (row, m.local.field[i], m.sizes[i])
+            });
+            let surfaces = (0..k).map(|i| {
+                let row = (0..n).map(|j| m.gradients[i * n + j] * self.widths[j]);
+                (row.chain((0..k).map(|_| 0.0)).collect(), m.values[i], 0.0)
+            });
+            let step = least_step(field.chain(surfaces).collect(), dependent)?;
+            x.iter_mut().zip(&step.by).zip(&self.widths).for_each(|((x, s), w)| *x -= s * w);
+            weights.iter_mut().zip(&step.by[n..]).for_each(|(w, s)| *w -= s);
+            if !x.iter().chain(&weights).all(|v| v.is_finite()) {
                 return None;
             }
-            if settled {
-                if !self.is_its_own(config, &x, None) {
-                    return None;
-                }
-                let jacobian = self.local(config, None, &x).jacobian;
-                let eigenvalues = eigenvalues(&jacobian, self.n)?;
-                let moved: Vec<f64> = x.iter().zip(&self.widths).map(|(x, w)| x + 1e-9 * w).collect();
-                let other = self.local(config, None, &moved).jacobian;
-                let blur = jacobian.iter().zip(&other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-                let boundary = self.boundary(config, &x);
-                return Some(Rest { x, mode: config.mode, place: Place::Field, eigenvalues, blur, boundary });
+            let close =
+                |(s, (x, w)): (&f64, (&f64, &f64))| s.abs() <= 1e-13 || s.abs() * w <= 4.0 * f64::EPSILON * x.abs();
+            let settled = step.by.iter().zip(x.iter().zip(&self.widths)).all(close);
+            if settled && step.by[n..].iter().all(|s| s.abs() <= 1e-12) {
+                let open = step.open(n);
+                return (step.left_over <= 1e-9).then_some(Zero { x, weights, open });
             }
         }
         None
@@ -278,90 +499,260 @@ impl Search {
     /// The switching function that is zero at a state, to rounding, and on whose other side the equations are others.
     fn boundary(&self, config: &Configuration, x: &[f64]) -> Option<String> {
         let n = self.n;
-        let own = self.local(config, None, x);
-        let on = |guard: &usize| {
-            let local = self.local(config, Some(*guard), x);
+        let own = self.local(config, x);
+        let is_on = |guard: &usize| {
+            let (_, values, gradients) = self.with_guards(config, &[*guard], x);
             // The distance that the state is known to.
-            let reach: f64 = local.gradient.iter().zip(&self.widths).map(|(g, w)| (g * w).abs()).sum();
-            if self.equation.guards[*guard].whole || !(local.value.abs() <= 1e-12 * reach) {
+            let reach: f64 = gradients.iter().zip(&self.widths).map(|(g, w)| (g * w).abs()).sum();
+            if self.equation.guards[*guard].whole || !(values[0].abs() <= 1e-12 * reach) {
                 return false;
             }
             let mut other = config.clone();
             other.sides[*guard] = -config.sides[*guard];
-            let there = self.local(&other, None, x);
+            let there = self.local(&other, x);
             (0..n).any(|i| own.field[i] != there.field[i]) || (0..n * n).any(|i| own.jacobian[i] != there.jacobian[i])
         };
-        let guard = self.equation.compiled(config).active.iter().copied().find(|g| on(g))?;
+        let guard = self.equation.compiled(config).active.iter().copied().find(|g| is_on(g))?;
         Some(self.equation.guards[guard].expression.to_string())
     }
 
-    /// Newton's method for the state and the weight at once: a mixture of the fields that vanishes, and the switching function that does.
-    fn on_surface(&self, config: &Configuration, guard: usize, start: &[f64]) -> Option<Rest> {
-        let n = self.n;
-        let (mut low, mut high) = (config.clone(), config.clone());
-        (low.sides[guard], high.sides[guard]) = (-1.0, 1.0);
-        let (mut x, mut weight) = (start.to_vec(), 0.5);
-        for _ in 0..MOST_ITERATIONS {
-            let (a, b) = (self.local(&low, Some(guard), &x), self.local(&high, Some(guard), &x));
-            let m = n + 1;
-            let (mut matrix, mut right) = (vec![0.0; m * m], vec![0.0; m]);
-            for i in 0..n {
-                for j in 0..n {
-                    matrix[i * m + j] =
-                        a.jacobian[i * n + j] + weight * (b.jacobian[i * n + j] - a.jacobian[i * n + j]);
-                }
-                matrix[i * m + n] = b.field[i] - a.field[i];
-                right[i] = a.field[i] + weight * (b.field[i] - a.field[i]);
-                matrix[n * m + i] = a.gradient[i];
-            }
-            right[n] = a.value;
-            let step = solve_any(&matrix, &right, 0.0)?;
-            x.iter_mut().zip(&step).for_each(|(x, s)| *x -= s);
-            weight -= step[n];
-            if !x.iter().all(|v| v.is_finite()) {
-                return None;
-            }
-            let settled = step.iter().zip(&self.widths).all(|(s, w)| s.abs() <= 1e-13 * w) && step[n].abs() <= 1e-12;
-            if settled {
-                if !(weight > 0.0 && weight < 1.0) || !self.is_its_own(config, &x, Some(guard)) {
-                    return None;
-                }
-                return self.pseudo(&low, &high, guard, x, weight);
+    /// An isolated rest, with the linearised motion along its surfaces.
+    fn rest(&self, config: &Configuration, on: &[usize], zero: Zero) -> Option<Rest> {
+        let (n, k) = (self.n, on.len());
+        let Zero { x, weights, .. } = zero;
+        let m = self.mixture(config, on, &x, &weights);
+        // How fast the surfaces' functions change with the weights.
+        let mut normal = vec![0.0; k * k];
+        for i in 0..k {
+            for j in 0..k {
+                normal[i * k + j] = (0..n).map(|l| m.gradients[i * n + l] * m.by_weight[l * k + j]).sum();
             }
         }
-        None
-    }
-
-    fn pseudo(
-        &self,
-        low: &Configuration,
-        high: &Configuration,
-        guard: usize,
-        x: Vec<f64>,
-        weight: f64,
-    ) -> Option<Rest> {
-        let n = self.n;
-        let (a, b) = (self.local(low, Some(guard), &x), self.local(high, Some(guard), &x));
-        let jump: Vec<f64> = a.field.iter().zip(&b.field).map(|(a, b)| b - a).collect();
-        let normal: f64 = a.gradient.iter().zip(&jump).map(|(c, b)| c * b).sum();
-        if normal == 0.0 {
-            return None;
-        }
-        // Where the mixture vanishes, sliding is linearised by (1 - b c^T/(c^T b)) A: c has the eigenvalue 0, which is none of the surface.
-        let mixed: Vec<f64> = a.jacobian.iter().zip(&b.jacobian).map(|(a, b)| a + weight * (b - a)).collect();
-        let mut along = vec![0.0; n * n];
-        for j in 0..n {
-            let pull: f64 = (0..n).map(|i| a.gradient[i] * mixed[i * n + j]).sum();
+        // Where the mixture vanishes, sliding is linearised by (1 - B (C B)^-1 C) A: the rows of C have the eigenvalue 0, which is none of the surfaces.
+        let mut along = m.local.jacobian.clone();
+        for j in 0..if k > 0 { n } else { 0 } {
+            let pull = |i: usize| (0..n).map(|l| m.gradients[i * n + l] * m.local.jacobian[l * n + j]).sum::<f64>();
+            let shift = solve_any(&normal, &(0..k).map(pull).collect::<Vec<_>>(), 0.0)?;
             for i in 0..n {
-                along[i * n + j] = mixed[i * n + j] - jump[i] * pull / normal;
+                let kept: f64 = (0..k).map(|l| m.by_weight[i * k + l] * shift[l]).sum();
+                along[i * n + j] -= kept;
             }
         }
         let mut eigenvalues = eigenvalues(&along, n)?;
-        let size = |e: &[f64; 2]| e[0] * e[0] + e[1] * e[1];
-        let smallest = (0..n).min_by(|i, j| size(&eigenvalues[*i]).total_cmp(&size(&eigenvalues[*j])))?;
-        eigenvalues.remove(smallest);
-        let surface = self.equation.guards[guard].expression.to_string();
-        let place = Place::Surface { surface, weight, attracting: normal < 0.0 };
-        Some(Rest { x, mode: low.mode, place, eigenvalues, blur: 0.0, boundary: None })
+        let modulus = |e: &[f64; 2]| e[0] * e[0] + e[1] * e[1];
+        for _ in 0..k {
+            let smallest = (0..eigenvalues.len())
+                .min_by(|i, j| modulus(&eigenvalues[*i]).total_cmp(&modulus(&eigenvalues[*j])))?;
+            eigenvalues.remove(smallest);
+        }
+        let moved: Vec<f64> = x.iter().zip(&self.widths).map(|(x, w)| x + 1e-9 * w).collect();
+        let (blur, boundary) = match k {
+            0 => {
+                let other = self.local(config, &moved).jacobian;
+                let change = m.local.jacobian.iter().zip(&other).map(|(a, b)| (a - b).abs());
+                (change.fold(0.0, f64::max), self.boundary(config, &x))
+            }
+            _ => (0.0, None),
+        };
+        let name = |guard: &usize| self.equation.guards[*guard].expression.to_string();
+        let on = on.iter().zip(&weights).map(|(g, w)| On { surface: name(g), weight: *w }).collect();
+        let attracting = if k > 0 { attracts(&normal, k) } else { None };
+        Some(Rest { x, mode: config.mode, on, attracting, family: None, eigenvalues, blur, boundary })
     }
+
+    /// A rest that is not isolated; a curve of them is followed to its ends.
+    fn family(&self, config: &Configuration, on: &[usize], zero: Zero, dimension: usize) -> Option<Rest> {
+        if dimension > 1 {
+            let mut rest = self.rest(config, on, zero)?;
+            rest.family = Some(Family { dimension, ends: None, points: Vec::new() });
+            return Some(rest);
+        }
+        let first = zero.open.first()?.clone();
+        let mut points = vec![zero.x.clone()];
+        let mut closed = false;
+        for sign in [1.0, -1.0] {
+            if closed {
+                break;
+            }
+            let mut here = Zero { x: zero.x.clone(), weights: zero.weights.clone(), open: vec![first.clone()] };
+            let mut heading: Vec<f64> = first.iter().map(|d| sign * d).collect();
+            let mut side = Vec::new();
+            for _ in 0..MOST_STRIDES {
+                let ahead = |by: f64| {
+                    let (aim, weights) = self.moved(&here, &heading, by);
+                    let there = self.settle(config, on, &aim, &weights, DEPENDENT)?;
+                    let follows = self.distance(&there.x, &aim) <= 0.5 * by && self.is_valid(config, on, &there);
+                    (follows && !there.open.is_empty()).then_some(there)
+                };
+                let Some(next) = ahead(STRIDE) else {
+                    // The end: the last place from which the rest is still one.
+                    let (mut good, mut bad) = (0.0, STRIDE);
+                    while bad - good > 1e-13 {
+                        let middle = 0.5 * (good + bad);
+                        if ahead(middle).is_some() { good = middle } else { bad = middle }
+                    }
+                    side.extend(ahead(good).map(|z| z.x));
+                    break;
+                };
+                let direction = next.open.first()?;
+                let turn = if dot(direction, &heading) < 0.0 { -1.0 } else { 1.0 };
+                heading = direction.iter().map(|d| turn * d).collect();
+                side.push(next.x.clone());
+                closed = side.len() > 2 && self.distance(&next.x, &zero.x) < 0.6 * STRIDE;
+                here = next;
+                if closed {
+                    break;
+                }
+            }
+            points.reverse();
+            points.extend(side);
+        }
+        let middle = points[points.len() / 2].clone();
+        let ends = (!closed).then(|| [points[points.len() - 1].clone(), points[0].clone()]);
+        let ends =
+            ends.map(
+                |[a, b]| {
+                    if a.iter().zip(&b).find(|(a, b)| a != b).is_some_and(|(a, b)| a > b) { [b, a] } else { [a, b] }
+                },
+            );
+        let there = self.settle(config, on, &middle, &zero.weights, DEPENDENT)?;
+        let mut rest = self.rest(config, on, there)?;
+        rest.family = Some(Family { dimension, ends, points });
+        Some(rest)
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// The least step that solves linear equations.
+struct Step {
+    by: Vec<f64>,
+    /// Unit vectors that span the equations' rows.
+    span: Vec<Vec<f64>>,
+    /// By how much the equations that depend on others are not satisfied.
+    left_over: f64,
+}
+
+impl Step {
+    /// Directions along which no equation changes, orthogonal, with a unit vector as their first `n` components.
+    fn open(&self, n: usize) -> Vec<Vec<f64>> {
+        let (mut span, mut open) = (self.span.clone(), Vec::new());
+        let all = self.by.len();
+        while span.len() < all {
+            // The unit vector that is farthest from what is spanned.
+            let left = |i: usize| 1.0 - span.iter().map(|q| q[i] * q[i]).sum::<f64>();
+            let Some(i) = (0..all).max_by(|i, j| left(*i).total_cmp(&left(*j))) else { break };
+            let mut v: Vec<f64> = (0..all).map(|j| if i == j { 1.0 } else { 0.0 }).collect();
+            for _ in 0..2 {
+                for q in &span {
+                    let share = dot(&v, q);
+                    v.iter_mut().zip(q).for_each(|(v, q)| *v -= share * q);
+                }
+            }
+            let size = sqrt(dot(&v, &v));
+            v.iter_mut().for_each(|v| *v /= size);
+            let states = v[..n].to_vec();
+            let states = sqrt(dot(&states, &states));
+            if states > 1e-3 {
+                open.push(v.iter().map(|v| v / states).collect());
+            }
+            span.push(v);
+        }
+        open
+    }
+}
+
+/// The least solution of equations (row, right-hand side, size that rounding is measured by): rows are made orthogonal, the most independent first.
+fn least_step(mut rows: Vec<(Vec<f64>, f64, f64)>, dependent: f64) -> Option<Step> {
+    let all = rows.first()?.0.len();
+    let mut step = Step { by: vec![0.0; all], span: Vec::new(), left_over: 0.0 };
+    for (row, right, size) in &mut rows {
+        let norm = sqrt(dot(row, row));
+        if norm > 0.0 {
+            row.iter_mut().for_each(|v| *v /= norm);
+            *right /= norm;
+        } else if right.abs() > 1e-12 * *size {
+            return None;
+        } else {
+            *right = 0.0;
+        }
+    }
+    while !rows.is_empty() {
+        let size = |i: &usize| dot(&rows[*i].0, &rows[*i].0);
+        let farthest = (0..rows.len()).max_by(|i, j| size(i).total_cmp(&size(j)))?;
+        let (mut row, mut right, _) = rows.swap_remove(farthest);
+        let norm = sqrt(dot(&row, &row));
+        if norm.is_nan() {
+            return None;
+        }
+        if norm <= dependent {
+            step.left_over = rows.iter().map(|r| r.1.abs()).fold(right.abs(), f64::max);
+            break;
+        }
+        row.iter_mut().for_each(|v| *v /= norm);
+        right /= norm;
+        for (other, value, _) in &mut rows {
+            let share = dot(other, &row);
+            other.iter_mut().zip(&row).for_each(|(v, q)| *v -= share * q);
+            *value -= share * right;
+        }
+        step.by.iter_mut().zip(&row).for_each(|(s, q)| *s += right * q);
+        step.span.push(row);
+    }
+    Some(step)
+}
+
+/// Whether w' = D W w comes to zero for every diagonal matrix D > 0: `Some` if it does for all, or for none.
+fn attracts(w: &[f64], k: usize) -> Option<bool> {
+    let minor = |rows: &[usize]| {
+        let matrix: Vec<f64> = rows.iter().flat_map(|i| rows.iter().map(move |j| -w[i * k + j])).collect();
+        determinant(matrix, rows.len())
+    };
+    let all: Vec<usize> = (0..k).collect();
+    if minor(&all) < 0.0 {
+        // The product of the eigenvalues has the wrong sign, whatever D is.
+        return Some(false);
+    }
+    if k <= 2 {
+        let diagonal: Vec<f64> = (0..k).map(|i| -w[i * k + i]).collect();
+        let trace: f64 = diagonal.iter().sum();
+        return match diagonal.iter().all(|d| *d >= 0.0) && trace > 0.0 {
+            true => Some(true),
+            false if diagonal.iter().all(|d| *d <= 0.0) => Some(false),
+            false => None,
+        };
+    }
+    // W + W^T is negative definite: so is that of D^1/2 W D^1/2, which has the eigenvalues of D W.
+    let symmetric: Vec<f64> = (0..k * k).map(|p| -0.5 * (w[p] + w[p % k * k + p / k])).collect();
+    let leading = |m: usize| {
+        let part: Vec<f64> =
+            (0..m).flat_map(|i| (0..m).map(move |j| (i, j))).map(|(i, j)| symmetric[i * k + j]).collect();
+        determinant(part, m)
+    };
+    (1..=k).all(|m| leading(m) > 0.0).then_some(true)
+}
+
+/// The determinant of a matrix, row by row, by elimination.
+fn determinant(mut a: Vec<f64>, n: usize) -> f64 {
+    let mut product = 1.0;
+    for k in 0..n {
+        let Some(pivot) = (k..n).max_by(|i, j| a[i * n + k].abs().total_cmp(&a[j * n + k].abs())) else { break };
+        if pivot != k {
+            (0..n).for_each(|j| a.swap(k * n + j, pivot * n + j));
+            product = -product;
+        }
+        product *= a[k * n + k];
+        if product == 0.0 {
+            return 0.0;
+        }
+        for i in k + 1..n {
+            let factor = a[i * n + k] / a[k * n + k];
+            for j in k..n {
+                a[i * n + j] -= factor * a[k * n + j];
+            }
+        }
+    }
+    product
 }

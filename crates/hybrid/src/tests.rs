@@ -380,23 +380,22 @@ fn errors_point_into_the_file() {
 /// Equilibria, and pseudo-equilibria with the eigenvalues that a formula gives.
 #[test]
 fn rests_are_found_with_their_stability() {
-    use crate::rests::{Place, rests};
+    use crate::rests::rests;
     // Two foci and a saddle of a double well.
     let well = model("states = ['x', 'v']\nf = ['v', 'x - x^3 - 0.2*v']");
     let kinds: Vec<String> = rests(&well, &[(-2.0, 2.0); 2]).unwrap().iter().map(|r| r.kind()).collect();
     assert_eq!(kinds, ["stable focus", "saddle", "stable focus"]);
-    // Sliding on v = 0.2 with x' = 0.2: no rest. With the belt at rest every x within friction is one: none is isolated.
+    // Sliding on v = 0.2 with x' = 0.2: no rest there, but those of both fields, which are not on their own sides.
     let block = "states = ['x', 'v']\nf = ['v', '-x - sign(v - 0.2)']";
-    assert!(rests(&model(block), &[(-3.0, 3.0); 2]).unwrap().iter().all(|r| r.place == Place::Field));
+    assert!(rests(&model(block), &[(-3.0, 3.0); 2]).unwrap().iter().all(|r| r.on.is_empty()));
     // On x = 0: fields (1, y - 1) below and (-1, y + 3) above: halves cancel in x, so y' = y + 1, which vanishes at -1 and grows.
     let planar = model("states = ['x', 'y']\nf = ['-sign(x)', 'y + 1 + 2*sign(x)']");
     let found = rests(&planar, &[(-3.0, 3.0); 2]).unwrap();
     assert_eq!(found.len(), 1, "{found:?}");
     near(found[0].x[1], -1.0, 1e-12);
     near(found[0].eigenvalues[0][0], 1.0, 1e-9);
-    assert!(
-        matches!(&found[0].place, Place::Surface { surface, weight, attracting: true } if surface == "x" && (weight - 0.5).abs() < 1e-12)
-    );
+    assert_eq!((found[0].on[0].surface.as_str(), found[0].attracting), ("x", Some(true)));
+    near(found[0].on[0].weight, 0.5, 1e-12);
     assert!(rests(&model("states = ['x']\nf = ['sin(t)']"), &[(-1.0, 1.0)]).unwrap_err().to_string().contains("time"));
 }
 
@@ -1025,6 +1024,59 @@ fn stability_is_said_where_it_is_decided() {
     let double = kinds("states = ['x']\nf = ['x^2']", &[(-10.0, 10.0)]);
     assert!(double.iter().all(|k| k == "not decided by the linearised motion"), "{double:?}");
     assert_eq!(kinds("states = ['x']\nf = ['-0.001*x']", &[(-10.0, 10.0)]), ["stable node"]);
+}
+
+/// Rests that fill a curve are one row with its ends; those on several surfaces have the weights of a mixture, or of more dimensions.
+#[test]
+fn rests_on_curves_and_on_several_surfaces() {
+    use crate::rests::rests;
+    let find = |text: &str, half: f64, n: usize| rests(&model(text), &vec![(-half, half); n]).unwrap();
+    // A block within friction: x from -1/2 to 1/2 at v = 0, to which neighbours come; no row for the ends, which are zeros of a field.
+    let block = find("states = ['x', 'v']\nf = ['v', '-x - 0.5*sign(v)']", 3.0, 2);
+    let [stuck] = &block[..] else { panic!("{} rows", block.len()) };
+    let [from, to] = stuck.family.as_ref().unwrap().ends.as_ref().unwrap();
+    (near(from[0], -0.5, 1e-9), near(to[0], 0.5, 1e-9), near(stuck.x[1], 0.0, 1e-15));
+    assert_eq!(stuck.kind(), "stable: neighbours come to the set");
+    // The line x + y = 1, from one side of the box to the other, and the origin.
+    let line = find("states = ['x', 'y']\nf = ['-x*(1 - x - y)', '-y*(1 - x - y)']", 3.0, 2);
+    let [set] = &line.iter().filter(|r| r.family.is_some()).collect::<Vec<_>>()[..] else {
+        panic!("{} rows", line.len())
+    };
+    let [from, to] = set.family.as_ref().unwrap().ends.as_ref().unwrap();
+    (near(from[0], -2.0, 1e-9), near(to[0], 3.0, 1e-9), near(from[0] + from[1], 1.0, 1e-9));
+    assert_eq!(set.kind(), "unstable: neighbours leave the set");
+    assert_eq!(line.len(), 2);
+    // A circle of rests closes.
+    let ring = find("states = ['x', 'y']\nf = ['x*(1 - x^2 - y^2)', 'y*(1 - x^2 - y^2)']", 3.0, 2);
+    let closed = ring.iter().find_map(|r| r.family.clone()).unwrap();
+    assert_eq!((closed.dimension, closed.ends, ring.len()), (1, None, 2));
+    // A corner of two relays: -s + 0.3 = 0 and -u - 0.2 s = 0, so that s = 0.3 and u = -0.06; weights are (1 + s)/2.
+    let corner = find("states = ['x', 'y']\nf = ['-sign(x) + 0.3', '-sign(y) - 0.2*sign(x)']", 3.0, 2);
+    let [rest] = &corner[..] else { panic!("{} rows", corner.len()) };
+    (near(rest.on[0].weight, 0.65, 1e-12), near(rest.on[1].weight, 0.47, 1e-12));
+    assert_eq!((rest.kind().as_str(), rest.attracting), ("stable", Some(true)));
+    // Relays that work against each other: det W < 0 repels; of one that turns (W = [1, 4; -4, -2], det > 0) the speeds decide.
+    let saddle = find("states = ['x', 'y']\nf = ['-sign(x) - 2*sign(y)', '-2*sign(x) - sign(y)']", 3.0, 2);
+    assert_eq!(saddle.iter().map(|r| r.kind()).collect::<Vec<_>>(), ["unstable"]);
+    let open = find("states = ['x', 'y']\nf = ['sign(x) + 4*sign(y)', '-4*sign(x) - 2*sign(y)']", 3.0, 2);
+    assert_eq!(open[0].kind(), "decided by how fast each surface switches");
+    // A third state along the corner: z' = -z + s/2 - 0.4 u with s = 0.3 z, u = 0.1: z = -0.04/0.85, eigenvalue -0.85.
+    let edge = find(
+        "states = ['x', 'y', 'z']\nf = ['-sign(x) + 0.3*z', '-sign(y) + 0.1', '-z + 0.5*sign(x) - 0.4*sign(y)']",
+        3.0,
+        3,
+    );
+    let [rest] = &edge[..] else { panic!("{} rows", edge.len()) };
+    (near(rest.x[2], -0.04 / 0.85, 1e-12), near(rest.eigenvalues[0][0], -0.85, 1e-9));
+    // Two blocks that friction holds: a set of two dimensions on both surfaces, and curves where one of them slides against rest are none.
+    let blocks =
+        "states = ['x1', 'v1', 'x2', 'v2']\nf = ['v1', '-2*x1 + x2 - 0.5*sign(v1)', 'v2', 'x1 - 2*x2 - 0.5*sign(v2)']";
+    let held = find(blocks, 3.0, 4);
+    let sets: Vec<_> = held.iter().filter_map(|r| r.family.as_ref().map(|f| (r.on.len(), f.dimension))).collect();
+    assert!(sets.contains(&(2, 2)), "{sets:?}");
+    // In units a million times smaller.
+    let small = find("states = ['x', 'v']\nf = ['v', '-x - 0.5e-6*sign(v)']", 3e-6, 2);
+    near(small[0].family.as_ref().unwrap().ends.as_ref().unwrap()[1][0], 0.5e-6, 1e-15);
 }
 
 /// A pole is no zero, for events, sections and switches, wherever it is met together with others; a quotient has the sign of the product.

@@ -6,7 +6,7 @@ use twofold_analyse::path::MOST_POINTS;
 use twofold_hybrid::motion::sensitivity::sensitivities;
 use twofold_hybrid::motion::tangent::{Return, closed_orbit, exponents};
 use twofold_hybrid::motion::{Exit, Record};
-use twofold_hybrid::rests::{Place, rests};
+use twofold_hybrid::rests::rests;
 use twofold_hybrid::selection::Intersection;
 use twofold_hybrid::{Definition, Ending, Equation, HybridError, Model, Options, Point, follow, follow_watched};
 use twofold_integrate::Watch;
@@ -394,12 +394,24 @@ pub struct Resting {
     pub state: Vec<f64>,
     /// The mode's name.
     pub mode: String,
-    /// In a field or on a surface.
+    /// In a field or on surfaces.
     pub place: Standing,
+    /// The set that it belongs to, if it is not isolated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub family: Option<Family>,
     /// Real and imaginary parts.
     pub eigenvalues: Vec<[f64; 2]>,
     /// What its eigenvalues say: "attracts", "saddle" ...
     pub kind: String,
+}
+
+/// Rests that are not isolated.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Family {
+    /// The dimension of the set.
+    pub dimension: usize,
+    /// Both ends of a curve that has some.
+    pub ends: Option<[Vec<f64>; 2]>,
 }
 
 /// Where a motion rests.
@@ -414,6 +426,15 @@ pub enum Standing {
         weight: f64,
         /// Whether motion comes to the surface there.
         attracting: bool,
+    },
+    /// On several at once.
+    Intersection {
+        /// The switching functions.
+        surfaces: Vec<String>,
+        /// Of each, the share of the fields with the function above zero.
+        weights: Vec<f64>,
+        /// Whether motion comes to all of them, or leaves one; nothing if that depends on how fast each of them switches.
+        attracting: Option<bool>,
     },
     /// In a field, away from surfaces.
     Field,
@@ -437,12 +458,20 @@ impl Question for GeneralRests {
             .map(|rest| Resting {
                 state: rest.x.clone(),
                 mode: modes[rest.mode].name.clone(),
-                place: match &rest.place {
-                    Place::Field => Standing::Field,
-                    Place::Surface { surface, weight, attracting } => {
-                        Standing::Surface { surface: surface.clone(), weight: *weight, attracting: *attracting }
-                    }
+                place: match &rest.on[..] {
+                    [] => Standing::Field,
+                    [on] => Standing::Surface {
+                        surface: on.surface.clone(),
+                        weight: on.weight,
+                        attracting: rest.attracting == Some(true),
+                    },
+                    several => Standing::Intersection {
+                        surfaces: several.iter().map(|on| on.surface.clone()).collect(),
+                        weights: several.iter().map(|on| on.weight).collect(),
+                        attracting: rest.attracting,
+                    },
                 },
+                family: rest.family.as_ref().map(|f| Family { dimension: f.dimension, ends: f.ends.clone() }),
                 eigenvalues: rest.eigenvalues.clone(),
                 kind: rest.kind().to_owned(),
             })

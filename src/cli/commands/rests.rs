@@ -5,13 +5,14 @@ use serde_json::json;
 use crate::cli::general;
 use crate::cli::speak::{Delivery, deliver, try_delivery};
 use crate::cli::{CliError, Exit, ending};
-use crate::job::general::{GeneralRests, Resting, Standing};
+use crate::job::general::{Family, GeneralRests, Resting, Standing};
 use crate::job::{Executor, JobError, Question, encode};
 
 /// Find the rests of a system in a box: equilibria of its fields and pseudo-equilibria on its switching surfaces, with eigenvalues and stability.
 ///
-/// Newton's method starts at 400 places of the box; a rest that none of them leads to is not found. Systems with h, plus and minus are read as
-/// general ones; one with a table [second] is refused.
+/// Newton's method starts at up to 400 places of the box, for the fields and for every set of up to four switching surfaces; a rest that no start
+/// leads to is not found. Rests that fill a curve are one line, with its ends in the box. Systems with h, plus and minus are read as general ones;
+/// one with a table [second] is refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     twofold rests --system gene-switch --within x=0..2 --within y=0..2\n  \
@@ -85,7 +86,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 }
 
 fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
-    let state: Vec<String> = names.iter().zip(&rest.state).map(|(n, v)| format!("{n} = {v}")).collect();
+    let point = |state: &[f64]| -> String {
+        names.iter().zip(state).map(|(n, v)| format!("{n} = {v}")).collect::<Vec<_>>().join(", ")
+    };
     let mode = if with_mode { format!(", mode {}", rest.mode) } else { String::new() };
     let place = match &rest.place {
         Standing::Field => "equilibrium".to_owned(),
@@ -93,6 +96,29 @@ fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
             let moves = if *attracting { "attracts" } else { "repels" };
             format!("pseudo-equilibrium on {surface} = 0, which {moves} (weight {weight})")
         }
+        Standing::Intersection { surfaces, weights, attracting } => {
+            let moves = match attracting {
+                Some(true) => "which attract",
+                Some(false) => "which repel",
+                None => "whose speeds decide whether they attract",
+            };
+            let weights: Vec<String> = weights.iter().map(f64::to_string).collect();
+            format!(
+                "pseudo-equilibrium on {} = 0, {moves} (weights {})",
+                surfaces.join(" = 0 and "),
+                weights.join(", ")
+            )
+        }
+    };
+    let state = match &rest.family {
+        None => point(&rest.state),
+        Some(Family { dimension: 1, ends: Some([from, to]) }) => {
+            format!("every point of a curve from {} to {}, such as {}", point(from), point(to), point(&rest.state))
+        }
+        Some(Family { dimension: 1, ends: None }) => {
+            format!("every point of a closed curve, such as {}", point(&rest.state))
+        }
+        Some(Family { dimension, .. }) => format!("one of a set of {dimension} dimensions: {}", point(&rest.state)),
     };
     let values: Vec<String> = rest
         .eigenvalues
@@ -104,5 +130,5 @@ fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
         })
         .collect();
     let values = if values.is_empty() { String::new() } else { format!("; eigenvalues {}", values.join(", ")) };
-    format!("{place}{mode}: {}; {}{values}", state.join(", "), rest.kind)
+    format!("{place}{mode}: {state}; {}{values}", rest.kind)
 }
