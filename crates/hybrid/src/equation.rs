@@ -72,7 +72,7 @@ pub struct Compiled {
 /// A system's equations with its switching functions.
 #[derive(Debug)]
 pub struct Equation {
-    definition: Definition,
+    pub(crate) definition: Definition,
     values: BTreeMap<String, f64>,
     /// The switching functions, each once.
     pub guards: Vec<Guard>,

@@ -10,6 +10,7 @@ use twofold_num::Dual;
 use twofold_num::elementary::sqrt;
 use twofold_num::linear::{eigenvalues, solve_any};
 
+use crate::definition::{Direction, Event, When};
 use crate::equation::{Configuration, Equation, EquationError};
 use crate::model::Model;
 
@@ -52,6 +53,8 @@ pub struct Rest {
     pub blur: f64,
     /// The switching function that is zero at an equilibrium of a field: the equations change there, and eigenvalues are those of one side.
     pub boundary: Option<String>,
+    /// An event behind whose surface it lies: motion that comes from the other side is changed before. Only a start behind it comes to the rest.
+    pub behind: Option<String>,
 }
 
 impl Rest {
@@ -516,6 +519,21 @@ impl Search<'_> {
         Some(self.equation.guards[guard].expression.to_string())
     }
 
+    /// The first event of a mode whose condition holds at a state, or whose expression has passed zero there.
+    fn behind(&self, mode: usize, x: &[f64]) -> Option<String> {
+        let config = self.configuration(mode, x);
+        let passed = |when: &When| match when {
+            When::Becomes(condition) => self.equation.holds(condition, &config),
+            When::Zero(e, Direction::Up) => self.equation.value(e, 0.0, x) > 0.0,
+            When::Zero(e, Direction::Down) => self.equation.value(e, 0.0, x) < 0.0,
+            _ => false,
+        };
+        let events = self.equation.definition.events().iter();
+        let changes = |e: &&Event| e.stop || !e.set.is_empty() || e.mode.is_some_and(|m| m != mode);
+        let mut here = events.filter(|e| e.from.is_none_or(|m| m == mode)).filter(changes);
+        here.find(|e| passed(&e.when)).map(|e| e.name.clone())
+    }
+
     /// An isolated rest, with the linearised motion along its surfaces.
     fn rest(&self, config: &Configuration, on: &[usize], zero: Zero) -> Option<Rest> {
         let (n, k) = (self.n, on.len());
@@ -557,7 +575,8 @@ impl Search<'_> {
         let name = |guard: &usize| self.equation.guards[*guard].expression.to_string();
         let on = on.iter().zip(&weights).map(|(g, w)| On { surface: name(g), weight: *w }).collect();
         let attracting = if k > 0 { attracts(&normal, k) } else { None };
-        Some(Rest { x, mode: config.mode, on, attracting, family: None, eigenvalues, blur, boundary })
+        let behind = self.behind(config.mode, &x);
+        Some(Rest { x, mode: config.mode, on, attracting, family: None, eigenvalues, blur, boundary, behind })
     }
 
     /// A rest that is not isolated; a curve of them is followed to its ends.

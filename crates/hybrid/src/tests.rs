@@ -1074,6 +1074,10 @@ fn rests_on_curves_and_on_several_surfaces() {
     let held = find(blocks, 3.0, 4);
     let sets: Vec<_> = held.iter().filter_map(|r| r.family.as_ref().map(|f| (r.on.len(), f.dimension))).collect();
     assert!(sets.contains(&(2, 2)), "{sets:?}");
+    // A thermostat: each mode's rest lies behind the event that leaves it.
+    let thermostat = "states = ['T']\n[modes.on]\nf = ['30 - T']\n[modes.off]\nf = ['10 - T']\n[[event]]\nname = 'warm'\nwhen = 'T > 22'\nfrom = 'on'\nmode = 'off'\n[[event]]\nname = 'cold'\nwhen = 'T - 18'\ndirection = 'down'\nfrom = 'off'\nmode = 'on'";
+    let behind: Vec<_> = find(thermostat, 40.0, 1).into_iter().map(|r| r.behind.unwrap()).collect();
+    assert_eq!(behind, ["warm", "cold"]);
     // In units a million times smaller.
     let small = find("states = ['x', 'v']\nf = ['v', '-x - 0.5e-6*sign(v)']", 3e-6, 2);
     near(small[0].family.as_ref().unwrap().ends.as_ref().unwrap()[1][0], 0.5e-6, 1e-15);

@@ -403,6 +403,9 @@ pub struct Resting {
     pub eigenvalues: Vec<[f64; 2]>,
     /// What its eigenvalues say: "attracts", "saddle" ...
     pub kind: String,
+    /// An event that changes motion before it comes to the rest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub behind: Option<String>,
 }
 
 /// Rests that are not isolated.
@@ -473,7 +476,8 @@ impl Question for GeneralRests {
                 },
                 family: rest.family.as_ref().map(|f| Family { dimension: f.dimension, ends: f.ends.clone() }),
                 eigenvalues: rest.eigenvalues.clone(),
-                kind: rest.kind().to_owned(),
+                kind: rest.kind(),
+                behind: rest.behind.clone(),
             })
             .collect();
         Ok(Answer::of_tables(Vec::new()).with_fact("states", &self.model.coordinates()).with_fact("rests", &list))

@@ -130,5 +130,6 @@ fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
         })
         .collect();
     let values = if values.is_empty() { String::new() } else { format!("; eigenvalues {}", values.join(", ")) };
-    format!("{place}{mode}: {state}; {}{values}", rest.kind)
+    let behind = rest.behind.as_ref().map(|event| format!("; behind the event {event:?}, which changes motion before"));
+    format!("{place}{mode}: {state}; {}{values}{}", rest.kind, behind.unwrap_or_default())
 }
