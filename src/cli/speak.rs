@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::CliError;
+use super::exit::say_older_part;
 use crate::record;
 
 /// Prints text for people to standard output, and a newline.
@@ -64,7 +65,11 @@ pub struct Delivery {
 /// If it cannot be written.
 pub fn deliver(to: Option<&Path>, bytes: &[u8]) -> Result<(), CliError> {
     match to {
-        Some(file) if !is_standard_output(file) => Ok(record::write(file, bytes)?),
+        Some(file) if !is_standard_output(file) => {
+            record::write(file, bytes)?;
+            say_older_part(file);
+            Ok(())
+        }
         _ => print_bytes(bytes),
     }
 }

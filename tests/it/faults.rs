@@ -159,7 +159,11 @@ fn a_finished_file_replaces_its_predecessor_whole() {
     let output = twofold(&["run", "--quiet", "--t-end", "100", "--max-steps", "50", "--out", to]);
     refuses(&output, 3, &["50 steps were not enough", "t = ", "state ["]);
     assert_eq!(fs::read_to_string(&path).unwrap(), "old");
-    assert!(twofold(&["run", "--quiet", "--t-end", "1", "--out", to]).status.success());
+    // A run that finishes says that those rows are of another.
+    let finished = twofold(&["run", "--quiet", "--t-end", "1", "--out", to]);
+    assert!(finished.status.success());
+    let said = String::from_utf8(finished.stderr).unwrap();
+    assert!(said.contains("run.csv.part is of an earlier run that did not finish"), "{said}");
     let text = fs::read_to_string(&path).unwrap();
     assert!(text.contains("t,x,y,z\n0.0,0.2,0.0,-1.0\n") && text.ends_with('\n'), "{text}");
     // A longer predecessor leaves no rest.

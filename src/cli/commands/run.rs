@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::json;
 
 use crate::cli::ending;
-use crate::cli::exit::part_of;
+use crate::cli::exit::{part_of, say_older_part};
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::general;
 use crate::cli::progress::Progress;
@@ -149,8 +149,11 @@ fn general_run(arguments: &Arguments, run: &GeneralRun) -> Result<Exit, CliError
         rows.append_last(&encode::cut_short(stop))?;
     }
     let part = file.filter(|_| !whole).map(part_of);
-    if let Rows::File(file) = rows {
-        file.finish(part.as_deref())?;
+    if let Rows::File(rows) = rows {
+        rows.finish(part.as_deref())?;
+    }
+    if let Some(file) = file.filter(|_| whole) {
+        say_older_part(file);
     }
     let place = part.as_deref().map_or("standard output".to_owned(), |p| p.display().to_string());
     match (error, answer) {
@@ -320,8 +323,11 @@ fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, Cl
     rows.append_last(&tail)?;
     let stopped = if found.stop == Stop::Interrupted { progress.asked_to_stop() } else { None };
     let Some(exit) = stopped else {
-        if let Rows::File(file) = rows {
-            file.finish(None)?;
+        if let Rows::File(rows) = rows {
+            rows.finish(None)?;
+        }
+        if let Some(file) = file {
+            say_older_part(file);
         }
         return Ok(Exit::Fine);
     };

@@ -271,5 +271,13 @@ mod tests {
         says(stops, &at(3.0), &[], "before --t-end: give a time before it");
         let corner = "states = ['x', 'y']\nstart = [-1, -1]\nf = ['1 + 0.5*sign(x)', '1 + 0.5*sign(y)']";
         says(corner, &at(3.0), &[], "two surfaces are met at one moment");
+        // Thrown up to a ceiling that it just reaches, and a little faster: then the derivative is large, and one.
+        let up = |v: &str| {
+            format!(
+                "states = ['x', 'v']\nstart = [0, {v}]\nf = ['v', '-1']\n[[event]]\nwhen = 'x - 0.5'\ndirection = 'up'\nset = {{ v = '-v' }}"
+            )
+        };
+        says(&up("1"), &at(1.5), &[], "only touched (grazing)");
+        assert!(sensitivities(&model(&up("1.0001")), &at(1.5), &[]).is_ok());
     }
 }

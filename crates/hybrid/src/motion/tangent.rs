@@ -248,7 +248,7 @@ impl Follower<'_> {
             let in_time = gradient.pop().unwrap_or(0.0);
             let terms: f64 = gradient.iter().zip(&field).map(|(g, f)| (g * f).abs()).sum::<f64>() + in_time.abs();
             let speed: f64 = gradient.iter().zip(&field).map(|(g, f)| g * f).sum::<f64>() + in_time;
-            if !(speed.abs() > 1e-9 * terms) {
+            if !(speed.abs() > 1e-9 * terms) || self.only_touches(place, &gradient, &x, &field, speed) {
                 return Err(self.no_tangents(
                     "a surface is only touched (grazing), where neighbours have no common linear motion",
                 ));
@@ -271,6 +271,25 @@ impl Follower<'_> {
             // The field is continuous, or the time is fixed: nothing is met earlier or later by a neighbour.
             None => Before { field, gradient: vec![0.0; n], speed: 1.0 },
         }))
+    }
+
+    /// Whether motion that meets a surface at this speed turns back behind it by no more than rounding: the depth is speed^2/(2 acceleration).
+    fn only_touches(&self, place: usize, gradient: &[f64], x: &[f64], field: &[f64], speed: f64) -> bool {
+        // Sliding ends where its field meets a surface, which it may do as slowly as it likes.
+        if !self.sliding.is_empty() {
+            return false;
+        }
+        let n = self.n;
+        let size: f64 = gradient.iter().zip(&self.size).zip(x).map(|((g, s), x)| g.abs() * s.max(x.abs())).sum();
+        let shares = field.iter().zip(&self.size).zip(x).map(|((f, s), x)| f.abs() / s.max(x.abs()));
+        let ahead = 1e-6 / shares.filter(|s| s.is_finite()).fold(f64::MIN_POSITIVE, f64::max);
+        let mut there = self.variables.clone();
+        (0..n).for_each(|i| there[i] = x[i] + ahead * field[i]);
+        there[n] = self.t + ahead;
+        let mut next = vec![0.0; n];
+        self.compiled.field.evaluate(&there, &mut next);
+        let acceleration = (Self::along(&self.compiled, &there, &next)[place] - speed) / ahead;
+        speed * speed <= 2.0 * acceleration.abs() * 1e-14 * size
     }
 
     pub(super) fn no_tangents(&self, why: &str) -> HybridError {
