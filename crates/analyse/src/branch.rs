@@ -465,6 +465,19 @@ pub fn follow(
             Err(trouble) => {
                 step *= 0.5;
                 if step < SHORTEST * options.longest {
+                    if trouble.obstacle == Obstacle::Grazing
+                        && let Some((next, hop)) = behind_grazing(map, last, (&du, dp), &scales, options)
+                    {
+                        branch.bifurcations.extend(changes(map, last, &next, &scales, options.newton));
+                        let stop = !go_on(&next);
+                        branch.orbits.push(next);
+                        step = hop;
+                        if stop {
+                            branch.end = End::Interrupted;
+                            return branch;
+                        }
+                        continue;
+                    }
                     let missed = 4.0 * step * scales.parameter;
                     finish(map, &mut branch, trouble, missed, &scales);
                     return branch;
@@ -505,6 +518,34 @@ pub fn follow(
         }
     }
     branch
+}
+
+/// Steps over a grazing are at most so many shortest steps.
+const HOP: f64 = 64.0;
+
+/// The branch's next orbit, with the step to it, where the last lies so near to a grazing that its return map has no derivative: one with other
+/// events, behind the grazing, that is not farther from the guess than the step is long. None if there the branch ends.
+fn behind_grazing(
+    map: &dyn ReturnMap,
+    last: &Orbit,
+    (du, dp): (&[f64], f64),
+    scales: &Scales,
+    options: &BranchOptions,
+) -> Option<(Orbit, f64)> {
+    let shortest = SHORTEST * options.longest;
+    let hops = std::iter::successors(Some(2.0 * shortest), |s| Some(2.0 * s)).take_while(|s| *s <= HOP * shortest);
+    for hop in hops {
+        let guess: Vec<f64> = last.point.iter().zip(du).map(|(u, d)| u + hop * scales.state * d).collect();
+        let p = last.parameter + hop * scales.parameter * dp;
+        let inside = (p - options.from) * (options.to - p) >= 0.0;
+        let Ok(next) = arclength(map, &guess, p, (du, dp), scales, options.newton) else { continue };
+        let apart: f64 = next.point.iter().zip(&guess).map(|(a, b)| (a - b) / scales.state).map(|d| d * d).sum();
+        let off = (next.parameter - p) / scales.parameter;
+        if inside && next.events != last.events && sqrt(apart + off * off) <= hop {
+            return Some((next, hop));
+        }
+    }
+    None
 }
 
 /// Ends a branch where it cannot be followed.

@@ -51,7 +51,7 @@ pub struct Rest {
     pub eigenvalues: Vec<[f64; 2]>,
     /// By how much an eigenvalue may be off, the state being known to 1e-9 of the box: at a double root none has a sign.
     pub blur: f64,
-    /// The switching function that is zero at an equilibrium of a field: the equations change there, and eigenvalues are those of one side.
+    /// A further switching function that is zero there: the equations change, and eigenvalues are those of one side.
     pub boundary: Option<String>,
     /// An event behind whose surface it lies: motion that comes from the other side is changed before. Only a start behind it comes to the rest.
     pub behind: Option<String>,
@@ -180,9 +180,17 @@ pub fn rests(model: &Model, within: &[(f64, f64)]) -> Result<Vec<Rest>, RestErro
             }
         }
     }
-    // The end of a curve of rests is a zero of a field, too.
+    // The edge of a set of rests is a zero of a field, or of a mixture on fewer surfaces, too.
     let families: Vec<Rest> = found.iter().filter(|r| r.family.is_some()).cloned().collect();
-    found.retain(|r| r.boundary.is_none() || !families.iter().any(|f| f.mode == r.mode && search.passes(f, &r.x)));
+    found.retain(|r| {
+        let Some(boundary) = &r.boundary else { return true };
+        let is_edge_of = |f: &Rest| {
+            let on = |surface: &String| f.on.iter().any(|on| on.surface == *surface);
+            let may_be = f.mode == r.mode && on(boundary) && r.on.iter().all(|r| on(&r.surface));
+            may_be && f.family.as_ref().is_some_and(|family| family.dimension > 1 || search.passes(f, &r.x))
+        };
+        !families.iter().any(is_edge_of)
+    });
     found.sort_by(|a, b| {
         let by_state = a.x.iter().zip(&b.x).map(|(p, q)| p.total_cmp(q)).find(|o| o.is_ne());
         a.mode.cmp(&b.mode).then(by_state.unwrap_or(std::cmp::Ordering::Equal))
@@ -499,15 +507,15 @@ impl Search<'_> {
         None
     }
 
-    /// The switching function that is zero at a state, to rounding, and on whose other side the equations are others.
-    fn boundary(&self, config: &Configuration, x: &[f64]) -> Option<String> {
+    /// The switching function, none of those in `on`, that is zero at a state, to rounding, and on whose other side the equations are others.
+    fn boundary(&self, config: &Configuration, on: &[usize], x: &[f64]) -> Option<String> {
         let n = self.n;
         let own = self.local(config, x);
         let is_on = |guard: &usize| {
             let (_, values, gradients) = self.with_guards(config, &[*guard], x);
             // The distance that the state is known to.
             let reach: f64 = gradients.iter().zip(&self.widths).map(|(g, w)| (g * w).abs()).sum();
-            if self.equation.guards[*guard].whole || !(values[0].abs() <= 1e-12 * reach) {
+            if on.contains(guard) || self.equation.guards[*guard].whole || !(values[0].abs() <= 1e-12 * reach) {
                 return false;
             }
             let mut other = config.clone();
@@ -564,14 +572,13 @@ impl Search<'_> {
             eigenvalues.remove(smallest);
         }
         let moved: Vec<f64> = x.iter().zip(&self.widths).map(|(x, w)| x + 1e-9 * w).collect();
-        let (blur, boundary) = match k {
-            0 => {
-                let other = self.local(config, &moved).jacobian;
-                let change = m.local.jacobian.iter().zip(&other).map(|(a, b)| (a - b).abs());
-                (change.fold(0.0, f64::max), self.boundary(config, &x))
-            }
-            _ => (0.0, None),
+        let blur = if k == 0 {
+            let other = self.local(config, &moved).jacobian;
+            m.local.jacobian.iter().zip(&other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        } else {
+            0.0
         };
+        let boundary = self.boundary(config, on, &x);
         let name = |guard: &usize| self.equation.guards[*guard].expression.to_string();
         let on = on.iter().zip(&weights).map(|(g, w)| On { surface: name(g), weight: *w }).collect();
         let attracting = if k > 0 { attracts(&normal, k) } else { None };
@@ -606,7 +613,7 @@ impl Search<'_> {
                 let Some(next) = ahead(STRIDE) else {
                     // The end: the last place from which the rest is still one.
                     let (mut good, mut bad) = (0.0, STRIDE);
-                    while bad - good > 1e-13 {
+                    for _ in 0..60 {
                         let middle = 0.5 * (good + bad);
                         if ahead(middle).is_some() { good = middle } else { bad = middle }
                     }
