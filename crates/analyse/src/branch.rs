@@ -1243,6 +1243,44 @@ mod tests {
         }
     }
 
+    /// A fixed point x = p/2 whose loop grazes a surface at p = 1/2: within 1e-6 there is no derivative, and behind it is another event, or nothing.
+    struct Graze {
+        goes_on: bool,
+    }
+    impl ReturnMap for Graze {
+        fn states(&self) -> usize {
+            2
+        }
+        fn axis(&self) -> usize {
+            1
+        }
+        fn returned(&self, u: &[f64], p: f64, _: bool) -> Result<Returned, Trouble> {
+            if (p - 0.5).abs() < 1e-6 || p > 0.5 && !self.goes_on {
+                return Err(Trouble { obstacle: Obstacle::Grazing, said: "grazes".into() });
+            }
+            let (slope, events) = if p < 0.5 { (0.5, 1) } else { (-0.25, 2) };
+            let point = vec![0.5 * p + slope * (u[0] - 0.5 * p), 0.0];
+            Ok(Returned { events, ..once(point, vec![slope, 0.0, 0.0, 0.0]) })
+        }
+    }
+
+    #[test]
+    fn a_branch_goes_on_behind_a_grazing_if_there_is_more_of_it() {
+        for (from, to) in [(0.0, 1.0), (0.1, 0.9), (0.3, 0.500_01), (0.499, 0.6)] {
+            let options = BranchOptions { from, to, longest: 0.05, most: 200, newton: NEWTON };
+            for goes_on in [true, false] {
+                let map = Graze { goes_on };
+                let first = closed_orbit(&map, &[0.5 * from, 0.0], from, NEWTON).unwrap();
+                let branch = follow(&map, first, &options, &mut |_| true);
+                let [change] = &branch.bifurcations[..] else { panic!("{:?}", branch.bifurcations) };
+                assert!((change.parameter - 0.5).abs() <= change.uncertainty + 2e-6, "{change:?}");
+                let (kind, reached) = (change.change, branch.end == End::Reached);
+                let wanted = if goes_on { Change::DiscontinuityInduced } else { Change::Grazing };
+                assert_eq!((kind, reached), (wanted, goes_on), "{from} to {to}");
+            }
+        }
+    }
+
     #[test]
     fn a_doubling_is_found_on_a_curved_way_through_minus_one() {
         // The multiplier is -p^9: regula falsi without the Illinois variant's halving would take hundreds of trials.
