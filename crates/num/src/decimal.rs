@@ -1,4 +1,4 @@
-//! Numbers given in decimal, as people write them.
+//! Decimal numbers, kept with all digits that were written.
 
 use std::fmt;
 use std::str::FromStr;
@@ -18,7 +18,7 @@ pub struct Decimal {
     digits: Option<Arc<str>>,
 }
 
-/// A text that is not a decimal number, or not one that a [`Decimal`] can hold.
+/// Why a text is not a [`Decimal`]: not a number, not finite, or too long.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DecimalError {
     /// Not a number.
@@ -33,7 +33,7 @@ pub enum DecimalError {
 }
 
 impl Decimal {
-    /// Longest text of a number.
+    /// Maximum length of a number's text, in bytes.
     pub const MAX_DIGITS: usize = 100;
 
     /// The nearest `f64`.
@@ -133,7 +133,7 @@ impl<'de> Deserialize<'de> for Decimal {
     }
 }
 
-/// Numbers that can stand for a decimal number more exactly than `f64`.
+/// A number type that can represent a decimal number more exactly than `f64` does.
 pub trait FromDecimal {
     /// The decimal number, as exactly as the type can hold it.
     fn from_decimal(number: &Decimal) -> Self;

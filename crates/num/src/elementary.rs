@@ -51,7 +51,8 @@ pub fn exp(x: f64) -> f64 {
 /// `base` to the power `exponent` for step control: to about 1e-14 for a `base` that is not negative and an exponent between
 /// -1 and 1. Base 0 counts as 2^-1077; results are kept between 2^-1022 and 2^1023; NaN gives NaN.
 ///
-/// A step size wants no last digit, only the same one everywhere: this is several times cheaper than [`pow`].
+/// A step size need not be accurate to the last digit, only equal on every machine: this is several
+/// times cheaper than [`pow`].
 #[inline]
 pub fn rough_pow(base: f64, exponent: f64) -> f64 {
     kernels::rough_exp2(exponent * kernels::rough_log2(base))

@@ -1,11 +1,11 @@
-//! A number that is told what tanh is.
+//! A number whose tanh has a prescribed value.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use super::scalar::{Arithmetic, Elementary};
 
-/// A number in an equation whose every tanh has a value that is known beforehand, whatever its argument: how an equation looks at a given place
-/// in its layer.
+/// A number for which every tanh returns one prescribed value, whatever its argument: evaluates an
+/// equation at a given place in its layer.
 #[derive(Clone, Copy, Debug)]
 pub struct Given<T = f64> {
     value: T,

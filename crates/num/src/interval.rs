@@ -280,10 +280,10 @@ impl Interval {
         Self { lower: self.lower.min(other.lower), upper: self.upper.max(other.upper) }
     }
 
-    /// What both hold.
+    /// The set of all numbers that lie in both.
     ///
     /// # Errors
-    /// [`Error::Disjoint`] if that is nothing.
+    /// [`Error::Disjoint`] if no number does.
     pub fn intersection(self, other: Self) -> Result<Self, Error> {
         let (lower, upper) = (self.lower.max(other.lower), self.upper.min(other.upper));
         if lower <= upper { Ok(Self { lower, upper }) } else { Err(Error::Disjoint(self, other)) }

@@ -1,7 +1,8 @@
-//! Linear systems of a fixed small size, solved once, and eigenvalues.
+//! Solution of small linear systems, and eigenvalues of small matrices.
 //!
-//! Methods that solve many systems with one matrix, real or complex, keep its factors: see `integrate::linear`. Here nothing is kept, and
-//! the quotients are taken as they stand, so that both have their own last bits; published numbers rest on each.
+//! Methods that solve many systems with one matrix keep its factors: see `integrate::linear`. This
+//! module keeps none and divides instead of multiplying by reciprocals, so the last bits of the two
+//! differ; published numbers depend on both.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -36,7 +37,8 @@ pub fn solve<const N: usize>(
     Some(b)
 }
 
-/// The solution of a x = b for `n` equations, `a` row by row, as [`solve`] does it; for sizes that are known at run time only.
+/// The solution of a x = b for `n` equations by [`solve`]'s algorithm, `a` row by row, for a size
+/// known only at run time.
 pub fn solve_any(a: &[f64], b: &[f64], smallest: f64) -> Option<Vec<f64>> {
     let n = b.len();
     let (mut a, mut b) = (a.to_vec(), b.to_vec());

@@ -68,7 +68,7 @@ struct Reduced {
     argument: Option<Affine>,
 }
 
-/// Why an equation is no polynomial outside a layer. Said of a tape by [`Flow::new`].
+/// Why an equation is not a polynomial outside a layer: the error of [`Flow::new`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NotPolynomial {
     /// It has operations that are neither sums nor products.
@@ -175,8 +175,8 @@ const RECIPROCALS: [f64; LONG] = {
     table
 };
 
-/// Series being computed. Products are sums over two rows, one of them backwards, in eight lanes at a time: what lies beyond
-/// the degree reached is multiplied by zeros.
+/// Coefficients of the series while they are computed. Products are sums over two rows, one of them
+/// reversed, eight lanes at a time; coefficients beyond the degree reached are zero.
 #[derive(Clone, Debug)]
 pub struct Series {
     /// Row s: coefficients 0, 1, ... of series s.
@@ -186,7 +186,7 @@ pub struct Series {
 }
 
 impl Series {
-    /// Largest degree.
+    /// Maximum degree of a series.
     pub const MOST: usize = LONG - 1;
 
     /// The series of the state's `i`-th component, from the coefficient of degree 0 on.
@@ -218,10 +218,11 @@ pub struct Flow {
 }
 
 impl Flow {
-    /// The equation on `tape` with every tanh replaced by the number `tanh`.
+    /// Compiles the equation on `tape` with every tanh replaced by the number `tanh`.
     ///
     /// # Errors
-    /// If that is no polynomial, if there are tanh of two arguments, or if it is very long.
+    /// If the result is not a polynomial, if the tanh have different arguments, or if it has too
+    /// many terms.
     pub fn new(tape: &Tape, tanh: f64) -> Result<Self, NotPolynomial> {
         let reduced = Reduced::new(tape, tanh)?;
         let dimension = tape.variables();

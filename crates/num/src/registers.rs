@@ -14,10 +14,11 @@ use pulp::bytemuck::{Zeroable, cast_slice, cast_slice_mut};
 use super::elementary::kernels::{self, Pointwise, TANH_IS_ONE};
 use super::scalar::{Arithmetic, Elementary};
 
-/// The numbers in `K` registers of the instruction set `S`: more than one hides how long an operation takes behind its neighbours.
+/// The numbers in `K` registers of the instruction set `S`; with several registers the latency of
+/// one operation is hidden by the others.
 ///
-/// A constant ([`Arithmetic::from_f64`]) knows no instruction set, since it may be made where none has been chosen; it takes that of the
-/// number it is first combined with.
+/// A constant ([`Arithmetic::from_f64`]) has no instruction set, since it may be made before one is
+/// chosen; it takes that of the first number it is combined with.
 #[derive(Clone, Copy, Debug)]
 pub struct Registers<S: Simd, const K: usize> {
     set: Option<S>,
@@ -30,7 +31,7 @@ pub struct Registers<S: Simd, const K: usize> {
 #[repr(align(64))]
 pub struct Aligned<T>(pub T);
 
-/// Yes or no for each lane.
+/// A truth value for each lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Mask<S: Simd, const K: usize> {
     set: S,
@@ -38,7 +39,7 @@ pub struct Mask<S: Simd, const K: usize> {
 }
 
 impl<S: Simd, const K: usize> Registers<S, K> {
-    /// How many numbers.
+    /// Number of lanes.
     pub const WIDTH: usize = K * S::F64_LANES;
 
     /// The numbers in `parts`.
@@ -70,7 +71,7 @@ impl<S: Simd, const K: usize> Registers<S, K> {
         cast_slice::<_, f64>(&self.parts())[0]
     }
 
-    /// In every lane what was in the one after it; zero in the last.
+    /// Moves every lane's number to the lane before it; the last lane becomes zero.
     #[inline(always)]
     pub fn shifted(self, set: S) -> Self {
         let mut end = set.splat_f64s(0.0);
@@ -142,7 +143,7 @@ impl<S: Simd, const K: usize> Registers<S, K> {
         self
     }
 
-    /// Where this number is less than `other`; nowhere for NaN.
+    /// The lanes in which this number is less than `other`; false for NaN.
     #[inline(always)]
     pub fn less(self, other: Self, set: S) -> Mask<S, K> {
         let (a, b) = (self.with(set), other.with(set));
@@ -153,7 +154,7 @@ impl<S: Simd, const K: usize> Registers<S, K> {
         Mask { set, parts }
     }
 
-    /// Where this number is at most `other`; nowhere for NaN.
+    /// The lanes in which this number is at most `other`; false for NaN.
     #[inline(always)]
     pub fn at_most(self, other: Self, set: S) -> Mask<S, K> {
         let (a, b) = (self.with(set), other.with(set));
@@ -172,7 +173,7 @@ impl<S: Simd, const K: usize> Registers<S, K> {
 }
 
 impl<S: Simd, const K: usize> Mask<S, K> {
-    /// Where both hold.
+    /// The lanes in which both hold.
     #[inline(always)]
     pub fn and(mut self, other: Self) -> Self {
         for k in 0..K {
@@ -181,7 +182,7 @@ impl<S: Simd, const K: usize> Mask<S, K> {
         self
     }
 
-    /// Where either holds.
+    /// The lanes in which either holds.
     #[inline(always)]
     pub fn or(mut self, other: Self) -> Self {
         for k in 0..K {
@@ -190,7 +191,7 @@ impl<S: Simd, const K: usize> Mask<S, K> {
         self
     }
 
-    /// `yes` where this holds, else `no`.
+    /// `yes` in the lanes in which this holds, `no` in the others.
     #[inline(always)]
     pub fn select(self, yes: Registers<S, K>, no: Registers<S, K>) -> Registers<S, K> {
         let (mut yes, no) = (yes.with(self.set), no.with(self.set));
@@ -200,7 +201,7 @@ impl<S: Simd, const K: usize> Mask<S, K> {
         Registers::new(self.set, yes)
     }
 
-    /// Whether it holds anywhere.
+    /// Whether it holds in any lane.
     #[inline(always)]
     pub fn any(self) -> bool {
         let mut any = false;

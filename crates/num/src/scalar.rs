@@ -1,4 +1,4 @@
-//! What an equation may do with a number.
+//! The operations that an equation may apply to a number.
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -68,10 +68,11 @@ pub trait Arithmetic:
 
 /// A number as the equations see it: arithmetic and elementary functions, but no comparisons.
 ///
-/// Implemented by `f64`, by [`Dual`](super::Dual) (which carries derivatives), by power series, by extended-precision numbers
-/// and by numbers that only record what is done with them. An equation written once over `Elementary` therefore also gives its
-/// Jacobian, its Taylor coefficients and its high-precision value. It cannot branch on a value: what a
-/// recording holds at one point, it holds everywhere.
+/// Implemented by `f64`, by [`Dual`](super::Dual) (which carries derivatives), by power series, by
+/// extended-precision numbers and by symbolic numbers that record operations. An equation written
+/// once over `Elementary` therefore also gives its Jacobian, its Taylor coefficients and its
+/// high-precision value. It cannot branch on a value, so a recording made at one point is valid at
+/// all points.
 pub trait Elementary: Arithmetic {
     /// Hyperbolic tangent.
     fn tanh(self) -> Self;

@@ -1,4 +1,4 @@
-//! Equations as data: the operations of a function, written down once.
+//! Equations as data: a function recorded as a list of operations.
 //!
 //! A [`Tape`] holds a function of any number of variables as a list of operations with shared subterms. Constants and named
 //! parameters are operations of their own, so that extended precision can read them as the decimal numbers that they were given
@@ -132,7 +132,7 @@ impl PartialEq for Tape {
 }
 
 impl Tape {
-    /// Writes down what `function` does with `variables` numbers.
+    /// Records the operations that `function` applies to `variables` symbolic numbers.
     pub fn record(variables: usize, function: impl FnOnce(&[Recorded]) -> Vec<Recorded>) -> Self {
         let recorder = Recorder {
             tape: Tape { variables, operations: (0..variables).map(Operation::Variable).collect(), ..Tape::default() },
@@ -182,7 +182,7 @@ impl Tape {
         &self.outputs
     }
 
-    /// How many different tanh the function has.
+    /// Number of different tanh in the function.
     pub fn tanh_count(&self) -> usize {
         self.operations.iter().filter(|o| matches!(o, Operation::Tanh(_))).count()
     }
@@ -208,7 +208,8 @@ impl Tape {
         needed
     }
 
-    /// Each operation as a power of another: its base and exponent. What is no power has itself and 1.
+    /// Each operation as a power of another: base and exponent. An operation that is not a power
+    /// has itself and 1.
     pub fn powers(&self) -> Vec<(Node, u32)> {
         let mut powers: Vec<(Node, u32)> = Vec::with_capacity(self.operations.len());
         for (node, operation) in self.operations.iter().enumerate() {
@@ -322,7 +323,8 @@ fn record(operation: Operation) -> Recorded {
     RECORDER.with_borrow_mut(|recorder| Recorded { node: recorder.push(operation) })
 }
 
-/// A number that writes down what is done with it, on the tape that is being recorded. It has no value: an equation cannot look.
+/// A symbolic number: every operation on it appends an instruction to the tape being recorded. It
+/// holds no value, so an equation cannot branch on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Recorded {
     node: Node,
@@ -441,8 +443,8 @@ impl Elementary for Recorded {
     }
 }
 
-/// A tape written again, inside another recording: its function applied to recorded numbers, with parameters kept by name and only what is
-/// asked for.
+/// Replays a tape inside another recording: applies its function to symbolic numbers, keeps
+/// parameters by name, and records only the operations that are asked for.
 #[derive(Debug)]
 pub struct Replay<'a> {
     tape: &'a Tape,
@@ -463,7 +465,7 @@ impl<'a> Replay<'a> {
         Self { tape, values }
     }
 
-    /// The function's value number `i`.
+    /// Value `i` of the function.
     pub fn output(&mut self, i: usize) -> Recorded {
         self.node(self.tape.outputs[i])
     }
@@ -473,7 +475,7 @@ impl<'a> Replay<'a> {
         self.node(node)
     }
 
-    /// Gives an operation another value, for those that are written from here on.
+    /// Replaces the value of an operation, for all operations recorded after this call.
     pub fn set(&mut self, node: Node, value: Recorded) {
         self.values[node] = Some(value);
     }

@@ -1,9 +1,10 @@
 //! Sums of many products, eight side by side in vector registers.
 //!
-//! One after the other, every addition of double-double numbers waits for the one before. Here lane i adds the terms i, i + 8, i + 16, ... :
-//! their products' and partial sums' errors are known exactly (Dekker 1971, Knuth 1969) and are added up beside them, as in the algorithm Dot2 of Ogita,
-//! Rump & Oishi (2005), whose error is that of twice the working precision. There are eight lanes whatever the machine has, so the bits are the
-//! same everywhere.
+//! A sum of double-double numbers is a chain of dependent additions. Here lane i adds the terms i,
+//! i + 8, i + 16, ... : their products' and partial sums' errors are known exactly (Dekker 1971,
+//! Knuth 1969) and are added up beside them, as in the algorithm Dot2 of Ogita, Rump & Oishi
+//! (2005), whose error is that of twice the working precision. There are eight lanes whatever the
+//! machine has, so the bits are the same everywhere.
 
 // Loops by number over registers and lanes: iterators and closures may stay calls, compiled for the wrong instruction set.
 #![allow(clippy::needless_range_loop)]

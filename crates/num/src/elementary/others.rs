@@ -1,7 +1,8 @@
-//! The functions that are not our own (sine to powers, from `libm`), the root and the rough ones: how large their errors are, their frozen bits, what they
-//! give at the edges, their symmetries and their order. The oracle is double-double arithmetic (106 bits), and that is compared with 256 bits.
+//! Tests of the functions from `libm` (sine to powers), of the square root and of the rough
+//! functions: errors, frozen bits, values at the ends of the domain, symmetry and monotonicity. The
+//! reference is double-double arithmetic (106 bits), itself compared with 256 bits.
 //!
-//! `make elementary` runs the long ones: 2^24 points a function.
+//! `make elementary` runs the long tests: 2^24 points a function.
 
 use rayon::prelude::*;
 

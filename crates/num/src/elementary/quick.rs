@@ -1,11 +1,13 @@
-//! The hyperbolic tangent of one number, sooner: the kernel's bits after half of its wait.
+//! The hyperbolic tangent of one number by table look-up: the kernel's bits in half of its latency.
 //!
-//! An integration step waits for its tanh several times, and the kernel's operations wait for one another: a reduction, a polynomial, a quotient, and that
-//! quotient's correction. In a bundle of lanes other lanes fill that time; a number by itself has nothing to fill it with. Here it is looked up at the
-//! nearest multiple of 1/128, from where a short polynomial leads to it; that is another approximation of the same real number, with an error of
-//! its own. Where both errors together cannot change to which `f64` the sum is rounded, the kernel's result is known without the kernel (the rounding
-//! test of Ziv, ACM TOMS 17, 410 (1991)); elsewhere, in a few cases of a hundred, the kernel is asked. So the bits are the kernel's, and no figure depends on
-//! what is written here, unless a bound is wrong: `tests.rs` compares both, and the kernel's error with its bound.
+//! An integration step evaluates tanh several times, and the kernel is a chain of dependent
+//! operations: reduction, polynomial, quotient, correction. Lanes hide this latency; a single
+//! number does not. Here tanh is looked up at the nearest multiple of 1/128 and corrected by a
+//! short polynomial, which is a second approximation with an error of its own. Where both errors
+//! together cannot change the rounded `f64`, the kernel's result is known without evaluating it
+//! (the rounding test of Ziv, ACM TOMS 17, 410 (1991)); in the other few per cent of cases the
+//! kernel is evaluated. So the bits are always the kernel's, provided that the bounds hold:
+//! `tests.rs` compares both results, and the kernel's error with its bound.
 
 use super::super::DoubleDouble;
 use super::kernels;

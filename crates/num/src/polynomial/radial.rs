@@ -1,4 +1,5 @@
-//! Equations whose only products are with the squared distance from the origin, in the time that their coefficients wait for each other.
+//! Series of equations whose only products are with the squared distance from the origin, by
+//! relaxed products.
 //!
 //! The series of a product is wanted one degree at a time, and its newest coefficient is made of the newest of its factors; computed when it is wanted,
 //! it waits for all of them. Here it is computed before: as soon as x_k is known, its products with x_1, ..., x_k are added to the

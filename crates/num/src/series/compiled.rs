@@ -1,7 +1,8 @@
-//! Equations whose series are compiled.
+//! Series of equations that are compiled in advance.
 //!
-//! To go through a list of recurrences or instructions costs a jump for each, which takes about as long as what it does. One equation is known beforehand, the normal form of a two-fold with
-//! a pull towards it, smoothed (Jeffrey 2013, eqs (4), (5) and (8)):
+//! Interpreting a list of recurrences costs a jump for each, about as long as the recurrence
+//! itself. One equation is compiled in advance: the smoothed normal form of a two-fold with
+//! re-injection (Jeffrey 2013, eqs (4), (5) and (8)):
 //!
 //! ```text
 //! f- + (f+ - f-) phi,  phi = (1 + tanh(x/eps))/2
@@ -9,8 +10,9 @@
 //! f- = ( z, v-, 1 ) + (0, alpha - beta y, alpha - beta z) |x|^2
 //! ```
 //!
-//! Its recurrences and its plans are written down here, once, as lists that an equation is compared with and that are compiled too. What is none of them is
-//! gone through; the bits are the same, since either way each recurrence is [`begin`] and each instruction [`carry_out`].
+//! Its recurrences and plans are lists here: an equation is compared with them, and they are
+//! compiled. Other equations are interpreted, with the same bits, since both ways run each
+//! recurrence by [`begin`] and each instruction by [`carry_out`].
 
 use super::plan::{Action, Instruction, Saturated, begin, carry_out};
 use super::table::{ROW, Table};
@@ -41,7 +43,7 @@ pub(super) struct Compiled {
 }
 
 impl Compiled {
-    /// A plan as it is compiled, if it is.
+    /// The compiled form of a plan, if it has one.
     pub fn of(instructions: &[Instruction<f64>], derivatives: &[Series]) -> Option<Self> {
         let shape = Shape::of(instructions, derivatives)?;
         Some(Self { shape, numbers: numbers(instructions.iter().map(|given| (given.to, given.number()))) })
@@ -67,7 +69,7 @@ macro_rules! entry {
 macro_rules! opening {
     (dimension $dimension:literal outputs $outputs:tt { $($name:ident $arguments:tt -> $to:literal,)* }) => {
         impl Opening {
-            /// An equation's, if it is compiled.
+            /// The compiled form of an equation, if it has one.
             pub fn of(dimension: usize, recurrences: &[Recurrence<f64>], outputs: &[Series]) -> Option<Self> {
                 let mut given = recurrences.iter();
                 let same = dimension == $dimension && outputs == $outputs

@@ -1,4 +1,4 @@
-//! Every recurrence at every degree as it is written in the books, one after the other: what a plan is measured against.
+//! Reference implementation for tests: every recurrence at every degree, as in the literature.
 
 use super::plan::start_of;
 use super::*;

@@ -1,9 +1,10 @@
-//! The work of the degrees from 1 on, made lean once an equation.
+//! A plan: the instructions of one equation for all degrees from 1 on.
 //!
-//! A recurrence says how all coefficients of a series come about. From degree 1 on, much of that is idle: a constant summand has no say any more, sums and
-//! products of what is constant are zero, a product with what is constant is a scaling. A [`Plan`] is a list of instructions without that, in which a
-//! number goes from one instruction to the next without a way through memory. Where `tanh` is saturated, its series is constant too; there
-//! is a plan for every set of saturated ones that occurs.
+//! A recurrence gives all coefficients of a series. From degree 1 on parts of it are trivial:
+//! constant summands vanish, sums and products of constants are zero, a product with a constant is
+//! a scaling. A [`Plan`] omits these, and passes numbers from one instruction to the next without
+//! storing them. The series of a saturated `tanh` is constant too; there is a plan for each set of
+//! saturated `tanh` that occurs.
 //!
 //! Nothing is reassociated: every coefficient has the bits that its recurrence gives it (if all are finite; an overflow in a series that drops out of the equation,
 //! as in (1 + a) - (2 + a), drops out with it).

@@ -1,4 +1,4 @@
-//! Where the coefficients of all series are while they are computed.
+//! Storage for the coefficients of all series while they are computed.
 
 use super::Series;
 use super::plan::{Plan, advance};

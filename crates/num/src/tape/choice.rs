@@ -1,9 +1,10 @@
 //! Which operations of a tape become one instruction of a program.
 //!
-//! To look an instruction up, and to write and read what is between two, takes longer than most operations. So an instruction does as many as
-//! one of the patterns below holds, the largest first, from the last operation back to the first (*maximal munch*: Cattell 1980). An operation
-//! goes into another one's instruction only if nothing else uses what it gives; each rounds by itself, and operands keep their order, so that
-//! no bit depends on what is chosen.
+//! Dispatching an instruction and storing its result takes longer than most operations. So one
+//! instruction performs all operations of one of the patterns below, the largest pattern first,
+//! from the last operation back to the first (*maximal munch*: Cattell 1980). An operation is
+//! merged into another's instruction only if nothing else uses its result; each operation rounds by
+//! itself and operands keep their order, so no bit depends on the choice.
 
 use super::{Node, Operation, Tape};
 

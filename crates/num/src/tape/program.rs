@@ -100,7 +100,7 @@ impl Program {
         self.code.len()
     }
 
-    /// Whether the two differ in numbers alone.
+    /// Whether the two programs differ only in their numbers.
     pub fn is_like(&self, other: &Self) -> bool {
         let operation = |i: &Instruction| (i.code, i.to, i.a, i.b, i.c);
         let place = |output: &Output| match output {
@@ -112,7 +112,8 @@ impl Program {
             && self.outputs.iter().map(place).eq(other.outputs.iter().map(place))
     }
 
-    /// Two numbers for each instruction, then one for each value; 0 where there is none.
+    /// The program's numbers: two for each instruction, then one for each value; 0 where there is
+    /// none.
     pub fn numbers(&self) -> Vec<f64> {
         let of_value = |output: &Output| match output {
             Output::Register(_) => 0.0,

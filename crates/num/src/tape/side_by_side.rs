@@ -1,6 +1,7 @@
 //! A program at many points at once: every instruction once for all lanes of vector registers.
 //!
-//! Looking up what an instruction does takes longer than doing it; here that is paid once for as many points as there are lanes.
+//! Dispatching an instruction takes longer than executing it; here one dispatch serves as many
+//! points as there are lanes.
 
 // Loops by number over registers: iterators and closures may stay calls, compiled for the wrong instruction set.
 #![allow(clippy::needless_range_loop)]
@@ -42,8 +43,9 @@ impl<S: Simd, const K: usize> Numbers<S, K> for OfLanes<'_, S, K> {
 }
 
 impl Program {
-    /// How many bundles of registers an evaluation wants for its results: a power of two. Whoever evaluates keeps them: to clear them at each evaluation
-    /// was a tenth of an ensemble's time.
+    /// Number of register bundles that an evaluation needs for its results: a power of two. The
+    /// caller keeps them, since clearing them at each evaluation takes a tenth of an ensemble's
+    /// time.
     pub fn scratch_len(&self) -> usize {
         self.registers.max(self.variables).next_power_of_two()
     }
@@ -62,7 +64,8 @@ impl Program {
         self.evaluate_with(set, x, Own, scratch)
     }
 
-    /// The same with other numbers in each lane, those of [`Program::numbers`] in their order: in every lane the bits of the program that has them.
+    /// The same with different numbers in each lane, in the order of [`Program::numbers`]: each
+    /// lane has the bits of the program with its numbers.
     #[inline(always)]
     pub fn evaluate_with_numbers<S: Simd, const K: usize, const N: usize>(
         &self,
