@@ -1,11 +1,13 @@
-//! Equations that are one function with other numbers in it: what a sweep over a parameter makes, and what can still be evaluated side by side.
+//! Equations that differ only in numbers, as in a sweep over a parameter, and can be evaluated side
+//! by side.
 
 use super::{BoundField, VectorField};
 use twofold_num::{Aligned, Simd};
 
-/// The equations of several runs, which are done with the same operations.
+/// The equations of several runs that consist of the same operations.
 ///
-/// Any [`VectorField`] is such: every run's. Where runs differ in the values of their parameters, [`ParameterBatch`] is.
+/// A [`VectorField`] is one: all runs share it. [`ParameterBatch`] serves runs that differ in the
+/// values of parameters.
 pub trait BatchedField<const N: usize>: Sync {
     /// One run's.
     type One: VectorField<N>;

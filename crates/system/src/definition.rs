@@ -50,13 +50,13 @@ use twofold_num::{Arithmetic, Decimal};
 
 pub use super::document::{About, Bounds};
 
-/// Most states of a system.
+/// Maximum number of states of a system.
 pub const MAX_STATES: usize = 16;
-/// Most parameters, and most intermediate terms.
+/// Maximum number of parameters, and of intermediate terms.
 pub const MAX_NAMES: usize = 100;
-/// Longest file, in bytes.
+/// Maximum length of a file, in bytes.
 pub const MAX_FILE: usize = 100_000;
-/// Most operations of h, f+ and f- together.
+/// Maximum number of operations in h, f+ and f- together.
 pub const MAX_OPERATIONS: usize = 10_000;
 
 /// A piecewise-smooth system x' = f+(x) where h(x) > 0, x' = f-(x) where h(x) < 0, as expressions. See the [module](self).
@@ -109,7 +109,7 @@ pub struct ParameterDefinition {
     pub value: Decimal,
     /// Its meaning and unit.
     pub about: About,
-    /// What its values must be.
+    /// The range of values that it may have.
     pub bounds: Bounds,
 }
 

@@ -1,4 +1,4 @@
-//! The outer form of a system: the fields of a file, not yet understood.
+//! The outer form of a system: the fields of a file, not yet parsed.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -102,7 +102,7 @@ pub struct ParameterEntry {
     pub value: Decimal,
     /// Its meaning and unit.
     pub about: About,
-    /// What its values must be.
+    /// The range of values that it may have.
     pub bounds: Bounds,
 }
 

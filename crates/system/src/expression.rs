@@ -28,13 +28,13 @@ use std::ops::Range;
 use super::diagnostic::nearest;
 use twofold_num::{Decimal, Elementary};
 
-/// Longest expression, in bytes.
+/// Maximum length of an expression, in bytes.
 pub const MAX_LENGTH: usize = 4096;
-/// Most operations, numbers and names in an expression.
+/// Maximum number of operations, numbers and names in an expression.
 pub const MAX_TERMS: usize = 1000;
-/// Deepest nesting of parentheses, signs and exponents.
+/// Maximum nesting of parentheses, signs and exponents.
 pub const MAX_DEPTH: usize = 64;
-/// Largest exponent, either way.
+/// Maximum modulus of an exponent.
 pub const MAX_EXPONENT: i32 = 64;
 
 /// A function of one argument.
@@ -351,7 +351,7 @@ impl Expression {
         }
     }
 
-    /// The value, given what names and numbers stand for.
+    /// The value, with `name` giving the value of each name and `number` that of each number.
     pub fn evaluate<S: Elementary>(&self, name: &mut dyn FnMut(&str) -> S, number: &dyn Fn(&Decimal) -> S) -> S {
         match self {
             Expression::Number(n) => number(n),

@@ -1,4 +1,4 @@
-//! f+ and f- hold on their own sides of h = 0 only, where the sign of h is known.
+//! Replaces sign(h) by 1 in f+ and by -1 in f-.
 //!
 //! Friction is often written with `sign(v)` in both fields though h = v is the switching function itself. Taken literally, the jump would stay in the smoothed
 //! system, and sliding on it would be steps of no length; and at h = 0 neither field would have its limit. So in f+ the sign of h is 1, and in f- it is -1.

@@ -1,4 +1,5 @@
-//! Where an equation has no value, or is not smooth: which of its operations is to blame, in the words of its file.
+//! Names the operation at which an equation is undefined or not smooth, in the notation of its
+//! file.
 
 use std::sync::Arc;
 
@@ -78,7 +79,8 @@ fn product(a: Expression, b: Expression) -> Expression {
     }
 }
 
-/// What has no value in the state `x`, in words: the first operation whose arguments have one and that has none itself.
+/// The first operation that is undefined in the state `x` although its arguments are defined, as
+/// text.
 pub fn undefined(tape: &Tape, x: &[f64]) -> Option<String> {
     let (values, needed) = (tape.values(x), tape.needed());
     let sound = |node: &Node| values[*node].is_finite();

@@ -41,7 +41,8 @@ pub(super) fn blend<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(
     blended
 }
 
-/// f- + (f+ - f-) phi for a number phi that is given, whatever the state: what a switch that is decided elsewhere makes of a system.
+/// f- + (f+ - f-) phi for a prescribed number phi: the field of a system whose switch is decided
+/// elsewhere.
 #[derive(Clone, Copy, Debug)]
 pub struct Blended<'a, P> {
     /// The piecewise-smooth system.
