@@ -1,9 +1,11 @@
 //! Many independent runs at once, of one equation or of equations that differ in numbers alone ([`ParameterBatch`](twofold_system::ParameterBatch)), side by side
 //! in the lanes of vector registers, by Dormand-Prince 5(4).
 //!
-//! Each lane has its own time, step size, schedule and end, takes and refuses steps by itself, and is given the next run when its own has
-//! come to an end. So what comes of a run does not depend on its neighbours, on the number of lanes, or on the machine: it is bit for bit
-//! what [`drive`](super::drive) makes of it with [`Guarded`](super::Guarded) [`Dopri5`], because every operation is the same one in the same order (tests/it/ensemble.rs).
+//! Each lane has its own time, step size, schedule and end, accepts and rejects steps by itself,
+//! and receives the next run when its own has ended. A run's result does not depend on its
+//! neighbours, on the number of lanes, or on the machine: it is bit for bit that of
+//! [`drive`](super::drive) with [`Guarded`](super::Guarded) [`Dopri5`], because every operation is
+//! the same, in the same order (tests/it/ensemble.rs).
 //!
 //! The instruction set is chosen when the program runs ([`InstructionSet`]). It decides how many lanes an instruction takes and nothing else:
 //! no operation is fused, none reordered.
@@ -26,21 +28,21 @@ use twofold_num::elementary::sqrt;
 use twofold_num::{Aligned, Arithmetic, Mask, Registers};
 use twofold_system::{BatchedField, VectorField};
 
-/// A start and what is to happen from there.
+/// One run of an ensemble: its start and its options.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnsembleRun<const N: usize> {
     /// The state at time 0.
     pub start: SVector<f64, N>,
-    /// How far and by what rules.
+    /// End time, schedule and bounds on steps.
     pub options: DriveOptions,
 }
 
 /// How one run ended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct End<O, const N: usize> {
-    /// What [`drive`](super::drive) gives.
+    /// The summary, as [`drive`](super::drive) returns it.
     pub summary: Result<Summary<N>, Failure>,
-    /// The run's observer, with what it has seen.
+    /// The run's observer, after the run.
     pub observer: O,
 }
 
@@ -54,7 +56,7 @@ pub struct SectionPlane {
     pub value: f64,
 }
 
-/// The local errors that runs side by side may make.
+/// Tolerances of the local error, shared by all runs or one for each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerances<'a> {
     /// The same in all.
@@ -72,27 +74,28 @@ impl Tolerances<'_> {
     }
 }
 
-/// What is asked of runs side by side besides their equations and courses.
+/// Options of an ensemble besides the equations and the runs' own options.
 #[derive(Clone, Copy)]
 pub struct Common<'a, const N: usize> {
-    /// The local errors that they may make.
+    /// Tolerances of the local error.
     pub tolerances: Tolerances<'a>,
-    /// What the observers look at; without one they hear of kicks alone.
+    /// The plane that observers watch; without one they receive kicks only.
     pub plane: Option<SectionPlane>,
     /// A corner for each run, which ends as if its observer had stopped it ([`StopReason::Observer`]) at the first step's end where each component of
     /// the state is above the corner's.
     pub corners: Option<&'a [SVector<f64, N>]>,
     /// A vector that each run carries along, as part of its state.
     pub carried: Option<Carried<'a>>,
-    /// Is asked now and then whether to go on; if not, runs that have not come to their end are given up.
+    /// Asked at intervals whether to go on; if not, unfinished runs are abandoned.
     pub watch: &'a dyn Watch,
 }
 
-/// A vector that runs carry along, a tangent vector of their orbits: the components of the state from `first` on. It grows and shrinks without end, so
-/// it is brought to length 1 again where that is needed (Benettin, Galgani, Giorgilli & Strelcyn 1980), and the method starts anew. Observers hear of it.
+/// A tangent vector that each run carries: the components of the state from `first` on. When its
+/// length leaves `range` it is renormalised to 1 (Benettin, Galgani, Giorgilli & Strelcyn 1980),
+/// the method restarts, and observers are told.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Carried<'a> {
-    /// Which is the first of its components.
+    /// Index of its first component.
     pub first: usize,
     /// The least and the greatest length that a step may leave it with.
     pub range: [f64; 2],
@@ -107,7 +110,7 @@ impl Carried<'_> {
     }
 }
 
-/// The instructions that lanes are computed with.
+/// The instruction set in which lanes are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstructionSet {
     /// What the program was compiled for, one lane.
@@ -119,10 +122,10 @@ pub enum InstructionSet {
 }
 
 impl InstructionSet {
-    /// Every one, those of other machines too.
+    /// All instruction sets, including those of other machines.
     pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
 
-    /// Whether this machine has it.
+    /// Whether this machine supports it.
     pub fn is_here(self) -> bool {
         match self {
             Self::Portable => true,
@@ -135,7 +138,7 @@ impl InstructionSet {
         }
     }
 
-    /// The fastest one here.
+    /// The fastest instruction set of this machine.
     pub fn best() -> Self {
         let widest = [Self::Avx512, Self::Avx2];
         widest.into_iter().find(|set| set.is_here()).unwrap_or(Self::Portable)
@@ -144,8 +147,9 @@ impl InstructionSet {
 
 /// The ends of `runs`, in their order, computed with the fastest instructions of this machine.
 ///
-/// Each run has an observer of its own, made by `observer` from the run's number. It hears of every kick, and of those steps only that may
-/// meet `plane`: of none without one. (Steps that certainly do not meet a plane tell a section nothing, and most do not.)
+/// Each run has its own observer, made by `observer` from the run's number. It receives every kick,
+/// and only those steps that may meet `plane`; without a plane it receives no steps. (Most steps
+/// certainly do not meet the plane, and are of no use to a section.)
 ///
 /// # Panics
 /// If `equations` are those of fewer runs than `runs`.
@@ -182,7 +186,8 @@ where
     ends.into_iter().flatten().collect()
 }
 
-/// [`ensemble_with`] that gives each run's number and end to `finished` as it comes to it: in an order that depends on the number of lanes.
+/// [`ensemble_with`] that passes each run's number and end to `finished` when the run ends: in an
+/// order that depends on the number of lanes.
 ///
 /// # Panics
 /// If `equations`, tolerances or corners are those of fewer runs than `runs`.
@@ -203,7 +208,8 @@ pub fn ensemble_watched<E, O, const N: usize>(
     }
 }
 
-/// [`ensemble_watched`] by vector instructions only: says `false`, and has computed nothing, on a machine that has none.
+/// [`ensemble_watched`] by vector instructions only: returns `false` and computes nothing on a
+/// machine without them.
 ///
 /// # Panics
 /// As there.

@@ -1,12 +1,15 @@
-//! Steps that jump over what they cannot see.
+//! Detection of structure that a step jumps over.
 //!
-//! A method looks at an equation at few places in a step. A transition function, an exponential or a resonance that rises and falls between them, where all that
-//! the method sees is flat, leaves no trace in its error estimate. [`Guarded`] looks at each accepted step's continuous extension: it bounds how
-//! far the arguments of all operations that can be flat far away and steep near by (gates) leave the chords between their values at the step's ends. Nearly
-//! always that shows that none of them comes near its steep part, that it hardly moves, or that it goes through once, and the step stands. Otherwise the step is searched by bisection, and where the
-//! right-hand side along the continuous extension is found outside what the method saw (its values at the step's ends and the extension's own derivative: the
-//! defect, Enright 1989) by more than the tolerance allows, the step is taken back. The method then ends a step where the structure begins and goes through it with
-//! short steps.
+//! A method evaluates an equation at few places in a step. A transition function, an exponential or
+//! a resonance that rises and falls between them leaves no trace in its error estimate. [`Guarded`]
+//! looks at each accepted step's continuous extension: it bounds how far the arguments of all
+//! operations that can be flat far away and steep near by (gates) leave the chords between their
+//! values at the step's ends. Nearly always that shows that none of them comes near its steep part,
+//! that it hardly moves, or that it goes through once, and the step stands. Otherwise the step is
+//! searched by bisection, and where the right-hand side along the continuous extension is found
+//! outside what the method saw (its values at the step's ends and the extension's own derivative:
+//! the defect, Enright 1989) by more than the tolerance allows, the step is taken back. The method
+//! then ends a step where the structure begins and goes through it with short steps.
 //!
 //! A step that stands is exactly the method's own.
 
@@ -600,13 +603,13 @@ impl Stages {
     }
 }
 
-/// A method whose last step can be looked at again.
+/// A method whose last step can be examined and taken back.
 pub trait Redoable<const N: usize>: Stepper<N> {
     /// The continuous extension of the last step, which there must have been since the last restart.
     fn last(&self) -> &dyn Interpolant<N>;
 }
 
-/// A method whose steps are looked at. See the [module](self).
+/// A method whose steps are examined. See the [module](self).
 #[derive(Clone, Debug)]
 pub struct Guarded<M, const N: usize> {
     method: M,

@@ -7,10 +7,11 @@ use super::taylor::Precision;
 use super::{Dopri5, Guarded, Layered, Lsoda, Radau5, Taylor};
 use twofold_num::MultiFloat;
 
-/// How many bits a number of [`Method::TaylorExtended`] can have: double-double numbers, then those of [`MultiFloat`].
+/// Precisions of [`Method::TaylorExtended`], in bits: double-double numbers, then those of
+/// [`MultiFloat`].
 pub const PRECISIONS: [u16; 2] = [106, 192];
 
-/// Numbers of more digits are compiled for equations of up to so many states: four and a hysteretic phi.
+/// Maximum number of states in extended precision: four and a hysteretic phi.
 pub const MOST_STATES: usize = 5;
 
 /// An integration method.
@@ -32,7 +33,7 @@ pub enum Method {
     Layered,
 }
 
-/// Something that can be done with any stepper. A trait, because a stepper's type depends on the method.
+/// A computation over any stepper. It is a trait because a stepper's type depends on the method.
 pub trait WithStepper<const N: usize> {
     /// What comes of it.
     type Answer;
@@ -57,7 +58,7 @@ impl Method {
         }
     }
 
-    /// Gives a fresh stepper of this method to `user`.
+    /// Makes a stepper of this method and passes it to `user`.
     pub fn with_stepper<U: WithStepper<N>, const N: usize>(self, tolerance: Tolerance, user: U) -> U::Answer {
         match self {
             Method::Lsoda => user.with(Guarded::new(Lsoda::new(tolerance), tolerance)),

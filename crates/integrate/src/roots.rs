@@ -89,7 +89,7 @@ pub struct CrossingFinder {
 }
 
 impl CrossingFinder {
-    /// Of an orbit that was last on the positive side, or on the other.
+    /// A finder for an orbit that starts on the positive side (`true`) or on the negative side.
     pub fn starting(positive: bool) -> Self {
         Self { side: if positive { 1.0 } else { -1.0 } }
     }

@@ -1,4 +1,4 @@
-//! What happens around a run at fixed times: restarts and kicks.
+//! Events at fixed times of a run: restarts and kicks.
 //!
 //! Noise and restarts are not kinds of system. They cut the time axis into segments; each segment is integrated as if
 //! it were a run of its own, which is what a loop around a solver does.
@@ -66,9 +66,9 @@ pub struct Kick {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Schedule {
-    /// Forget everything after each such interval.
+    /// Time between restarts, at which the method forgets its history.
     pub restart_every: Option<f64>,
-    /// Perturb the state after each such interval.
+    /// Kicks at fixed intervals.
     pub kick: Option<Kick>,
 }
 

@@ -33,7 +33,7 @@ use twofold_num::{DoubleDouble, FromDecimal, MultiFloat, Scalar, Tape};
 use twofold_system::VectorField;
 use twofold_system::singular::{written, written_sign};
 
-/// How far a step inside a layer may always move the argument of its tanh.
+/// Change of a tanh's argument that a step inside a layer may always make.
 pub const LAYER_STRIDE: f64 = 0.5;
 
 /// Jorba & Zou (2005), sec. 3: the step is shortened by exp(-0.7/(p - 1)) for safety.

@@ -1,11 +1,13 @@
-//! Switches with a past. A delayed one: x' = f- + (f+ - f-) phi(h(x(t - delay))/eps), and its limit eps -> 0, f+ while h(x(t - delay)) > 0 and
-//! f- otherwise. A relay with memory: f+ until h falls to -band, f- until it rises to band.
+//! Switches that depend on the past. Delayed: x' = f- + (f+ - f-) phi(h(x(t - delay))/eps), and its
+//! limit eps -> 0, f+ while h(x(t - delay)) > 0 and f- otherwise. A relay with memory: f+ until h
+//! falls to -band, f- until it rises to band.
 //!
 //! Jeffrey (2013), end of sec. 4.3, names the delay as a fourth way to resolve a discontinuity and leaves it out. The relay is the sharp form of the
 //! hysteresis there (Tsypkin 1984).
 //!
-//! - The sharp rule: between switches the motion is a smooth field's. An orbit's zeros of h are located on dense output, and each is a switch one delay
-//!   later: a queue of coming switches is all the past that is kept. Every switch ends a step.
+//! - The sharp rule: between switches the motion follows a smooth field. Zeros of h are located on
+//! dense output, and each causes a switch one delay later, so the only past that is kept is a queue
+//! of pending switches. Every switch ends a step.
 //! - The relay: the same with passages of the band's far edge, each of which is a switch at once.
 //! - The smooth rule: the method of steps (Bellman 1961; Hairer, Norsett & Wanner 1993, sec. II.17; Bellen & Zennaro 2003). No step is longer than the delay, so
 //!   that its stages ask only for a past that is known: the continuous extensions of the steps in the last delay. Where a jump of a derivative
@@ -38,7 +40,7 @@ use sharp::Sharp;
 use smooth::Smooth;
 pub use tangent::{Carry, Shift, TangentStepper, Varied, WithTangent};
 
-/// Where the orbit was before the start.
+/// The state before the start of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum History {
@@ -59,7 +61,7 @@ impl History {
     }
 }
 
-/// What a relay begins with inside its band, where both f+ and f- can hold.
+/// The field with which a relay begins inside its band, where both f+ and f- can hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Inside {
@@ -298,7 +300,7 @@ pub enum LateSwitch {
         delay: f64,
         /// The transition function and its eps; none: the sharp rule.
         smooth: Option<(Transition, f64)>,
-        /// Where the orbit was before the start.
+        /// The state before the start of a run.
         history: History,
     },
     /// A relay with memory: f+ until h falls to -band, f- until it rises to band.
@@ -322,8 +324,8 @@ pub struct Delayed<'a, P, const N: usize> {
 }
 
 impl<'a, P: PiecewiseSmooth<N> + Clone, const N: usize> Delayed<'a, P, N> {
-    /// Gives a stepper of this switch by `method` to `user`. `order` is the degree of extended series, where another is asked for than the tolerance
-    /// does.
+    /// Makes a stepper of this switch by `method` and passes it to `user`. `order` is the degree of
+    /// extended series; `None` takes the degree that the tolerance implies.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Parts of steps as polynomials, and the past made of them.
+//! Parts of steps as polynomials, and the history composed of them.
 
 use std::collections::VecDeque;
 

@@ -23,7 +23,7 @@ use twofold_system::{PiecewiseSmooth, Transition};
 #[derive(Clone, Copy, Debug)]
 pub struct Varied<'a, P>(pub &'a P);
 
-/// What a disturbance makes of one passage.
+/// The effect of a disturbance on one passage of the surface.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Shift {
     /// By how much later it comes.
@@ -42,7 +42,7 @@ impl Shift {
     }
 }
 
-/// What is carried along an orbit beside its state, the second half of the components.
+/// A quantity carried along an orbit beside its state: the second half of the components.
 pub trait Carry<const N: usize>: Sync {
     /// Of a passage of the surface at `x` under f+ or f-.
     fn shift(&self, x: &SVector<f64, N>, plus: bool) -> Shift;
@@ -152,7 +152,7 @@ pub trait TangentStepper<const M: usize>: Stepper<M> {
     fn shorten(&mut self, by: f64);
 }
 
-/// Something that can be done with any [`TangentStepper`].
+/// A computation over any [`TangentStepper`].
 pub trait WithTangent<const M: usize> {
     /// What comes of it.
     type Answer;

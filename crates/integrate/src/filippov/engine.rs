@@ -1,4 +1,4 @@
-//! The state machine: one mode after the other, decided at events.
+//! The state machine of Filippov motion: the mode is decided at each event.
 
 use std::sync::Arc;
 
@@ -39,7 +39,8 @@ where
     run_watched(system, x0, t_end, settings, rule, observer, &())
 }
 
-/// [`run`], reporting to `watch` how far it has come; where `watch` refuses, the run ends as [`StopReason::Watch`].
+/// [`run`], reporting its time to `watch`; when `watch` asks to stop, the run ends as
+/// [`StopReason::Watch`].
 ///
 /// # Errors
 /// See [`FilippovError`]; each names the time and the state.

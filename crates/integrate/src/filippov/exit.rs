@@ -1,4 +1,4 @@
-//! How repelling sliding ends: the choice that the equations do not make.
+//! Exit rules: how repelling sliding ends, which Filippov's equation leaves open.
 
 use serde::{Deserialize, Serialize};
 
@@ -134,11 +134,11 @@ impl std::fmt::Display for ExitRule {
 }
 
 impl ExitRule {
-    /// Whether the rule's numbers make sense; the message says what to change.
+    /// Checks the rule's numbers.
     ///
     /// # Errors
     ///
-    /// In words: which number is wrong and what it should be.
+    /// A message that names the wrong number and its allowed range.
     pub fn validate(&self) -> Result<(), String> {
         let positive = |name: &str, v: f64| {
             if v.is_finite() && v >= 0.0 {

@@ -197,7 +197,7 @@ impl<const N: usize, O: Observer<N>> FilippovObserver<N> for AllModes<'_, O> {
     }
 }
 
-/// How a run is made.
+/// Options of a Filippov run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FilippovOptions {
@@ -229,7 +229,7 @@ impl Default for FilippovOptions {
     }
 }
 
-/// How a run ended.
+/// The end of a Filippov run.
 #[derive(Clone, Debug, PartialEq)]
 #[must_use = "a run may have been cut short: look at `stop`"]
 pub struct FilippovSummary<const N: usize> {
@@ -251,7 +251,7 @@ impl<const N: usize> FilippovSummary<N> {
     /// This summary, unless the budget of steps ended the run.
     ///
     /// # Errors
-    /// [`Failure::TooManySteps`], for callers to whom a run cut short by its budget is worth nothing.
+    /// [`Failure::TooManySteps`] if the budget of steps ended the run.
     pub fn within_budget(self) -> Result<Self, FilippovError> {
         match self.stop {
             StopReason::StepBudget => {
@@ -363,9 +363,9 @@ pub enum FilippovError {
 pub struct Choice {
     /// Where the motion is.
     pub what: &'static str,
-    /// What may follow.
+    /// The possible continuations.
     pub continuations: Vec<String>,
-    /// What the one who asked can do.
+    /// What the user can do.
     pub remedy: &'static str,
 }
 

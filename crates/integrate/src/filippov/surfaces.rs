@@ -33,7 +33,8 @@ use twofold_system::{PiecewiseSmooth, VectorField, variables};
 /// negative.
 pub type Faces<P> = [[P; 2]; 2];
 
-/// Tables call a state that is nearer to a surface than this, relative to its size, on the surface.
+/// Distance from a surface, relative to the state's size, below which tables call a state on the
+/// surface.
 pub const INTERSECTION: f64 = 1e-9;
 
 /// Share of [`resolution`] within which a spiral has come to the intersection: nearer, a turn takes no time that matters.

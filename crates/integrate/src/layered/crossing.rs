@@ -247,8 +247,8 @@ pub(super) struct Collocation<'a, F, const N: usize> {
 struct In<T, const K: usize>(T);
 
 impl<F: VectorField<N>, const N: usize> Collocation<'_, F, N> {
-    /// Whether the crossing is now what was wanted, and the evaluations that it took; not if the orbit turns back, the iteration does not converge, or the
-    /// error is too large.
+    /// Solves for the crossing; returns whether it succeeded and the number of evaluations. It
+    /// fails if the orbit turns back, the iteration does not converge, or the error is too large.
     pub fn solve(self) -> (bool, u64) {
         // All parts are in one register, two, or one each.
         #[cfg(target_arch = "x86_64")]

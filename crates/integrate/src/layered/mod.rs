@@ -33,7 +33,7 @@ use twofold_num::polynomial::{Flow, NotPolynomial, Series};
 use twofold_num::{Given, Tape};
 use twofold_system::VectorField;
 
-/// How far a step in time inside the layer may move u.
+/// Largest change of u in one time step inside the layer.
 pub const STRIDE: f64 = 4.0;
 
 /// A step in time inside the layer ends there only when u is so far beyond the edge: else an orbit that follows the edge would change methods at
@@ -49,7 +49,7 @@ const HALVINGS: u32 = 5;
 /// Whether the equation on `tape` can be integrated by [`Layered`].
 ///
 /// # Errors
-/// Why not.
+/// The reason why it cannot.
 pub fn applicable(tape: &Tape) -> Result<(), NotPolynomial> {
     Flow::new(tape, 1.0).map(|_| ())
 }

@@ -1,9 +1,10 @@
 //! Steps in time inside a layer, with w = tanh u for a state.
 //!
-//! What an explicit method waits for inside a layer is tanh, once in every stage. But w' = (1 - w^2) u' with u' a sum of the field's components: with w
-//! beside x the equation is a polynomial (Kerner 1981), and a stage costs what it does outside. [`Dopri5`] on both has its order,
-//! and hardly another stability: across the layer w goes as u does. At each step's end w is tanh u again (a projection on the invariant w - tanh u, Hairer,
-//! Lubich & Wanner 2006, sec. IV.4), so that it is no second truth: its error within a step is the step's.
+//! Inside a layer the cost of an explicit method is one tanh a stage. But w' = (1 - w^2) u' with u'
+//! a sum of the field's components: with w beside x the equation is a polynomial (Kerner 1981), and
+//! a stage costs what it does outside. [`Dopri5`] on both keeps its order and nearly its stability.
+//! At each step's end w is set to tanh u (a projection on the invariant w - tanh u, Hairer, Lubich
+//! & Wanner 2006, sec. IV.4), so that errors of w do not accumulate.
 //!
 //! Along an orbit that is held in the layer u hardly moves in a step. Where it does, and near the edge, where 1 - w^2 grows like an exponential,
 //! w would need shorter steps than x: there each stage takes its own tanh.

@@ -15,14 +15,15 @@
 //! | `correction` | ACOR |
 //! | `lipschitz` | PDEST, PDLAST: the Lipschitz constant seen by the iteration |
 //!
-//! Errors are measured in the norm max_i |e_i| / (rtol |x_i| + atol). The dense output is the Nordsieck polynomial of the
-//! step just made. The end of the run is a wall (ODEPACK's ITASK 4 and 5): no evaluation is made beyond it, and the end
-//! also sets the scale of the first step, as TOUT does there.
+//! Errors are measured in the norm max_i |e_i| / (rtol |x_i| + atol). The dense output is the
+//! Nordsieck polynomial of the step just made. No evaluation is made beyond the end of the run
+//! (ODEPACK's ITASK 4 and 5), which also sets the scale of the first step, as TOUT does there.
 //!
-//! How near it comes to ODEPACK is tested in tests/it/odepack.rs. Of 62 runs of its LSODA on ten problems, 27 make the same
-//! decisions from starts 1e-12 apart; there steps, evaluations, Jacobians, orders and switches are the same here, one by
-//! one. In the others rounding decides sooner or later, and the counts here differ from ODEPACK's as ODEPACK's differ from
-//! themselves: steps by at most 14.6 %, evaluations by at most 11.4 %.
+//! tests/it/odepack.rs compares this stepper with ODEPACK's LSODA in 62 runs on ten problems. In 27
+//! of them ODEPACK makes the same decisions from starts 1e-12 apart; there steps, evaluations,
+//! Jacobians, orders and switches agree one by one. In the others rounding decides, and the counts
+//! differ from ODEPACK's by as much as ODEPACK's own counts scatter: steps by at most 14.6 %,
+//! evaluations by at most 11.4 %.
 //!
 //! Every constant and decision of step, order and method selection, of the corrector's convergence and of the failures was also compared, line by
 //! line, with ODEPACK's own text (LSODA, STODA; public domain). They are the same, but for three things that are meant: the Jacobian is exact and not
