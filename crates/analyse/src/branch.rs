@@ -37,13 +37,13 @@ pub trait ReturnMap {
 /// Why there is no closed orbit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trouble {
-    /// What kind of thing is in the way.
+    /// The kind of obstacle.
     pub obstacle: Obstacle,
-    /// In words, with what to do.
+    /// A message that says what to do.
     pub said: String,
 }
 
-/// What is in the way of a closed orbit.
+/// Why a return map has no closed orbit here.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Obstacle {
     /// It touches the switching surface.
@@ -103,7 +103,7 @@ impl Orbit {
         self.multipliers.first().map_or(0.0, |m| sqrt(m[0] * m[0] + m[1] * m[1]))
     }
 
-    /// What the multipliers say, within their error.
+    /// The stability that the multipliers imply, within their error.
     pub fn stability(&self) -> Stability {
         let (largest, error) = (self.largest_modulus(), self.multiplier_error);
         let isolated = self.multipliers.iter().all(|m| distance(*m, [1.0, 0.0]) > error);
@@ -126,7 +126,7 @@ impl Orbit {
     }
 }
 
-/// What multipliers say of neighbours.
+/// Stability of a closed orbit by its multipliers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stability {
@@ -152,7 +152,7 @@ impl Stability {
     }
 }
 
-/// Newton's method: when it is done and when it gives up.
+/// Options of Newton's method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Newton {
     /// Largest |P(u) - u| that counts as closed, as a share of the orbit's extent.
@@ -161,7 +161,7 @@ pub struct Newton {
     pub atol: f64,
     /// Relative error of the integration.
     pub rtol: f64,
-    /// Most iterations.
+    /// Maximum number of iterations.
     pub iterations: usize,
 }
 
@@ -210,7 +210,7 @@ fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
 /// The closed orbit near `guess` at the parameter's value `p`.
 ///
 /// # Errors
-/// In words, with what to do.
+/// A message that says what to do.
 pub fn closed_orbit(map: &dyn ReturnMap, guess: &[f64], p: f64, newton: Newton) -> Result<Orbit, Trouble> {
     let (n, axis) = (map.states(), map.axis());
     let mut u = guess.to_vec();
@@ -382,16 +382,16 @@ pub struct Branch {
     pub end: End,
 }
 
-/// How a branch is followed.
+/// Options of continuation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BranchOptions {
     /// The parameter's range: from where the first orbit is to its other end.
     pub from: f64,
     /// The other end.
     pub to: f64,
-    /// Longest step along the branch, as a share of the range (and of the state's size).
+    /// Maximum step along the branch, as a share of the range (and of the state's size).
     pub longest: f64,
-    /// Most orbits.
+    /// Maximum number of orbits.
     pub most: usize,
     /// Newton's method.
     pub newton: Newton,
@@ -416,7 +416,8 @@ struct Scales {
     parameter: f64,
 }
 
-/// The branch from the orbit `first` on, as far as `options` says; `go_on` is told each orbit and may stop it.
+/// Follows the branch from the orbit `first` to the ends of `options`; `go_on` receives each orbit
+/// and returns whether to continue.
 pub fn follow(
     map: &dyn ReturnMap,
     first: Orbit,

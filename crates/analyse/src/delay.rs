@@ -1,4 +1,4 @@
-//! How a disturbance grows while an orbit passes a two-fold, where the switch acts late or has a memory.
+//! Growth of disturbances while an orbit passes a two-fold, for a delayed switch or a relay.
 //!
 //! A delay of d makes the scales x ~ d^2 across the surface and (y, z, t) ~ d along it: with them the equation near the two-fold has no d to
 //! leading order. A band of half-width b (f+ until h falls to -b, f- until it rises to b) makes them b and sqrt(b). Growth is then a number of order 1 in
@@ -62,7 +62,7 @@ pub struct LatePassageQuestion {
     pub by: f64,
 }
 
-/// What a passage makes of disturbances: size of the exit's displacement over that of the disturbance.
+/// Growth of disturbances in a passage: displacement at the exit over size of the disturbance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LateGrowth {
     /// Of one across the surface, made where sliding stops to attract.

@@ -1,8 +1,9 @@
-//! How many digits of an orbit a method gets right: its crossings of a plane beside those of a reference orbit in
-//! double-double arithmetic ([`reference()`]).
+//! Number of correct digits of an orbit by a method: its crossings of a plane compared with those
+//! of a reference orbit in double-double arithmetic ([`reference()`]).
 //!
-//! A smoothed two-fold is an ordinary differential equation and has one solution, but near the singularity that
-//! amplifies whatever disturbs it; [`passage`](super::passage) measures by how much. This is what that does to a method.
+//! A smoothed two-fold is an ordinary differential equation with one solution, but near the
+//! singularity it amplifies disturbances; [`passage`](super::passage) measures by how much. This
+//! module measures the effect on a method.
 
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
@@ -26,7 +27,7 @@ pub struct Contender {
     pub tolerance: f64,
 }
 
-/// Which digits of which orbit: all that [`digits`] depends on besides the equation.
+/// Options of [`digits`]: everything that it depends on besides the equation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DigitsQuestion {
@@ -42,7 +43,7 @@ pub struct DigitsQuestion {
     pub methods: Vec<Contender>,
     /// Their longest step.
     pub step_cap: StepCap,
-    /// Most steps of each.
+    /// Step limit of each method.
     pub max_steps: u64,
 }
 
@@ -52,7 +53,7 @@ pub struct DigitsQuestion {
 pub struct DigitsRow {
     /// The method.
     pub contender: Contender,
-    /// How well it agrees.
+    /// Its agreement with the reference orbit.
     pub agreement: Agreement,
 }
 

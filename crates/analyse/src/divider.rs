@@ -1,9 +1,11 @@
-//! How organised a path is: whether it goes again where it has been, and how much of it two paths share.
+//! Organisation of a path: the share of it that revisits earlier places, and the share that two
+//! paths have in common.
 //!
-//! Trajectories are often compared by eye ("less organised", "another structure"). Here numbers are put to that. A path is walked with
-//! dividers (Richardson 1961): a stride ends where the path first is one stride's width from where the stride began, so
-//! that chatter finer than a stride (a hysteretic switch makes much of it) counts for nothing. A stride is fresh if it ends farther than a
-//! width from every place visited before.
+//! Trajectories are often compared by eye ("less organised", "another structure"). This module
+//! measures both. A path is walked with dividers (Richardson 1961): a stride ends where the path
+//! first is one stride's width from where the stride began, so that chatter finer than a stride (a
+//! hysteretic switch makes much of it) counts for nothing. A stride is fresh if it ends farther
+//! than a width from every place visited before.
 
 use std::collections::BTreeMap;
 
@@ -91,7 +93,7 @@ fn squared(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|i| (a[i] - b[i]) * (a[i] - b[i])).sum()
 }
 
-/// What two paths have in common.
+/// The overlap of two paths.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Shared {
     /// Strides of each.

@@ -16,7 +16,7 @@ use twofold_integrate::{Failure, Flow, Step};
 use twofold_system::filippov::sliding_field;
 use twofold_system::{PiecewiseSmooth, VectorField};
 
-/// Why there is no return, or no derivative of it.
+/// Why the return map, or its derivative, is not defined here.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// The motion could not go on.

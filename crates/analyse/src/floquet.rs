@@ -26,7 +26,7 @@ pub struct ReturnPlane {
     pub upward: bool,
 }
 
-/// How a closed orbit is computed.
+/// Options of [`closed_orbit`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FloquetOptions {
     /// Local error of the orbit and its tangent vectors.
@@ -35,7 +35,7 @@ pub struct FloquetOptions {
     pub max_step: f64,
     /// Largest return error |P(u) - u| that counts as closed.
     pub closed: f64,
-    /// Most Newton iterations.
+    /// Maximum number of Newton iterations.
     pub iterations: usize,
     /// Give up on a return after this time.
     pub longest_return: f64,
@@ -73,7 +73,7 @@ pub struct ClosedOrbit {
     pub iterations: usize,
 }
 
-/// Why no closed orbit came out.
+/// Why no closed orbit was found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// The integration failed.

@@ -1,7 +1,8 @@
 //! The largest Lyapunov exponent where the switch depends on the past.
 //!
-//! As [`lyapunov`](super::lyapunov), with the disturbed state of [`TangentStepper`]: a tangent vector together with what it has made of switches that
-//! are to come, or with its past. Growth rates do not depend on how such a state is measured, as long as all of it is.
+//! As [`lyapunov`](super::lyapunov), with the disturbed state of [`TangentStepper`]: a tangent
+//! vector together with its effect on pending switches, or with its history. Growth rates do not
+//! depend on the norm, as long as it covers all of that state.
 
 use nalgebra::SVector;
 

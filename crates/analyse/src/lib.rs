@@ -1,6 +1,8 @@
-//! What is made of steps: paths, Poincare sections, and the character of an attractor with its exponents and multipliers.
+//! Analysis of trajectories: paths, Poincare sections, kinds of attractors, Lyapunov exponents and
+//! Floquet multipliers.
 //!
-//! Everything here looks at accepted steps and their interpolants from outside; no solver knows that it is observed.
+//! Everything here observes accepted steps and their interpolants from outside; no solver depends
+//! on it.
 //!
 //! ```
 //! use nalgebra::{SVector, vector};

@@ -1,4 +1,4 @@
-//! The limit eps -> 0: how a smoothed system tends to the Filippov motion.
+//! The limit eps -> 0: convergence of a smoothed system to the Filippov motion.
 //!
 //! Before the first visit to a two-fold the motion is unique and smoothing is a perturbation: a transversal crossing
 //! shifts the orbit by the time spent in the layer, O(eps); in attracting sliding the smoothed orbit follows a slow
@@ -23,7 +23,7 @@ fn smooth<P: Clone>(system: &P, eps: f64) -> Smoothed<P> {
     Smoothed { system: system.clone(), transition: Transition::Tanh, eps }
 }
 
-/// Smoothed orbits before the first visit: all that [`convergence`] depends on besides the system.
+/// Options of [`convergence`]: everything that it depends on besides the system.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConvergenceQuestion {
@@ -141,7 +141,7 @@ pub fn observed_rate(points: impl IntoIterator<Item = [f64; 2]>) -> f64 {
     line(&logs).map_or(f64::NAN, |l| l.slope)
 }
 
-/// Smoothed orbits after the first visit: all that [`after_visit`] depends on besides the system.
+/// Options of [`after_visit`]: everything that it depends on besides the system.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AfterVisitQuestion {
@@ -278,8 +278,9 @@ impl<P, const N: usize> Futures<'_, P, N> {
     }
 }
 
-/// Looks for the member of the funnel that crosses nearest to where the smoothed orbit of each eps does. Where that is, `crossing` says: a visit multiplies
-/// local errors by up to 10^28, only extended precision knows ([`passage`](super::passage)).
+/// Finds, for each eps, the member of the funnel whose crossing is nearest to that of the smoothed
+/// orbit, which `crossing` computes: a visit multiplies local errors by up to 10^28, so it needs
+/// extended precision ([`passage`](super::passage)).
 ///
 /// # Errors
 /// Those of [`funnel`] and of the methods.

@@ -36,7 +36,7 @@ pub struct Exponent {
     pub duration: f64,
 }
 
-/// An exponent with an interval: what a statement about its sign may rest on.
+/// An exponent with a 95 % interval, which decides its sign.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// The mean over the run, with its standard error alone.
@@ -46,7 +46,7 @@ pub struct Estimate {
     pub half_width: f64,
 }
 
-/// What an interval says about an exponent.
+/// The sign of an exponent, as its interval decides it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sign {
@@ -59,7 +59,7 @@ pub enum Sign {
 }
 
 impl Estimate {
-    /// What the interval says.
+    /// The sign that the interval implies.
     pub fn sign(&self) -> Sign {
         match self.exponent.value {
             v if v > self.half_width => Sign::Positive,
@@ -72,7 +72,7 @@ impl Estimate {
 /// Student's 97.5 % quantile for the seven degrees of freedom of the longest blocks.
 const QUANTILE: f64 = 2.365;
 
-/// How an exponent is computed.
+/// Options of an exponent's computation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LyapunovOptions {
@@ -84,7 +84,7 @@ pub struct LyapunovOptions {
     pub transient: f64,
     /// Time averaged over.
     pub duration: f64,
-    /// Most steps.
+    /// Step limit.
     pub max_steps: u64,
     /// Random kicks.
     pub kick: Option<Kick>,

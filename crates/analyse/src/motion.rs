@@ -60,7 +60,8 @@ impl<const D: usize> MotionRecorder<D> {
         self.pieces.iter().map(|(_, path)| path.len()).sum()
     }
 
-    /// What was recorded so far, which is forgotten but for the mode of the piece that is not finished: it goes on as the first one.
+    /// Takes the points recorded so far and clears the recorder, except for the mode of the
+    /// unfinished piece, which becomes the first piece.
     pub fn take(&mut self) -> Motion<D> {
         let unfinished = self.pieces.pop().map(|(mode, mut path)| ((mode, path.take()), (mode, path)));
         let mut pieces: Vec<(Mode, Vec<Sample<D>>)> =
@@ -116,7 +117,8 @@ impl<const D: usize> TimedMotion<D> {
         self.modes.iter().map(|(_, count)| count).sum::<usize>() + empty
     }
 
-    /// What was recorded so far, which is forgotten but for the mode of the piece that is not finished.
+    /// Takes the points recorded so far and clears the recorder, except for the mode of the
+    /// unfinished piece.
     pub fn take(&mut self) -> Motion<D> {
         let last = self.modes.last().map(|(mode, _)| (*mode, 0));
         let modes = std::mem::replace(&mut self.modes, last.into_iter().collect());

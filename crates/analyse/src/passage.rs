@@ -1,4 +1,5 @@
-//! How smoothed orbits pass a two-fold, for stiffness parameters far smaller than other modules can afford.
+//! Passage of smoothed orbits through a two-fold, for stiffness parameters far smaller than other
+//! modules can treat.
 //!
 //! **The law.** Near a two-fold at the origin of the normal form (Jeffrey 2013, eq. 4), x = eps u and (y, z, t) = sqrt(eps) (Y, Z, T) remove eps: to leading
 //! order there is one inner problem, and powers of eps count how often a motion has shrunk or grown on its way through it. The desingularised
@@ -44,7 +45,7 @@ const LEAVES: f64 = 3.0;
 /// Most steps of one orbit.
 const MOST_STEPS: u64 = 50_000_000;
 
-/// What the law says of the normal form with constants v+, v-: formulas only.
+/// The law's predictions for the normal form with constants v+, v-: formulas only.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Predicted {
@@ -112,7 +113,7 @@ impl Predicted {
     }
 }
 
-/// Which passage: all that [`passage()`] depends on besides equation and eps.
+/// Options of [`passage()`]: everything that it depends on besides equation and eps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PassageQuestion {

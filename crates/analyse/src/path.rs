@@ -22,8 +22,8 @@ pub struct PathRecorder<const D: usize = 3> {
     samples: Vec<Sample<D>>,
 }
 
-/// The most points that a recorder takes in: 0.6 GB in memory, and some 1.5 GB more while they are written as text. A full recorder
-/// stops the run.
+/// Maximum number of points of a recorder: 0.6 GB in memory, and about 1.5 GB more while they are
+/// written as text. A full recorder stops the run.
 pub const MOST_POINTS: usize = 20_000_000;
 
 /// Halvings of one step: a bound against wild interpolants, far above what a tolerance of 1e-4 asks for.
@@ -42,7 +42,8 @@ impl<const D: usize> PathRecorder<D> {
         Self { chord, most: MOST_POINTS, samples: vec![Sample { t, x: leading(x) }] }
     }
 
-    /// Stops the run when it has so many points, instead of [`MOST_POINTS`]; the step that brings it there is recorded whole.
+    /// Stops the run at `points` points instead of [`MOST_POINTS`]; the last step is recorded
+    /// whole.
     pub fn at_most(mut self, points: usize) -> Self {
         self.most = points;
         self
@@ -59,7 +60,8 @@ impl<const D: usize> PathRecorder<D> {
         self.samples
     }
 
-    /// The path so far, which is forgotten: what comes next is recorded as if it were still there.
+    /// Takes the path so far and clears the recorder; recording continues as if the points were
+    /// still there.
     pub fn take(&mut self) -> Vec<Sample<D>> {
         std::mem::take(&mut self.samples)
     }
@@ -155,7 +157,7 @@ impl<const D: usize> TimesRecorder<D> {
         self.samples
     }
 
-    /// The samples so far, which are forgotten.
+    /// Takes the samples so far and clears the recorder.
     pub fn take(&mut self) -> Vec<Sample<D>> {
         std::mem::take(&mut self.samples)
     }

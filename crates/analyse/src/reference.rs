@@ -1,4 +1,5 @@
-//! Reference orbits in double-double arithmetic, about 32 digits: what other methods are measured against.
+//! Reference orbits in double-double arithmetic (about 32 digits), against which methods are
+//! measured.
 
 use nalgebra::SVector;
 
@@ -16,7 +17,8 @@ pub type ExtendedPoint<const N: usize = 3> = SVector<DoubleDouble, N>;
 /// it, and roundings, unlike it, may cancel. Absolutely far below: at the two-fold every component is small.
 pub const REFERENCE_TOLERANCE: Tolerance = Tolerance { rtol: 1e-33, atol: 1e-40 };
 
-/// A surface that orbits are watched at: the zeros of a height, which is evaluated in whatever arithmetic the orbit has.
+/// A surface whose crossings are recorded: the zeros of a height function, evaluated in the orbit's
+/// arithmetic.
 pub trait Surface<const N: usize> {
     /// The height of `x` over the surface.
     fn height<S: Elementary>(&self, x: &SVector<S, N>) -> S;

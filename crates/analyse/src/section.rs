@@ -66,7 +66,7 @@ impl<const D: usize> SectionRecorder<D> {
         &self.crossings
     }
 
-    /// The crossings so far, which are forgotten.
+    /// Takes the crossings so far and clears the recorder.
     pub fn take(&mut self) -> Vec<Crossing<D>> {
         std::mem::take(&mut self.crossings)
     }

@@ -1,4 +1,5 @@
-//! Error against work: what methods make of a problem whose solution is known, tolerance by tolerance.
+//! Work-precision measurements: error against work of several methods at several tolerances, on a
+//! problem with a known solution.
 
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
@@ -9,7 +10,7 @@ use twofold_integrate::{
 };
 use twofold_system::VectorField;
 
-/// Which methods on which problem: all that [`work_precision`] depends on besides the equation.
+/// Options of [`work_precision`]: everything that it depends on besides the equation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WorkPrecisionQuestion {
@@ -27,7 +28,7 @@ pub struct WorkPrecisionQuestion {
     pub methods: Vec<Method>,
     /// The tolerances that each is given.
     pub tolerances: Vec<Tolerance>,
-    /// Steps after which a run is given up.
+    /// Step limit of a run.
     pub max_steps: u64,
 }
 
@@ -45,11 +46,11 @@ pub struct WorkPrecisionRow {
     pub statistics: Option<Statistics>,
     /// Why the run ended; absent for a run that failed.
     pub stop: Option<StopReason>,
-    /// What went wrong, in words.
+    /// Why the run failed, as a message.
     pub failure: Option<String>,
 }
 
-/// The question speaks of another number of components than the equation has.
+/// The question's number of components differs from the equation's.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what} has {got} components, the equation {wanted}")]
 pub struct DimensionError {

@@ -1,4 +1,5 @@
-//! A section as turns around a closed orbit: its period, the centres of its phases, and since when the run follows it.
+//! A section as turns around a closed orbit: its period, the centres of its phases, and the time of
+//! capture.
 //!
 //! The last point has phase 0, the one before it phase 1, ..., modulo the period.
 

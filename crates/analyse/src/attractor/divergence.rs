@@ -20,7 +20,7 @@ const PARTS: usize = 8;
 /// Most points searched.
 const MOST_POINTS: usize = 20_000;
 
-/// What nearest neighbours tell.
+/// Statistics of nearest neighbours.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Divergence {
     /// Growth of ln(distance) per return.

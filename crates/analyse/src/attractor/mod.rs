@@ -44,7 +44,7 @@ pub struct SectionPoint {
     pub upward: bool,
 }
 
-/// What is known about a run besides its section.
+/// Data about a run besides its section.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Question<'a> {
     /// End of the run; with it, an orbit that has stopped crossing is noticed.

@@ -1,4 +1,4 @@
-//! Islands and sea: what noise washes out.
+//! Contrast between islands and sea, which noise reduces.
 //!
 //! Long-lived chaos of a conservative kind, or one that is nearly so, fills a sea around islands that it never enters. Noise lets the orbit leak into
 //! them, and in the end they are as dense as the sea. How much emptier the islands still are is the structure that is left.
