@@ -39,11 +39,11 @@ pub struct Return {
     pub upward: bool,
     /// How many crossings a return takes, in both directions: an even number.
     pub crossings: usize,
-    /// No return is longer.
+    /// Upper bound on the duration of a return.
     pub longest: f64,
 }
 
-/// What is known of the image of a part of an h-set.
+/// The enclosure of the image of a part of an h-set.
 #[derive(Clone, Debug)]
 pub struct Image {
     /// The part: this range of u, and all v.

@@ -20,7 +20,7 @@ use super::section::AxisPlane;
 use super::set::Set;
 use twofold_num::{Arithmetic, Interval, Tape};
 
-/// What is known about a closed orbit of a flow in three dimensions.
+/// A proved closed orbit of a flow in three dimensions, with enclosures.
 #[derive(Clone, Debug)]
 pub struct Cycle {
     /// The box, in the plane's coordinates, in which exactly one closed orbit with this number of crossings was proved to cross.
@@ -75,7 +75,7 @@ struct Turn {
     crossings: Vec<(Interval, [Interval; 2], bool)>,
 }
 
-/// Where a closed orbit is looked for.
+/// Where [`prove_cycle`] searches for a closed orbit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Search {
     /// The plane; the orbit starts on it, upward.
@@ -86,7 +86,7 @@ pub struct Search {
     pub radius: f64,
     /// Crossings of the plane a turn, in both directions.
     pub crossings: usize,
-    /// No turn is longer.
+    /// Upper bound on the duration of a turn.
     pub longest: f64,
 }
 

@@ -20,14 +20,14 @@ use super::set::Set;
 use twofold_num::series::{Constants, Solution};
 use twofold_num::{Arithmetic, Dual, Elementary, Enclosure, Interval, Tape, elementary};
 
-/// What a [`Flow`] is asked for.
+/// Options of a [`Flow`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlowOptions {
     /// Degree of the series.
     pub order: usize,
     /// Largest remainder of a step, in each component.
     pub tolerance: f64,
-    /// Longest step.
+    /// Maximum length of a step.
     pub longest_step: f64,
 }
 
