@@ -9,7 +9,7 @@ use crate::record::Hash;
 use crate::record::hash::canonical_json;
 use twofold_integrate::{Statistics, StopReason};
 
-/// What a job gives back.
+/// The result of a job.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
     /// The numbers, as named tables.
@@ -66,13 +66,13 @@ impl From<StopReason> for Stop {
     }
 }
 
-/// A fact that an answer should have and has not, or not in that shape: the answer is of another kind than its reader thinks.
+/// A fact that is missing from an answer, or has another shape than was asked for.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the answer has no fact \"{name}\" of the kind wanted ({why}); was it made by another version?")]
 pub struct NoSuchFact {
     /// The fact's name.
     pub name: String,
-    /// What was met.
+    /// The reason.
     pub why: String,
 }
 
@@ -82,7 +82,7 @@ impl Answer {
         Self { tables, facts: Map::new(), statistics: None, stop: Stop::Finished }
     }
 
-    /// The answer with a fact more.
+    /// Adds a fact.
     pub fn with_fact<T: Serialize>(mut self, name: &str, value: &T) -> Self {
         let value = serde_json::to_value(value).expect("facts are plain data: string keys, no failing serialisers");
         self.facts.insert(name.to_owned(), value);

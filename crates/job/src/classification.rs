@@ -1,4 +1,4 @@
-//! The question of what a run settles on.
+//! Classification of a run's attractor.
 
 use std::sync::Arc;
 
@@ -16,8 +16,9 @@ use twofold_analyse::lyapunov::{self, Exponent};
 use twofold_integrate::filippov::ExitRule;
 use twofold_integrate::{Schedule, Watch};
 
-/// What a run settles on, judged from its section: with the largest exponent where motion is not captured by a cycle, and beside its noise-free
-/// twin where there is noise. Fact: `evidence` ([`Evidence`]).
+/// The attractor of a run, classified from its section; with the largest exponent where no cycle
+/// captures the motion, and compared with noise-free runs where there is noise. Fact: `evidence`
+/// ([`Evidence`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Classification {
     /// The run; it records a section.
@@ -32,11 +33,11 @@ impl Classification {
         Self { run, thresholds: Thresholds::default() }
     }
 
-    /// The evidence that an answer to this question holds.
+    /// Asks the question and returns the evidence in its answer.
     ///
     /// # Errors
     ///
-    /// Whatever the computation met.
+    /// The failure of the computation.
     pub fn ask(&self, executor: &Executor<'_>) -> Result<Evidence, JobError> {
         Ok(executor.ask(self)?.fact("evidence")?)
     }

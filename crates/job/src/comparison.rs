@@ -1,4 +1,4 @@
-//! The question of how alike two paths are.
+//! Comparison of two paths.
 
 use serde_json::{Value, json};
 
@@ -12,8 +12,8 @@ use twofold_analyse::Sample;
 use twofold_analyse::divider::{DividerWalk, STRIDES, common_box};
 use twofold_integrate::Watch;
 
-/// How organised two runs' paths are, and what they share. Facts: `freshness` (share of each path's strides into new places) and
-/// `shared` ([`Shared`](twofold_analyse::divider::Shared)).
+/// Organisation of two runs' paths, and their overlap. Facts: `freshness` (share of each path's
+/// strides into new places) and `shared` ([`Shared`](twofold_analyse::divider::Shared)).
 #[derive(Clone, Debug, PartialEq)]
 pub struct PathComparison(pub RunSpec, pub RunSpec);
 

@@ -1,4 +1,4 @@
-//! The question of how many digits of an orbit methods get right.
+//! Number of correct digits of an orbit, by method.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -12,15 +12,16 @@ use twofold_instances as instances;
 use twofold_integrate::Watch;
 use twofold_system::{System, Transition};
 
-/// How many digits of each passage through a plane methods get right, beside an orbit in double-double arithmetic, with tanh smoothing. Tables:
-/// `agreement`, a row per method and passage, and `visits`, the reference orbit's passages near the origin.
+/// Number of correct digits at each crossing of a plane, for several methods, compared with an
+/// orbit in double-double arithmetic; tanh smoothing. Tables: `agreement`, a row per method and
+/// passage, and `visits`, the reference orbit's passages near the origin.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MethodDigits {
     /// The system.
     pub system: System,
     /// The stiffness parameter of the smoothing.
     pub eps: f64,
-    /// Which digits of which orbit.
+    /// Orbit, plane and methods that are compared.
     pub compared: DigitsQuestion,
 }
 

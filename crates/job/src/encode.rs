@@ -15,7 +15,7 @@ use super::shortest::shortest;
 use super::table::{Cells, Column, ColumnKind, Table, Words};
 use crate::record::hash::canonical_json;
 
-/// Bytes that are not what they claim to be.
+/// Bytes that cannot be decoded as an answer.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("this is not a table that twofold wrote: {0}")]
 pub struct Malformed(pub String);
@@ -97,7 +97,7 @@ impl<'a> Reader<'a> {
 ///
 /// # Errors
 ///
-/// If the bytes are anything else.
+/// If the bytes have any other form.
 pub fn from_bits(bytes: &[u8]) -> Result<Vec<Table>, Malformed> {
     let mut r = Reader(bytes);
     let mut tables = Vec::new();
@@ -144,7 +144,7 @@ pub fn from_bits(bytes: &[u8]) -> Result<Vec<Table>, Malformed> {
     Ok(tables)
 }
 
-/// What a file says about itself: a CSV file in its last line.
+/// A file's description of itself: the last line of a CSV file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Heading {
@@ -152,13 +152,13 @@ pub struct Heading {
     pub made_by: String,
     /// The table's name.
     pub table: String,
-    /// Whatever its maker adds: the question, its hash.
+    /// Further data of the writer: the question, its hash.
     pub about: Value,
     /// The columns.
     pub columns: Vec<ColumnHeading>,
 }
 
-/// What a file says about a column.
+/// A file's description of a column.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ColumnHeading {

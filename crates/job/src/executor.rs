@@ -1,4 +1,4 @@
-//! Where questions are asked: each is computed once, or taken from the store.
+//! The executor: computes each question once, or takes its answer from the store.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -10,7 +10,7 @@ use super::store::{Kept, Store};
 use crate::record::Hash;
 use twofold_integrate::Watch;
 
-/// Shows how far jobs have come.
+/// Displays the progress of jobs.
 pub trait Progress: Sync {
     /// A job begins; its watch will be told values up to `extent`.
     fn begin<'a>(&'a self, label: &str, extent: f64) -> Box<dyn JobWatch + 'a>;
@@ -37,10 +37,11 @@ impl JobWatch for () {
 /// An answer in the making, or made.
 type Cell = Arc<OnceLock<Result<Arc<Answer>, JobError>>>;
 
-/// Asks each question once.
+/// Computes each question once, and hands out its answer.
 ///
-/// Several threads may ask at a time; who asks for what another thread is computing waits for it. That cannot lock up: a job rests only on
-/// jobs that do not rest on it, and a job that computes never turns to other work in between (see [`Question`]).
+/// Several threads may ask at a time; a thread that asks for an answer that another is computing
+/// waits for it. There is no deadlock: dependencies between jobs have no cycles, and a job does no
+/// other work while it computes (see [`Question`]).
 pub struct Executor<'a> {
     store: Option<Store>,
     progress: &'a dyn Progress,
@@ -74,7 +75,7 @@ impl<'a> Executor<'a> {
     ///
     /// # Errors
     ///
-    /// Whatever the computation met; asked again, the same.
+    /// The failure of the computation; asked again, the same failure.
     pub fn ask(&self, question: &dyn Question) -> Result<Arc<Answer>, JobError> {
         let key = key(question);
         let cell = {
@@ -85,7 +86,8 @@ impl<'a> Executor<'a> {
         cell.get_or_init(|| self.answer(question, &key)).clone()
     }
 
-    /// The answer to a question that nobody else is expected to ask: it is not kept in memory, only in the store.
+    /// The answer to a question that is not expected to be asked again: it is kept in the store,
+    /// not in memory.
     ///
     /// # Errors
     ///
@@ -124,8 +126,9 @@ impl<'a> Executor<'a> {
         Ok(Arc::new(answer))
     }
 
-    /// Sees to it that all these questions have answers, side by side on the current thread pool: first what others rest on, and of that the longest. With a
-    /// store, answers are there and not in memory. Errors wait in the executor until they are asked for, or are met again.
+    /// Computes all these questions in parallel on the current thread pool: dependencies first, and
+    /// of these the longest. With a store, answers are kept there and not in memory. Errors are
+    /// kept in the executor until they are asked for.
     pub fn gather(&self, questions: &[AnyQuestion]) {
         Plan::of(questions).carry_out(|question| match &self.store {
             Some(store) if store.has(&key(&**question)) => {}
@@ -136,7 +139,7 @@ impl<'a> Executor<'a> {
         }
     }
 
-    /// Lets go of every answer that the store has and nobody holds.
+    /// Drops every answer from memory that the store has and that has no other owner.
     pub fn forget(&self) {
         let Some(store) = &self.store else { return };
         let mut answers = self.answers.lock().unwrap_or_else(PoisonError::into_inner);

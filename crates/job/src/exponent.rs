@@ -1,4 +1,4 @@
-//! The question of the largest Lyapunov exponent.
+//! The largest Lyapunov exponent as a question.
 
 use nalgebra::SVector;
 use serde::Serialize;
@@ -27,7 +27,7 @@ pub struct LargestExponent {
     pub switch: SwitchSpec,
     /// Where the orbit starts.
     pub start: Vec<f64>,
-    /// How the exponent is computed.
+    /// Options of the computation.
     pub settings: lyapunov::LyapunovOptions,
 }
 

@@ -45,7 +45,7 @@ pub fn model_of(system: &System) -> Result<Model, JobError> {
 const PART: usize = 4096;
 
 impl GeneralRun {
-    /// Everything that the run depends on, as data.
+    /// Everything that the run depends on, as JSON.
     pub fn json(&self) -> Value {
         let o = &self.options;
         json!({
@@ -75,7 +75,7 @@ impl GeneralRun {
         })
     }
 
-    /// What a file of this run says about itself.
+    /// The description of this run in its files.
     pub fn about(&self) -> Value {
         json!({ "kind": "general-run", "question": self.json() })
     }
@@ -291,7 +291,7 @@ pub struct GeneralExponents {
     pub run: GeneralRun,
     /// Time that is not averaged over.
     pub transient: f64,
-    /// How many, the largest first.
+    /// Number of exponents, the largest first.
     pub count: usize,
 }
 

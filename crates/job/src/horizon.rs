@@ -1,4 +1,4 @@
-//! How long an orbit in extended precision is the equation's and not the arithmetic's.
+//! The time up to which an orbit in extended precision is free of rounding errors.
 
 use std::sync::Arc;
 
@@ -21,9 +21,9 @@ use twofold_integrate::{Method, PRECISIONS, Tolerance, Watch, taylor};
 /// each alone; `precision`, `other_precision`, `order`, `other_order`. Table `horizon`: the differences at each time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Horizon {
-    /// The orbit. What it records is not looked at.
+    /// The orbit. Its observation is ignored.
     pub run: RunSpec,
-    /// What counts as agreement.
+    /// Largest difference that counts as agreement.
     pub within: f64,
 }
 
@@ -31,7 +31,7 @@ pub struct Horizon {
 const MORE_DEGREES: u16 = 8;
 
 impl Horizon {
-    /// How many times are compared.
+    /// Number of times at which states are compared.
     pub const SAMPLES: usize = 1000;
 
     fn variant(&self, precision: u16, order: Option<u16>, tolerance: Tolerance) -> AnyQuestion {

@@ -1,4 +1,4 @@
-//! The questions of what smoothed orbits tend to as the switch steepens: before the first visit to a two-fold, and after it.
+//! The limit of smoothed orbits as eps -> 0, before and after the first visit to a two-fold.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! The question of a closed orbit, and of how it changes with a parameter.
+//! A closed orbit, and its branch along a parameter, as a question.
 
 use std::cell::RefCell;
 
@@ -38,7 +38,7 @@ pub struct ClosedOrbit {
     pub switch: SwitchSpec,
     /// Where to begin.
     pub start: Vec<f64>,
-    /// How the motion settles before Newton's method begins, at most until this time; 0: not at all.
+    /// Longest time for which the motion settles before Newton's method begins; 0: not at all.
     pub settle: f64,
     /// The plane.
     pub plane: ReturnPlane,
@@ -68,7 +68,7 @@ fn has_past(switch: SwitchSpec) -> Option<SpecError> {
     Some(SpecError { field: "switch", value: value.into(), rule })
 }
 
-/// A parameter, and from where to where.
+/// A parameter and its range.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Along {
     /// Its name: one of the system's, or `eps`.
@@ -79,7 +79,7 @@ pub struct Along {
     pub to: f64,
     /// Steps that the range is divided into, at least.
     pub steps: usize,
-    /// Most orbits.
+    /// Maximum number of orbits.
     pub most: usize,
 }
 

@@ -1,4 +1,4 @@
-//! The questions of how an orbit passes a two-fold.
+//! Passage of an orbit through a two-fold, as questions.
 
 use nalgebra::{SVector, vector};
 use serde::Serialize;
@@ -26,7 +26,7 @@ pub struct TwoFoldPassage {
     pub transition: Transition,
     /// The stiffness parameter.
     pub eps: f64,
-    /// Which orbit, and what of it.
+    /// The orbit, and the disturbances that are measured.
     pub followed: PassageQuestion,
 }
 

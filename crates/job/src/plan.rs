@@ -1,7 +1,8 @@
-//! In which order questions are computed side by side.
+//! The order in which questions are computed in parallel.
 //!
-//! What others rest on comes first, so that nobody sits and waits for it; and of what can be begun always that with the most work behind it, its
-//! own and that of those that rest on it (the critical path: Graham 1969, Hu 1961).
+//! Dependencies come first, so that no thread waits for them. Of the questions that can be started,
+//! the one with the most work on its path is started: its own work and that of its dependents
+//! (critical path: Graham 1969, Hu 1961).
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -30,7 +31,7 @@ struct Task {
 }
 
 impl Plan {
-    /// The plan for `questions` and all that they rest on.
+    /// The plan for `questions` and all their dependencies.
     pub fn of(questions: &[AnyQuestion]) -> Self {
         let mut plan = Self { tasks: Vec::new(), by_rank: Vec::new(), ready: Mutex::default() };
         let mut known = HashMap::new();

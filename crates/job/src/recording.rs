@@ -1,4 +1,4 @@
-//! What a run records, as typed data and as an [`Answer`]'s tables.
+//! The recording of a run, as typed data and as an [`Answer`]'s tables.
 //!
 //! | observation | table | columns |
 //! |---|---|---|
@@ -21,7 +21,7 @@ use twofold_integrate::filippov::{EventKind, ExitRule, INTERSECTION, Mode, ModeE
 use twofold_integrate::{Statistics, StopReason};
 use twofold_num::tape::Program;
 
-/// What a run left behind.
+/// The recording of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording<const D: usize = 3> {
     /// The recorded points.
@@ -94,7 +94,7 @@ impl<const D: usize> Recording<D> {
     ///
     /// # Errors
     ///
-    /// [`JobError::Interrupted`]: nothing may rest on half a run.
+    /// [`JobError::Interrupted`].
     pub fn whole(self) -> Result<Self, JobError> {
         if self.stop == StopReason::Watch { Err(JobError::Interrupted) } else { Ok(self) }
     }

@@ -1,4 +1,4 @@
-//! Rests: where a motion ends that does not go on moving.
+//! Rests: equilibria and pseudo-equilibria at which a motion ends.
 //!
 //! A rest is a zero of the equation that holds there: of a smooth field, of f+ where h > 0, of f- where h < 0, or of a mixture of both on
 //! h = 0 (a pseudo-equilibrium; Filippov 1988, sec. 19; di Bernardo, Budd, Champneys & Kowalczyk 2008, sec. 5.1). It is found by Newton's
@@ -19,7 +19,7 @@ use twofold_num::tape::Program;
 use twofold_num::{Dual, Elementary};
 use twofold_system::{Field, System};
 
-/// What a rest is a zero of.
+/// The field of which a rest is a zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RestKind {
@@ -29,7 +29,7 @@ pub enum RestKind {
     PseudoEquilibrium,
 }
 
-/// Whether neighbours come to a rest.
+/// Stability of a rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stability {
@@ -45,14 +45,14 @@ pub enum Stability {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rest {
-    /// What it is a zero of.
+    /// The field of which it is a zero.
     pub kind: RestKind,
     /// Where; with phi as last state, if the switch is hysteretic.
     pub state: Vec<f64>,
     /// Eigenvalues (real, imaginary) of the equation there, by falling real part; along the surface, of a pseudo-equilibrium. None where
     /// the equation has no derivative.
     pub eigenvalues: Vec<[f64; 2]>,
-    /// What they, and the fields on both sides, say.
+    /// The stability implied by the eigenvalues and by the fields on both sides.
     pub stability: Stability,
 }
 

@@ -1,4 +1,4 @@
-//! The question of a run: what happens from a start.
+//! A run as a question.
 
 use serde_json::Value;
 

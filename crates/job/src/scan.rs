@@ -1,4 +1,5 @@
-//! Scans: the late crossings of a run for each value of one setting, or what it ends on over a grid of two.
+//! Scans: the late crossings of a run for each value of one setting, or the attractor over a grid
+//! of two settings.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -20,7 +21,7 @@ use super::sweep::{self, Axis, Coordinate, Sweep};
 use super::table::{Column, Entry, Table};
 use super::{Answer, Stop};
 
-/// What is varied.
+/// The settings that vary.
 #[derive(Clone, Debug)]
 pub enum Subject {
     /// A system with h, plus and minus.
@@ -75,7 +76,7 @@ pub struct Scanned {
     pub first_error: Option<JobError>,
 }
 
-/// Most runs of a scan: their rows are kept in memory.
+/// Maximum number of runs of a scan, whose rows are kept in memory.
 pub const MOST_RUNS: u64 = 1_000_000;
 
 /// What a run ends on, and where that is.
@@ -138,7 +139,7 @@ impl Scan {
     /// A scan over the axes of `subject`; `alike`: attractors this near, as a share of the largest number in any start or attractor, are one.
     ///
     /// # Errors
-    /// What does not go together, in words.
+    /// A message that names the settings that exclude each other.
     pub fn new(subject: Subject, follow: Option<Follow>, alike: f64) -> Result<Self, String> {
         let scan = Self { subject, follow, alike };
         let axes = scan.axes();
@@ -184,7 +185,7 @@ impl Scan {
         Ok(scan)
     }
 
-    /// What is varied.
+    /// The settings that vary.
     pub fn axes(&self) -> &[Axis] {
         match &self.subject {
             Subject::Surfaces(sweep) => sweep.axes(),
@@ -197,7 +198,7 @@ impl Scan {
         self.axes().iter().map(Axis::count).product()
     }
 
-    /// How many runs there are.
+    /// Number of runs.
     pub fn runs(&self) -> u64 {
         self.cells() * if self.follow == Some(Follow::Both) { 2 } else { 1 }
     }
@@ -220,7 +221,7 @@ impl Scan {
         }
     }
 
-    /// What a file of this scan says about itself.
+    /// The description of this scan in its files.
     pub fn about(&self) -> Value {
         let run = match &self.subject {
             Subject::Surfaces(sweep) => json!(sweep.run()),

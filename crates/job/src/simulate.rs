@@ -85,16 +85,17 @@ const UP_TO_EIGHT: &str = "runs are computed with up to eight states";
 pub struct Streamed {
     /// Final time.
     pub t: f64,
-    /// Rows given away.
+    /// Rows passed on.
     pub rows: u64,
     /// Work done.
     pub statistics: Statistics,
-    /// Why it ended; [`Stop::Found`] where `rows` wanted no more.
+    /// Why it ended; [`Stop::Found`] if `rows` asked to stop.
     pub stop: Stop,
 }
 
-/// Computes a run and gives its first table away in parts, in order and without gaps: together they are the table of [`answer`]. Memory
-/// stays flat however long the run is. `rows` says whether it wants more.
+/// Computes a run and passes its first table to `rows` in parts, in order and without gaps:
+/// together they are the table of [`answer`]. Memory does not grow with the length of the run.
+/// `rows` returns whether to continue.
 ///
 /// # Errors
 ///

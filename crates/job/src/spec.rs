@@ -138,7 +138,7 @@ impl SwitchSpec {
     }
 }
 
-/// A method with its settings.
+/// A method with its options.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MethodSpec {
@@ -148,7 +148,7 @@ pub struct MethodSpec {
     pub tolerance: Tolerance,
     /// Longest step.
     pub step_cap: StepCap,
-    /// Most steps of the whole run before it is given up as a failure.
+    /// Step limit of the whole run; a run that exceeds it fails.
     pub max_steps: u64,
     /// Bits of the numbers of [`Method::TaylorExtended`], one of [`PRECISIONS`]; 106 if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -176,7 +176,7 @@ impl MethodSpec {
         }
     }
 
-    /// What a method does if nothing else is asked for: as NDSolve, but extended precision is used to its end, 1e-32.
+    /// A method's default options: NDSolve's, but a tolerance of 1e-32 in extended precision.
     pub fn defaults(name: Method) -> Self {
         let mut defaults = Self::ndsolve_defaults(name);
         if name == Method::TaylorExtended {
@@ -246,7 +246,7 @@ const COLUMNS: [&str; 16] = [
     "arc",
 ];
 
-/// A wrong number in a spec: which, and what is allowed.
+/// A wrong number in a spec: the field, its value, and the rule.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{field} is {value}: {rule}")]
 pub struct SpecError {
@@ -254,7 +254,7 @@ pub struct SpecError {
     pub field: &'static str,
     /// Its value.
     pub value: String,
-    /// What would be right.
+    /// The rule that it breaks.
     pub rule: &'static str,
 }
 

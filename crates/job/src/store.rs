@@ -24,7 +24,7 @@ pub struct Store {
     folder: PathBuf,
 }
 
-/// What a store has under a key.
+/// The content of a store under a key.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Kept {
     /// The answer.
@@ -169,7 +169,7 @@ impl Store {
         Ok(entries)
     }
 
-    /// Removes entries; those that `unwanted` says. Gives back how many bytes that freed.
+    /// Removes the entries for which `unwanted` is true; returns the number of bytes freed.
     ///
     /// # Errors
     ///

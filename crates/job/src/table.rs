@@ -1,4 +1,4 @@
-//! Named columns with units: what every computation's numbers are laid out as.
+//! Tables: named columns with units, the form of all numerical results.
 //!
 //! A [`Table`] is stored by column, because that is how it is hashed and drawn; it is built row by row,
 //! because that is how computations yield.
@@ -23,7 +23,7 @@ pub struct Column {
     pub name: String,
     /// Its unit, "1" for a pure number.
     pub unit: String,
-    /// What is in it.
+    /// Its cells.
     pub cells: Cells,
 }
 
@@ -94,7 +94,7 @@ impl Words {
     }
 }
 
-/// What a column holds.
+/// The kind of a column's cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ColumnKind {
@@ -180,7 +180,7 @@ impl Column {
         Self::new(name, "", ColumnKind::Word)
     }
 
-    /// What the column holds.
+    /// The kind of its cells.
     pub fn kind(&self) -> ColumnKind {
         match self.cells {
             Cells::Numbers(_) => ColumnKind::Number,

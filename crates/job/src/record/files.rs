@@ -1,5 +1,6 @@
-//! Files are written to a temporary name beside their place and renamed: a reader, or a run that is killed, never sees
-//! half a file, and an existing file stays until its successor is whole.
+//! Atomic writes. Files are written to a temporary name beside their place and renamed: a reader,
+//! or a run that is killed, never sees half a file, and an existing file stays until its successor
+//! is whole.
 //!
 //! What is not a regular file (a pipe, a terminal, an open descriptor such as /dev/stdout) is written to and never replaced. A
 //! symbolic link is followed, and what it leads to is replaced, not the link. A temporary file is locked by the process that
@@ -330,7 +331,8 @@ fn try_again(act: &mut dyn FnMut() -> io::Result<()>, in_use: &dyn Fn(&io::Error
     act()
 }
 
-/// Removes the temporary files that dead processes left in `folder`, and says how many. Those of living ones are locked and stay.
+/// Removes the temporary files that dead processes left in `folder`; returns their number. Those of
+/// living processes are locked and stay.
 pub fn sweep(folder: &Path) -> usize {
     let Ok(entries) = fs::read_dir(folder) else { return 0 };
     let stale = |entry: &fs::DirEntry| {
@@ -364,10 +366,11 @@ pub fn abandon() {
     std::mem::forget(mine);
 }
 
-/// Whether files that were written are still there with their lengths: another process may have removed them since.
+/// Checks that all written files still exist with their lengths: another process may have removed
+/// them since.
 ///
 /// # Errors
-/// The first that is not.
+/// The first file that is missing or has another length.
 pub fn still_there(files: &[(PathBuf, u64)]) -> Result<(), FileError> {
     for (path, length) in files {
         let found = fs::metadata(path).map_err(FileError::new("find again", path))?;

@@ -29,7 +29,7 @@ impl FileBytes {
     }
 }
 
-/// A folder's files, and what was met and not read.
+/// A folder's files, and the entries that were not read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tree {
     /// Sorted by path.
@@ -55,11 +55,11 @@ pub fn read_tree(folder: &Path, wanted: &dyn Fn(&str) -> bool) -> Result<Tree, F
     Ok(Tree { files, dangling })
 }
 
-/// Goes to every file that [`read_tree`] reads, several side by side, with its path inside the folder and the place where it is: what `visit` makes of
-/// each, and what was met and is not there.
+/// Calls `visit` for every file that [`read_tree`] reads, several in parallel, with its path inside
+/// the folder and its full path. Returns the results, and the links that lead nowhere.
 ///
 /// # Errors
-/// As [`read_tree`], and what `visit` says.
+/// As [`read_tree`], and the errors of `visit`.
 pub fn visit_tree<T: Send>(
     folder: &Path,
     wanted: &dyn Fn(&str) -> bool,

@@ -43,7 +43,7 @@ impl Hash {
         Self::of_parts([bytes])
     }
 
-    /// The digest of bytes one part after the other.
+    /// The digest of the concatenation of `parts`.
     pub fn of_parts<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> Self {
         let mut digest = Sha256::new();
         for part in parts {
@@ -52,7 +52,7 @@ impl Hash {
         Self::finish(digest)
     }
 
-    /// The digest of everything in a stream, and how many bytes that is. No more than a piece of it is in memory at a time.
+    /// The digest of everything in a stream, and its length in bytes; read piece by piece.
     ///
     /// # Errors
     /// If the stream cannot be read.

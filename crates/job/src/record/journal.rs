@@ -1,4 +1,4 @@
-//! A file that grows line by line, and of which a kill at any moment leaves all whole lines.
+//! A file that grows line by line; a kill at any moment leaves all whole lines.
 //!
 //! Every line carries a digest of itself and is written by one call to the system. A last line that was cut short is dropped when the
 //! journal is opened again; a line that was damaged otherwise is an error, because what it said cannot be known. The process that
@@ -76,7 +76,7 @@ impl Journal {
         })
     }
 
-    /// Removes the journal: what it held stands elsewhere by now.
+    /// Removes the journal, after its content was written elsewhere.
     ///
     /// # Errors
     /// If it cannot be removed.

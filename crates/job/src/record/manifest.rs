@@ -1,4 +1,4 @@
-//! Manifests: which bytes a figure is made of, in layers.
+//! Manifests: the hashes of a figure, layer by layer.
 //!
 //! A picture has a hash for its spec, its data, its verdict, its pixels and each of its files. The first layer that differs
 //! names the part of the program that changed: spec (the question), data (numerics), verdict (judgement), pixels (drawing), file (encoding).
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Hash;
 
-/// The format's version; a manifest of another version is refused, not guessed at.
+/// The format's version; a manifest of another version is refused.
 pub const VERSION: u32 = 2;
 
 /// All pictures of one figure.
@@ -18,7 +18,7 @@ pub struct Manifest {
     pub version: u32,
     /// The figure, "fig7".
     pub figure: String,
-    /// The crate's version that made it.
+    /// The version of the crate that made it.
     pub made_by: String,
     /// Its pictures.
     pub pictures: Vec<PictureEntry>,

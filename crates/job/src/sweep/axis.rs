@@ -1,4 +1,4 @@
-//! What a sweep varies, and over which values.
+//! Axes of a sweep: the coordinates that it varies, and their values.
 
 use std::fmt;
 use std::str::FromStr;
@@ -138,7 +138,7 @@ pub enum Values {
 pub struct Axis {
     /// What varies.
     pub coordinate: Coordinate,
-    /// Over what.
+    /// Its values.
     pub values: Values,
 }
 
@@ -347,7 +347,7 @@ impl Axis {
         matches!(self.values, Values::Uniform { .. } | Values::LogUniform { .. })
     }
 
-    /// How many values are listed; 1 for a drawn one.
+    /// Number of listed values; 1 for a random axis.
     pub fn count(&self) -> u64 {
         match &self.values {
             Values::Numbers(v) => v.len() as u64,

@@ -1,4 +1,4 @@
-//! Where a run of the caricature never comes back from.
+//! A region that no orbit of the caricature leaves.
 //!
 //! With w = |x|^2 the caricature's y and z obey y' >= -m + (alpha - beta y) w and the same for z, where m is the most that the constant parts
 //! can take away. On the edge y = c of the quadrant y, z >= c is w >= 2 c^2, so wherever (alpha - beta c) 2 c^2 > m no orbit leaves the

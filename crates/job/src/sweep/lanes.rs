@@ -1,4 +1,4 @@
-//! Cells side by side in the lanes of vector registers: the same rows, sooner.
+//! Rows computed side by side in the lanes of vector registers, with the same bits.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -162,7 +162,8 @@ enum Begun {
 }
 
 impl Sweep {
-    /// Whether these two rows would share lanes on this machine: then it pays to ask for many at once.
+    /// Whether these two rows would share lanes on this machine, so that computing many at once
+    /// pays.
     pub fn share_lanes(&self, a: u64, b: u64) -> bool {
         let cells = [a, b].into_iter().filter_map(|number| self.cell(number)).filter(|cell| cell.plane().is_some());
         InstructionSet::best() != InstructionSet::Portable

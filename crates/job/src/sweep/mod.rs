@@ -1,4 +1,4 @@
-//! Sweeps: one run with some of its numbers varied, and what becomes of each.
+//! Sweeps: one run with some of its numbers varied, and the outcome of each.
 //!
 //! A [`Sweep`] is a run, the [`Axis`] list over which it varies, and how often random axes are drawn. Its cells are numbered; a cell is a question
 //! ([`OutcomeQuestion`]) with a key of its own and becomes a row of a table: its settings, and where it ends. A cell that fails is a row with its reason.
@@ -56,7 +56,7 @@ use twofold_analyse::attractor::Thresholds;
 use twofold_integrate::filippov::ExitRule;
 use twofold_num::random::RandomStream;
 
-/// The most rows of a sweep.
+/// Maximum number of rows of a sweep.
 pub const MOST_ROWS: u64 = 1_000_000_000;
 
 /// Marks the streams from which random axes are drawn, so that they share no numbers with the kicks of runs of the same seed.
@@ -68,7 +68,7 @@ const DRAWS: u64 = 0x5377_6565_7000_0000;
 pub struct Sweep {
     /// What all cells have in common.
     run: RunSpec,
-    /// What varies. The last listed axis runs fastest; draws run slowest.
+    /// The axes. The last listed axis runs fastest; draws run slowest.
     over: Vec<Axis>,
     /// How often random axes are drawn in each cell of the grid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -77,7 +77,7 @@ pub struct Sweep {
     thresholds: Thresholds,
 }
 
-/// Random axes: how often, and from what seed.
+/// Draws of random axes: their number and their seed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Draws {
@@ -120,7 +120,7 @@ pub enum SweepError {
 pub struct Shard {
     /// Which part, from 1.
     pub k: u64,
-    /// Of how many.
+    /// Number of parts.
     pub n: u64,
 }
 
@@ -134,7 +134,7 @@ impl Shard {
         (self.k.saturating_sub(1)..sweep.rows()).step_by(step)
     }
 
-    /// How many there are.
+    /// Number of its rows.
     pub fn count(self, sweep: &Sweep) -> u64 {
         sweep.rows().saturating_sub(self.k.saturating_sub(1)).div_ceil(self.n.max(1))
     }
@@ -215,12 +215,12 @@ impl Sweep {
         &self.run
     }
 
-    /// What varies.
+    /// The axes.
     pub fn axes(&self) -> &[Axis] {
         &self.over
     }
 
-    /// How often random axes are drawn, if there are any.
+    /// Draws of random axes, if there are any.
     pub fn draws(&self) -> Option<Draws> {
         self.random
     }
@@ -260,7 +260,7 @@ impl Sweep {
     ///
     /// # Errors
     ///
-    /// Why its settings make none.
+    /// The reason why its settings make no valid question.
     pub fn question(&self, row: u64) -> Result<OutcomeQuestion, String> {
         let mut run = self.run.clone();
         let varied = |c: &Coordinate| self.over.iter().any(|axis| axis.coordinate == *c);

@@ -1,4 +1,4 @@
-//! What becomes of one cell of a sweep.
+//! The outcome of one row of a sweep.
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -21,7 +21,7 @@ use twofold_integrate::Watch;
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutcomeQuestion(pub Classification);
 
-/// Where a run ends, in a row's worth of numbers.
+/// The outcome of a run, as the numbers of a row.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Outcome {
@@ -54,7 +54,7 @@ pub struct Outcome {
     pub steps: u64,
 }
 
-/// An outcome, and where it is: what tells two attractors of one kind apart.
+/// An outcome with its place, which distinguishes attractors of one kind.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ending {
     /// What the run settles on.

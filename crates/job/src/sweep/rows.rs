@@ -1,4 +1,4 @@
-//! The rows of a sweep, from wherever they come, and the files that hold them.
+//! The rows of a sweep, and the files that hold them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -28,7 +28,7 @@ pub struct Row {
     cells: Vec<Entry>,
 }
 
-/// Why rows do not go together.
+/// Why rows cannot be merged.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RowsError {
     /// The file is not one of ours.
@@ -244,7 +244,7 @@ impl Rows {
         self.numerics.iter().map(String::as_str)
     }
 
-    /// How many there are.
+    /// Number of rows.
     pub fn len(&self) -> usize {
         self.lines.len()
     }
@@ -342,7 +342,7 @@ impl Rows {
         Some(Self { sweep, numerics: self.numerics.clone(), lines })
     }
 
-    /// How often each outcome occurred.
+    /// The number of rows with each outcome.
     pub fn counts(&self) -> BTreeMap<String, u64> {
         let mut counts = BTreeMap::new();
         for row in self.iter() {
@@ -365,7 +365,7 @@ impl Rows {
         table
     }
 
-    /// What files say about the rows.
+    /// The description of the rows in their files.
     pub fn about(&self) -> Value {
         let mut about = self.heading();
         about["rows"] = json!(self.sweep.rows());
@@ -405,7 +405,7 @@ impl Rows {
     ///
     /// # Errors
     ///
-    /// If it is anything else, or was changed.
+    /// If it has another form, or was changed.
     pub fn from_csv(bytes: &[u8]) -> Result<Self, RowsError> {
         Self::of_table(encode::from_csv(bytes)?)
     }
