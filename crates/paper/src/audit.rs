@@ -1,4 +1,5 @@
-//! The audit: at which alpha and beta would the paper's outcomes of figs 7, 8 and 9(i) be likely, and which printed digit is then most likely wrong.
+//! The parameter map: the likelihood of the paper's outcomes of figs 7, 8 and 9(i) over alpha and
+//! beta, and the printed digit that is most likely wrong.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +9,8 @@ use twofold_job::table::{Column, Entry, Table};
 use twofold_num::elementary::{exp10, log10};
 use twofold_num::random::RandomStream;
 
-/// The panels whose outcomes are judged: the census' six, and 9(i), fig. 7(iii) with hysteresis.
+/// The panels whose outcomes are judged: the six of the census, and 9(i), fig. 7(iii) with
+/// hysteresis.
 pub const PANELS: [Panel; 7] = {
     let [a, b, c, d, e, f] = census::PANELS;
     [a, b, c, d, e, f, Panel { name: "9(i)", said: Said::Chaos, column: None }]
@@ -20,7 +22,7 @@ pub type Sweeps = [Vec<Table>; 3];
 /// All runs of every panel, for [`cells`].
 pub const ALL: [usize; 7] = [usize::MAX; 7];
 
-/// A pair of parameters, and how likely the paper's seven outcomes are there.
+/// A pair of parameters, and the likelihood of the paper's seven outcomes there.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
     /// Strength of the drift.

@@ -1,5 +1,6 @@
-//! What figures/capture says, by the rules that stand there: times of capture by method, effect sizes of the census, the map of the parameters by LSODA, and
-//! how likely the published outcomes are at each candidate for alpha and beta. The texts stand in docs/capture.md and docs/parameters.md.
+//! Results of figures/capture, by its rules: times of capture by method, effect sizes of the
+//! census, the map of the parameters by LSODA, and the likelihood of the published outcomes at each
+//! candidate for alpha and beta. Writes the tables of docs/capture.md and docs/parameters.md.
 
 use std::fmt::Write as _;
 
@@ -202,7 +203,7 @@ impl Candidate {
     }
 }
 
-/// What the runs say without a prior: how many of them show each outcome.
+/// The table of likelihoods: the number of runs that show each outcome.
 pub fn likelihood_text(candidates: &[Candidate], rules: &Rules) -> String {
     let names = audit::PANELS.iter().map(|p| p.name).chain(["visits"]).collect::<Vec<_>>().join(" | ");
     let mut text = format!(
@@ -227,7 +228,8 @@ const PRIORS: [f64; 4] = [0.5, 0.9, 0.99, 0.999];
 /// Draws from the shares' posteriors.
 const DRAWS: usize = 4000;
 
-/// What follows with a prior: the posterior of the printed and the reconstructed numbers and of the best of the others, for each pseudo-count and prior.
+/// The table of posteriors: of the printed and the reconstructed numbers and of the best of the
+/// others, for each pseudo-count and prior.
 pub fn priors_text(candidates: &[Candidate], rules: &Rules) -> String {
     let place = |at: [f64; 2]| candidates.iter().position(|c| c.at == at);
     let [Some(printed), Some(reconstructed)] = READINGS.map(|(at, _)| place(at)) else { return String::new() };
@@ -292,7 +294,7 @@ fn mapped([fig7, fig8]: [&Table; 2], rules: &Rules) -> Vec<Mapped> {
     pairs.map(cell).collect()
 }
 
-/// The map of the six panels' likelihood by LSODA, and how it differs from that by Dormand-Prince.
+/// The map of the six panels' likelihood by LSODA, compared with that by Dormand-Prince.
 pub fn map_text(lsoda: [&Table; 2], dopri5: [&Table; 2], rules: &Rules) -> String {
     let [ours, other] = [lsoda, dopri5].map(|tables| mapped(tables, rules));
     let mixed = |cell: &Mapped| tally(&cell.runs, rules.end).iter().filter(|n| **n > 0).count() > 1;

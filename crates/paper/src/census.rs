@@ -1,5 +1,6 @@
-//! The census: how often each outcome of a panel of figs 7 and 8 occurs among runs that a reader could not tell apart, and what follows for
-//! the paper's sentences. Rules: [`claims`](super::claims).
+//! The census: the frequency of each outcome of a panel of figs 7 and 8 among runs whose starts
+//! differ by less than a reader could see, and what follows for the paper's claims. Rules:
+//! [`claims`](super::claims).
 
 use std::collections::BTreeMap;
 
@@ -12,7 +13,7 @@ use twofold_job::record::Manifest;
 use twofold_job::table::{Column, Entry, Table};
 use twofold_num::random::RandomStream;
 
-/// What a run is at a given time, as a reader of its section would say.
+/// The kind of motion of a run at a given time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
@@ -31,7 +32,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Kind; 6] =
         [Kind::PeriodOne, Kind::PeriodThree, Kind::OtherRegular, Kind::Irregular, Kind::Far, Kind::Undecided];
 
@@ -48,7 +49,7 @@ impl Kind {
     }
 }
 
-/// What the paper says of a panel.
+/// The paper's claim about a panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Said {
@@ -61,7 +62,7 @@ pub enum Said {
 }
 
 impl Said {
-    /// In a word.
+    /// The claim in a word.
     pub fn words(self) -> &'static str {
         match self {
             Said::Periodic => "periodic",
@@ -71,12 +72,12 @@ impl Said {
     }
 }
 
-/// A panel: its name, what the paper says, and which rows of a sweep are its runs.
+/// A panel: its name, the paper's claim, and the rows of a sweep that are its runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Panel {
     /// "7(i)".
     pub name: &'static str,
-    /// The sentence.
+    /// The claim.
     pub said: Said,
     /// The column that sets it apart from the other panels of its sweep, and its value there; `None` if the sweep is of this panel alone.
     pub column: Option<(&'static str, f64)>,
@@ -112,7 +113,8 @@ pub struct Run {
 }
 
 impl Run {
-    /// What the run is at time `t`: regular once captured, irregular before. Without a time of capture regular motion was so from the start.
+    /// The kind of motion at time `t`: regular once captured, irregular before. Regular motion
+    /// without a time of capture counts as regular from the start.
     pub fn kind(&self, t: f64) -> Kind {
         let later = self.captured_at > t;
         match self.outcome.as_str() {
@@ -147,7 +149,7 @@ pub fn runs(table: &Table, chosen: &[(&str, Entry)]) -> Vec<Run> {
         .collect()
 }
 
-/// How often each kind occurs at time `t`, in the order of [`Kind::ALL`].
+/// The number of runs of each kind at time `t`, in the order of [`Kind::ALL`].
 pub fn tally(runs: &[Run], t: f64) -> [u64; 6] {
     Kind::ALL.map(|kind| runs.iter().filter(|r| r.kind(t) == kind).count() as u64)
 }
@@ -173,7 +175,7 @@ pub fn captures(runs: &[Run], of: impl Fn(&Run) -> bool) -> Vec<[f64; 2]> {
     times.iter().enumerate().map(|(i, t)| [*t, (i + 1) as f64 / n]).collect()
 }
 
-/// A panel's verdict: the outcome that the paper claims happens in this share of runs that a reader could not tell apart.
+/// A panel's result: the share of its runs that support the paper's claim.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PanelShare {
     /// "7(i)".
@@ -218,7 +220,7 @@ pub fn share(panel: &Panel, reading: Reading, runs: &[Run], rules: &Rules) -> Pa
     }
 }
 
-/// Whether groups of runs have the same odds, at the end.
+/// Tests whether groups of runs have the same distribution of outcomes at the end.
 pub fn same_odds(groups: &[Vec<Run>], rules: &Rules) -> Homogeneity {
     let rows: Vec<Vec<u64>> = groups.iter().map(|g| tally(g, rules.end).to_vec()).collect();
     homogeneity(&rows, rules.permutations, rules.permutation_seed)
@@ -233,7 +235,7 @@ pub struct Probability {
     pub interval: [f64; 2],
 }
 
-/// What the panels of a figure do together, one independent run each.
+/// Joint probabilities of the panels of a figure, one independent run each.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Together {
     /// All three outcomes as the paper has them.
@@ -379,15 +381,15 @@ pub struct Data {
 /// Runs of fig. 7(iii) that were not followed to its end.
 #[derive(Clone, Debug)]
 pub struct Shorter {
-    /// How they were computed.
+    /// The method.
     pub name: &'static str,
-    /// How far.
+    /// The end time.
     pub end: f64,
     /// The rows.
     pub table: Table,
 }
 
-/// What the census says in a reading.
+/// Results of the census in one reading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     /// The reading.
@@ -396,15 +398,15 @@ pub struct Found {
     pub shares: Vec<PanelShare>,
     /// Panels' capture curves, in order.
     pub captures: Vec<Vec<[f64; 2]>>,
-    /// Tests of the same odds: between what, and the result.
+    /// Tests of homogeneity: the groups, and the result.
     pub tests: Vec<(&'static str, Homogeneity)>,
     /// Fig. 7's and fig. 8's panels together.
     pub together: [Together; 2],
     /// Kinds at the end by method and by tolerance, with their names.
     pub ways: Vec<(String, [u64; 6])>,
-    /// Kinds of runs that were not followed to the end: how they were computed, until when, how many.
+    /// Kinds of runs that were not followed to the end: method, end time, counts.
     pub shorter: Vec<(String, f64, [u64; 6])>,
-    /// What other limits would make of each panel's claim, in the order of [`LIMITS`].
+    /// Support of each panel's claim under other limits, in the order of [`LIMITS`].
     pub influence: Vec<[u64; 5]>,
 }
 
@@ -437,7 +439,7 @@ pub fn influence(said: Said, runs: &[Run], rules: &Rules) -> [u64; 5] {
 }
 
 impl Found {
-    /// Goes through the data.
+    /// Evaluates the sweeps.
     pub fn of(reading: Reading, data: &Data, rules: &Rules) -> Self {
         let alpha = Entry::Number(reading.caricature().alpha);
         let (mut shares, mut captured, mut groups, mut influences) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -648,7 +650,7 @@ pub const LIMITS_BEGIN: &str = "<!-- limits: what figures/census says; tests/it/
 /// Stands after it.
 pub const LIMITS_END: &str = "<!-- end of limits -->";
 
-/// What other limits would make of the claims, as a table.
+/// Support of the claims under other limits, as a table.
 pub fn limits_text(found: &[Found; 2]) -> String {
     use std::fmt::Write as _;
     let mut text = format!("| panel | reading | runs | {} |\n|---|---|---|{}", LIMITS.join(" | "), "---|".repeat(5));

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use twofold_analyse::attractor::{Evidence, Verdict};
 
-/// What the paper says of a section (figs 7-9).
+/// The paper's claim about a section (figs 7-9).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Claim {
@@ -18,7 +18,7 @@ pub enum Claim {
     PartlyWashedOut,
 }
 
-/// A claim held against a verdict.
+/// A claim compared with a verdict.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Score {
     /// The claim.

@@ -21,7 +21,7 @@ pub struct Claims {
     pub sentence: Vec<Sentence>,
 }
 
-/// What a section is judged by. Times are dimensionless, as the paper's.
+/// Limits by which a section is judged. Times are dimensionless, as the paper's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rules {
@@ -43,7 +43,8 @@ pub struct Rules {
     pub washed_out_confidence: f64,
 }
 
-/// How runs of a delayed switch are compared with those of other rules: what each number means stands in the file.
+/// The comparison of runs of a delayed switch with those of other rules; the file explains each
+/// number.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Similarity {

@@ -3,7 +3,7 @@
 use twofold_analyse::counts::{chi_square_above, normal_quantile, wilson};
 use twofold_num::elementary::{exp, ln, sqrt};
 
-/// How long a run was followed, and whether that is because the event occurred then.
+/// The duration of a run, and whether the event ended it.
 pub type Time = (f64, bool);
 
 /// A value with the ends of its interval.

@@ -94,7 +94,7 @@ pub struct Panel {
     pub title: String,
     /// The run.
     pub run: RunSpec,
-    /// What the paper says of it.
+    /// The paper's claim about it.
     pub claim: Option<Claim>,
     /// Runs that repeat the panel's from starts that a reader could not tell apart.
     pub repeats: Option<Repeats>,
@@ -114,12 +114,12 @@ pub struct Repeats {
     pub count: Count,
 }
 
-/// How many of the runs that repeat a panel support what the paper says of it.
+/// The number of repeated runs of a panel that support the paper's claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Support {
-    /// Runs that support it.
+    /// Runs that support the claim.
     pub support: u64,
-    /// All of them.
+    /// All repeated runs.
     pub runs: u64,
 }
 
@@ -244,7 +244,7 @@ impl Panel {
         Panel { label: label.to_owned(), title: title.into(), run, claim: None, repeats: None }
     }
 
-    /// The panel with what the paper says of it.
+    /// The panel with the paper's claim about it.
     pub fn claimed(self, claim: Claim) -> Self {
         Panel { claim: Some(claim), ..self }
     }

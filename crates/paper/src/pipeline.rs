@@ -15,16 +15,16 @@ use twofold_job::spec::RunSpec;
 use twofold_job::{Answer, AnyQuestion, Executor, JobError, Recording, Run, Stop, Table};
 use twofold_render::{Pixels, RenderError, Rendered, render};
 
-/// A computed picture: what is drawn and what is known about it.
+/// A computed picture and its record.
 #[derive(Clone, Debug)]
 pub struct Computed {
     /// PNG, SVG and PDF.
     pub rendered: Rendered,
-    /// What is known about the picture, as it is written beside it.
+    /// The record that is written beside the picture.
     pub record: PictureRecord,
 }
 
-/// What is known about a picture.
+/// The record of a picture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PictureRecord {
     /// Hashes of every layer.
@@ -41,7 +41,7 @@ pub struct PictureRecord {
     pub panels: Vec<PanelRecord>,
     /// Verdicts on the paper's claims.
     pub verdicts: Vec<PanelVerdict>,
-    /// What it asks, if it is not made of runs.
+    /// Its questions, if it is not made of runs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub questions: Vec<Value>,
     /// The tables' files, name and digest.
@@ -64,7 +64,7 @@ impl PictureRecord {
     }
 }
 
-/// What is known about a table's file.
+/// The record of a table's file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TableRecord {
     /// The file's name.
@@ -77,7 +77,7 @@ pub struct TableRecord {
     pub rows: usize,
 }
 
-/// What is known about a panel.
+/// The record of a panel.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PanelRecord {
     /// Label.
@@ -159,7 +159,7 @@ pub fn compute(picture: &Picture, executor: &Executor<'_>) -> Result<Computed, P
     compute_with_tables(picture, executor, &mut |_, _| Ok(()))
 }
 
-/// What becomes of a table's file: its name and its bytes.
+/// Receives a table's file: its name and its bytes.
 pub type Keep<'a> = dyn FnMut(&str, &[u8]) -> Result<(), FileError> + 'a;
 
 /// [`compute`], and hands a CSV file per table to `keep`, one after the other once the picture is drawn: its name and its bytes. All of them together take more

@@ -31,7 +31,7 @@ pub struct Plot {
     pub label: String,
     /// A few words above the panel, as plain text.
     pub title: String,
-    /// What is asked.
+    /// The question.
     pub question: AnyQuestion,
     /// How the answer is drawn.
     pub drawing: Drawing,
@@ -92,7 +92,7 @@ impl Recorded {
         }
     }
 
-    /// What a picture needs to know of it.
+    /// Data about it that a picture needs.
     pub fn frame(&self) -> Frame<'_> {
         match self {
             Recorded::Surfaces(spec) => Frame::from(spec),

@@ -1,5 +1,6 @@
-//! What figures/resolved says, by the rules that stand there: which outcomes of figs 7 and 8 runs show that resolve the passage of the singularity, and
-//! which only those of LSODA. The texts stand in docs/resolved.md.
+//! Results of figures/resolved, by its rules: the outcomes of figs 7 and 8 that occur in runs which
+//! resolve the passage of the singularity, and those that occur only under LSODA. Writes the tables
+//! of docs/resolved.md.
 
 use std::fmt::Write as _;
 
@@ -44,7 +45,7 @@ pub fn compared(reference: &[Table], runs: &[Table]) -> Vec<Compared> {
     Reading::ALL.into_iter().flat_map(of).collect()
 }
 
-/// Whose an outcome is.
+/// Attribution of an outcome: to the system, or to the method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Belongs {
     /// Resolved runs show it as often as LSODA's, as far as a test tells.
@@ -88,7 +89,7 @@ fn shown(panel: &Panel, runs: &[Run], rules: &Rules) -> [u64; 2] {
     [bears_out(panel.said, runs, rules), runs.len() as u64]
 }
 
-/// Each panel's outcome, by both methods, and whose it is.
+/// Each panel's outcome by both methods, and its attribution.
 pub fn belongs(all: &[Compared], rules: &Rules) -> Vec<(Belongs, f64)> {
     let counts: Vec<[[u64; 2]; 2]> =
         all.iter().map(|c| [&c.reference, &c.runs].map(|runs| shown(&c.panel, runs, rules))).collect();

@@ -5,7 +5,7 @@ use twofold_analyse::counts::wilson;
 use super::Reading;
 use super::claims::claims;
 
-/// What stands in for the discontinuity.
+/// The switching rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
     /// Eq. (8).
@@ -51,7 +51,7 @@ pub struct Run {
     pub reading: String,
     /// A rule's name.
     pub rule: String,
-    /// What had captured it.
+    /// The attractor that captured it.
     pub outcome: String,
     /// Its distances in each way from eq. (8) and from both readings of eq. (10).
     pub distances: [[f64; 3]; 4],
@@ -76,7 +76,7 @@ pub fn runs(csv: &str) -> Option<Vec<Run>> {
         .collect()
 }
 
-/// How a way comes out.
+/// The result of a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Similar {
     /// As near to hysteresis as its runs are to each other, and nearer than to smoothing.
@@ -88,7 +88,7 @@ pub enum Similar {
 }
 
 impl Similar {
-    /// In words.
+    /// The result in words.
     pub fn word(self) -> &'static str {
         match self {
             Self::Yes => "similar",

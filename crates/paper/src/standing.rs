@@ -1,12 +1,13 @@
-//! Pictures that stand: what this very program has drawn of the same questions is there already, and is not drawn again.
+//! Reuse of pictures: one that this program has drawn of the same questions, and that is unchanged,
+//! is not drawn again.
 //!
-//! That one program makes the same bytes of the same questions is what the whole project promises and tests; here it saves time. Once a picture's files are
-//! written, the digest of its record goes into the store, under what the picture asks, together with the digest of the program's own file. Later a picture
-//! stands if the store knows its record *from a program of the same digest*, the record in the folder has the digest that is known, and every file
-//! that the record names has the digest that the record names. Otherwise - another program, a file that is gone or was changed by one
-//! bit - it is made again.
+//! Once a picture's files are written, the store keeps the digest of its record, under the
+//! picture's questions, together with the digest of the program's own file. Later the picture is
+//! reused if the store has a record *by a program of the same digest*, if the record in the folder
+//! has that digest, and if every file named in it has the digest that it names. Otherwise (another
+//! program, a file that is missing or was changed by one bit) the picture is made again.
 //!
-//! Only who has a store comes here: what is checked or blessed, and what is made with `--fresh`, is always computed.
+//! Without a store nothing is reused: `check`, `bless` and `--fresh` always compute.
 
 use std::path::{Path, PathBuf};
 
@@ -21,17 +22,17 @@ use twofold_job::record::{FileError, Hash, files};
 use twofold_job::store::Kept;
 use twofold_job::{Answer, Executor, JobError, Question, Store};
 
-/// Knows which pictures stand.
+/// The pictures that can be reused.
 #[derive(Debug)]
 pub struct Standing<'a> {
     store: &'a Store,
     program: Hash,
 }
 
-/// A picture that need not be made.
+/// A picture that can be reused.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stands {
-    /// What is known about it.
+    /// Its record.
     pub record: PictureRecord,
     /// Its files and their lengths.
     pub files: Vec<(PathBuf, u64)>,
@@ -85,13 +86,14 @@ const RECORD: &str = "record_sha256";
 const PROGRAM: &str = "program_sha256";
 
 impl<'a> Standing<'a> {
-    /// What `store` knows of pictures by this program. None if the program's own file cannot be read: then nothing is known to stand.
+    /// The reusable pictures that `store` records for this program. None if the program's own file
+    /// cannot be read: then nothing is reused.
     pub fn of(store: &'a Store) -> Option<Self> {
         let (program, _) = files::digest(&std::env::current_exe().ok()?).ok()?;
         Some(Self { store, program })
     }
 
-    /// The picture, if it stands in `folder`.
+    /// The picture, if it can be reused from `folder`.
     pub fn find(&self, picture: &Picture, folder: &Path) -> Option<Stands> {
         let question = Drawn(picture);
         let Kept::Answer(known) = self.store.get(&key(&question), &question) else { return None };

@@ -11,7 +11,7 @@ use twofold_render::Sheet;
 /// A picture that asks its own questions and draws the answers. Function pointers keep figures plain data.
 #[derive(Clone, Copy, Debug)]
 pub struct Study {
-    /// What is asked.
+    /// The questions.
     pub questions: fn() -> Vec<AnyQuestion>,
     /// Draws the answers, in the questions' order: panels, legend, subtitle, footer. Title, description and provenance are added by the
     /// pipeline.

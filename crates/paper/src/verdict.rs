@@ -15,7 +15,7 @@ use twofold_job::{AnyQuestion, Classification, Executor, JobError, PathCompariso
 use twofold_num::elementary::sqrt;
 use twofold_num::fit::mean;
 
-/// What the paper says of a panel.
+/// The paper's claim about a panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Claim {
@@ -41,9 +41,9 @@ pub struct PanelVerdict {
     pub panel: String,
     /// The method.
     pub method: String,
-    /// What the paper says.
+    /// The paper's claim.
     pub claim: Claim,
-    /// In its words, or nearly.
+    /// The claim in the paper's words, or close to them.
     pub claim_text: String,
     /// What was found, in one line.
     pub found: String,
@@ -51,7 +51,7 @@ pub struct PanelVerdict {
     pub agrees: bool,
     /// Why, or with what reservation.
     pub because: String,
-    /// What the finding rests on.
+    /// The evidence for the finding.
     pub evidence: Grounds,
 }
 

@@ -1,4 +1,5 @@
-//! Two pictures held against each other: how many pixels differ, how much, and whether the structure is the same.
+//! Comparison of two pictures: the number of pixels that differ, by how much, and the structural
+//! similarity.
 //!
 //! Hashes say *whether* two pictures differ; this says *how*. A picture of ours is mostly white, and what matters may be two dots:
 //! means over the whole picture would call a picture with both dots in the wrong place nearly perfect. So every mean is

@@ -1,4 +1,4 @@
-//! From answers to drawings: sketches and surfaces made of plain data.
+//! Drawings of answers: sketches and surfaces made of plain data.
 //!
 //! ```
 //! use twofold_paper::draw::surface;

@@ -18,7 +18,7 @@ use twofold_system::filippov::Region;
 use super::level::Level;
 use super::surface;
 
-/// What a picture needs to know of a run.
+/// Data about a run that a picture needs.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
     /// The system's title.
@@ -29,7 +29,7 @@ pub struct Frame<'a> {
     pub axes: &'a [usize],
     /// The system, if it has switching surfaces that are drawn.
     pub system: Option<&'a System>,
-    /// What is crossed where crossings were recorded.
+    /// The section whose crossings were recorded.
     pub section: Option<Crossed<'a>>,
     /// When the run begins and ends.
     pub times: (f64, f64),
@@ -83,7 +83,7 @@ impl Frame<'_> {
     }
 }
 
-/// What a picture of a run shows.
+/// The kind of picture of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// States against time, a panel for each.
@@ -123,7 +123,7 @@ impl Kind {
 /// How a run is drawn.
 #[derive(Clone, Debug)]
 pub struct Look {
-    /// What is shown.
+    /// The kind of picture.
     pub kind: Kind,
     /// The states on the axes (of a series: the panels); empty for the ones that suit.
     pub axes: Vec<usize>,

@@ -32,7 +32,7 @@ pub struct Report {
     pub figures: Vec<FigureReport>,
     /// By which programs, on which machines and in what time the figures were made, as far as the folder says.
     pub making: Vec<Making>,
-    /// What could not be read, a line each.
+    /// Files that could not be read, a line each.
     pub problems: Vec<String>,
     /// What docs/findings.md says was found, as HTML; for the page alone.
     #[serde(skip)]
@@ -149,7 +149,7 @@ pub struct ReadingSummary {
     pub reading: Option<Reading>,
     /// Claims of the paper that were judged.
     pub claims: usize,
-    /// Of these, borne out.
+    /// Number of these that hold.
     pub agree: usize,
     /// What was found, each with its number of panels, in order of appearance.
     pub found: Vec<Found>,
@@ -204,7 +204,7 @@ pub struct PictureReport {
     pub hashes: PictureEntry,
     /// Its files.
     pub files: Vec<FileReport>,
-    /// How it stands to the committed reference.
+    /// Its comparison with the committed reference.
     pub reference: Reference,
     /// Its panels.
     pub panels: Vec<PanelReport>,
@@ -241,7 +241,7 @@ pub struct Preview {
 /// Width of previews in pixels.
 pub const PREVIEW_WIDTH: u32 = 960;
 
-/// How a picture stands to the committed reference.
+/// Comparison of a picture with the committed reference.
 #[derive(Clone, Debug, Serialize)]
 #[serde(tag = "state", rename_all = "kebab-case")]
 pub enum Reference {
@@ -274,7 +274,7 @@ pub enum Reference {
 pub struct FileReport {
     /// Path inside the folder of the figures.
     pub path: String,
-    /// What it is.
+    /// Its role.
     pub role: Role,
     /// The panel whose numbers it holds.
     pub panel: Option<String>,
@@ -284,7 +284,7 @@ pub struct FileReport {
     pub bytes: u64,
     /// SHA-256; none if the file is not there.
     pub sha256: Option<Hash>,
-    /// Whether it is what the record says.
+    /// Whether it agrees with its record.
     pub integrity: Integrity,
 }
 
@@ -304,7 +304,7 @@ pub enum Role {
     Record,
 }
 
-/// Whether a file is what its record says.
+/// Whether a file agrees with its record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Integrity {
