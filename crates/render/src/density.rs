@@ -1,4 +1,5 @@
-//! How a cloud of points is drawn: merged where points coincide, large where places are few, and shaded by density where they are many.
+//! Drawing of point clouds: coincident points are merged, few points are drawn large, and many
+//! points are shaded by density.
 
 use super::scene::{Position, UNITS_PER_POINT, units};
 use super::sheet::{Colour, DotStyle};

@@ -1,4 +1,4 @@
-//! Where things lie on a sheet: heading, warning, panels, legend, small print.
+//! Layout of a sheet: heading, warning, panels, legend, small print.
 
 use plotters::style::text_anchor::{HPos, VPos};
 

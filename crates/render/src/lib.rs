@@ -1,4 +1,4 @@
-//! Pictures: from plain data to PNG, SVG and PDF. The only crate that names plotters.
+//! Rendering of plain data to PNG, SVG and PDF. The only crate that uses plotters.
 //!
 //! A [`Sheet`] says what is drawn. It is laid out and drawn once, with plotters' charts and series, through a backend of our own
 //! (`backend`) into a device-independent list of paths (`scene`); three writers turn that one list into pixels, SVG and PDF,

@@ -11,7 +11,7 @@ use super::style;
 use super::ticks::{self, Ticks};
 use twofold_num::elementary;
 
-/// Room that a panel needs around its drawing area, in units.
+/// Space that a panel needs around its drawing area, in units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Insets {
     /// On the left.
@@ -112,7 +112,7 @@ pub fn natural_aspect(panel: &PlanePanel) -> Option<f64> {
     })
 }
 
-/// Room needed around a drawing area of this size.
+/// Space needed around a drawing area of this size.
 pub fn insets(panel: &PlanePanel, w: i32, h: i32) -> Insets {
     if !panel.axes {
         return Insets::default();

@@ -1,7 +1,8 @@
-//! Where a picture comes from, written into the file itself, and a seal by which a later change of the file is noticed.
+//! Provenance of a picture, written into its file, with a seal that reveals later changes of the
+//! file.
 //!
-//! The seal is the SHA-256 of the file as it is with 64 zeros in place of the seal. It tells damage and editing; it is no signature:
-//! whoever wants to can compute it anew.
+//! The seal is the SHA-256 of the file with 64 zeros in place of the seal. It reveals damage and
+//! editing. It is not a signature: anyone can compute it anew.
 
 use sha2::{Digest, Sha256};
 
@@ -19,7 +20,7 @@ pub enum Format {
     Pdf,
 }
 
-/// What a picture says of itself.
+/// The provenance written in a picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Provenance {
     /// Kind of file.

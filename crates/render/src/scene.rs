@@ -43,7 +43,7 @@ pub struct Paint {
     pub opacity: u8,
 }
 
-/// What a set text says and where it stands, for programs that search or read pictures.
+/// The content and place of a text, for programs that search or read pictures.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Words {
     /// The text without markup.
