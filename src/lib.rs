@@ -14,12 +14,12 @@
 //!   are a schedule around a run.
 //! - [`rigor`]: validated steps, sets, Poincaré maps, closed orbits: enclosures that are theorems. The theorems: `proofs/`.
 //! - [`verify`]: checks the theorems' certificates in exact arithmetic; shares nothing with [`rigor`].
-//! - [`analyse`]: what is made of steps: paths, Poincaré sections, exponents, closed orbits.
+//! - [`analyse`]: analysis of trajectories: paths, Poincaré sections, exponents, closed orbits.
 //! - [`job`]: a question as data, its computation, its answer. [`record`]: files, hashes, manifests, all-or-nothing writes.
 //! - [`render`]: the only user of plotters: one drawing, three formats.
-//! - [`paper`]: what speaks of this paper: readings, claims, figures as data.
+//! - [`paper`]: everything specific to this paper: readings, claims, figures as data.
 //! - [`draw`]: drawings from answers. [`compare`]: two pictures, point by point. [`report`]: the page about everything.
-//! - [`cli`]: flags, progress, errors in words.
+//! - [`cli`]: flags, progress, error messages.
 //!
 //! # Why isn't there ...?
 //!
@@ -68,7 +68,7 @@ pub use twofold_rigor as rigor;
 pub use twofold_system as system;
 pub use twofold_verify as verify;
 
-/// What speaks of a paper: readings, claims, verdicts; and this paper's figures as data.
+/// Everything specific to a paper: readings, claims, verdicts; and this paper's figures as data.
 ///
 /// ```
 /// use twofold::job::Executor;

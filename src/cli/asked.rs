@@ -1,4 +1,5 @@
-//! What commands ask, for callers that have a command's flags but want the answer itself: papers' folders and Python.
+//! The questions of commands, for callers that have a command's flags but need the answer itself:
+//! papers' folders and Python.
 
 use std::sync::Arc;
 
@@ -12,7 +13,7 @@ use crate::job::AnyQuestion;
 use crate::job::scan::Scan;
 use crate::paper::plots::Recorded;
 
-/// What a command would compute.
+/// The question of a command.
 pub enum Asked {
     /// One question.
     Question(AnyQuestion),
@@ -35,7 +36,7 @@ fn command<T: Args>() -> Command {
 /// Reads flags, such as `--t-end=10`.
 ///
 /// # Errors
-/// What is wrong with them, in one line.
+/// A message in one line.
 pub fn parsed<T: Args>(flags: Vec<String>) -> Result<T, String> {
     let read = command::<T>().try_get_matches_from(flags).and_then(|m| T::from_arg_matches(&m));
     read.map_err(|error| {

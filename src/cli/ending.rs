@@ -1,4 +1,5 @@
-//! What the ending of a file's name says is in it. Rows under the name of a picture are found out late, by another program.
+//! The format that a file's name implies, checked early: rows under a picture's name would fail
+//! only in another program.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! How a program ends: exit codes, and errors in words.
+//! Exit codes, and errors as messages.
 
 use std::io;
 use std::path::PathBuf;
@@ -40,7 +40,7 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// What can go wrong under the command line. Its text says what was wrong, where, and what to do.
+/// An error of the command line. Its text says what is wrong, where, and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
     /// Bad usage that only one command knows of.
@@ -153,7 +153,7 @@ fn advice(error: &FileError) -> &'static str {
     }
 }
 
-/// Where the rest of an unfinished output is put: beside its place, under a name that nobody takes for the whole.
+/// The path of an unfinished output: beside the finished one, with the suffix `.part`.
 pub fn part_of(file: &std::path::Path) -> PathBuf {
     let mut name = file.as_os_str().to_owned();
     name.push(".part");

@@ -29,7 +29,7 @@ struct Arguments {
     flags: FigureFlags,
 }
 
-/// How figures are made.
+/// Options of making figures.
 #[derive(Clone, Debug, clap::Args)]
 pub struct FigureFlags {
     /// Folder to write to; a folder named after the figure is made in it.
@@ -73,7 +73,7 @@ pub struct FigureFlags {
     print_spec: bool,
 }
 
-/// Where answers are kept, so that nothing is computed twice.
+/// Options of the store.
 #[derive(Clone, Debug, clap::Args)]
 pub struct StoreFlags {
     /// Folder in which answers are kept for the next time.

@@ -1,4 +1,5 @@
-//! Ctrl-C and SIGTERM: leave within a second, with one line, without litter.
+//! Ctrl-C and SIGTERM: the program ends within a second, prints one line, and leaves no temporary
+//! files.
 //!
 //! Most programs here write every picture as soon as it is finished: for them a signal removes the temporary files and ends the
 //! process. A command whose result grows row by row can ask for grace ([`Grace`]): it is told, and has a moment to keep the
@@ -13,21 +14,22 @@ static GRACES: AtomicUsize = AtomicUsize::new(0);
 /// The exit code of the signal that came; 0 before.
 static CAME: AtomicU8 = AtomicU8::new(0);
 
-/// While it lives, a signal is announced first ([`Grace::asked_to_stop`]); the process ends [`GRACE_MS`] later at the latest.
+/// While this value exists, a signal is first announced ([`Grace::asked_to_stop`]); the process
+/// ends at most [`GRACE_MS`] later.
 pub struct Grace(());
 
-/// How long a computation may take to stop and to write what it has.
+/// Time for a computation to stop and to write its rows, in milliseconds.
 pub const GRACE_MS: u64 = 800;
 
 impl Grace {
-    /// Asks for it.
+    /// Enables the grace period.
     #[allow(clippy::new_without_default)] // it is not a value but a state of the process
     pub fn new() -> Self {
         GRACES.fetch_add(1, Ordering::SeqCst);
         Self(())
     }
 
-    /// The exit code of the signal, if one came.
+    /// The exit code of the signal, if one was received.
     pub fn asked_to_stop(&self) -> Option<Exit> {
         match CAME.load(Ordering::SeqCst) {
             0 => None,

@@ -33,7 +33,7 @@ pub use exit::{CliError, Exit};
 pub use figure::{FigureFlags, main, make, run};
 pub use speak::{print, print_bytes};
 
-/// The most threads that can be asked for. More than this many never help here, and tens of thousands hang before they fail.
+/// Maximum number of threads. More never help here, and tens of thousands hang before they fail.
 pub const MOST_THREADS: usize = 1024;
 
 /// Runs `work` on a pool of so many threads (0: one per core).

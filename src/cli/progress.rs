@@ -24,7 +24,7 @@ pub(super) fn clear() {
     }
 }
 
-/// Shows how far runs have come.
+/// Displays the progress of runs.
 pub struct Progress {
     style: Style,
     grace: Option<Grace>,
@@ -58,7 +58,7 @@ impl Progress {
         Self { grace: Some(Grace::new()), ..Self::new(quiet) }
     }
 
-    /// The exit code of the signal for which runs shown here stop, if it came.
+    /// The exit code of the signal that stopped the runs shown here, if one was received.
     pub fn asked_to_stop(&self) -> Option<Exit> {
         self.grace.as_ref().and_then(Grace::asked_to_stop)
     }
@@ -148,7 +148,8 @@ impl Watch for RunProgress<'_> {
     }
 }
 
-/// The progress of many short jobs: how many are finished, and the time left. On a terminal a bar, elsewhere a line now and then.
+/// The progress of many short jobs: the number finished, and the time left. A bar on a terminal,
+/// occasional lines elsewhere.
 pub struct Tally<'a> {
     progress: &'a Progress,
     bar: Option<ProgressBar>,
@@ -216,7 +217,7 @@ impl<'a> Tally<'a> {
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

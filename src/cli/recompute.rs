@@ -1,4 +1,4 @@
-//! Rows that are committed beside a figure, computed anew.
+//! Recomputation of the rows that are committed beside a figure.
 
 use std::path::Path;
 

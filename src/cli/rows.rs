@@ -31,19 +31,19 @@ pub struct Pending {
 }
 
 impl Pending {
-    /// What a shard lacks.
+    /// The missing rows of a shard.
     pub fn of(rows: &Rows, shard: Shard) -> Self {
         let numbers = Box::new(rows.missing(shard));
         Self { numbers, ahead: VecDeque::new(), left: rows.missing_count(shard) }
     }
 
-    /// These numbers.
+    /// The rows of these numbers.
     pub fn these(numbers: Vec<u64>) -> Self {
         let left = numbers.len() as u64;
         Self { numbers: Box::new(numbers.into_iter()), ahead: VecDeque::new(), left }
     }
 
-    /// How many there are.
+    /// Number of rows left.
     pub fn left(&self) -> u64 {
         self.left
     }

@@ -1,5 +1,5 @@
-//! The two streams of a terminal. What is written for people steers no terminal, whatever names it holds; a stream that nobody reads
-//! any more ends no computation.
+//! Output to the two standard streams. Text for people contains no control sequences, whatever
+//! names it holds; a closed stream does not stop a computation.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -43,12 +43,12 @@ pub fn print_bytes(bytes: &[u8]) -> Result<(), CliError> {
     }
 }
 
-/// One line for people on standard error. If nobody can read it, it is lost, and nothing else is.
+/// Prints one line for people to standard error. Failures to write it are ignored.
 pub fn complain(text: &str) {
     let _ = io::stderr().lock().write_all(format!("{}\n", harmless(text)).as_bytes());
 }
 
-/// Where an answer goes and whether its progress is shown, on every command that computes one.
+/// Output flags shared by all commands that compute an answer.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Delivery {
     /// File to write instead of standard output (-).
@@ -85,12 +85,13 @@ pub fn try_delivery(to: Option<&Path>) -> Result<(), CliError> {
     }
 }
 
-/// Whether a file's name means the stream that is open already, whatever that is connected to.
+/// Whether `path` names an open standard stream, such as /dev/stdout.
 pub fn is_standard_output(file: &Path) -> bool {
     ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"].iter().any(|name| file == Path::new(name))
 }
 
-/// Text without characters that steer a terminal or turn the direction of writing. Lines stay lines.
+/// Text without terminal control sequences and without characters that change the writing
+/// direction. Line ends are kept.
 pub fn harmless(text: &str) -> String {
     text.chars().map(|c| if steers(c) && c != '\n' { '\u{fffd}' } else { c }).collect()
 }

@@ -1,4 +1,4 @@
-//! What a paper says, and how it is scored: the kinds of checks.
+//! The claims of a paper, and the checks that score them.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -172,7 +172,7 @@ const ALIKE: f64 = 0.05;
 /// The longest period that is looked for.
 const LONGEST: usize = 64;
 
-/// What a check came to.
+/// The result of a check.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Verdict {

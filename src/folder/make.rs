@@ -14,7 +14,7 @@ use crate::record::files::{read_text, try_folder};
 use crate::record::manifest::VERSION;
 use crate::record::{self, Manifest};
 
-/// What a claim came to: a verdict, or why there is none.
+/// The result of a claim: a verdict, or the reason why there is none.
 #[derive(Debug)]
 pub struct Scored<'a> {
     /// The claim.
@@ -42,7 +42,7 @@ pub struct Outcomes {
     pub verdicts: Vec<Verdict>,
 }
 
-/// How something stands against what is expected.
+/// Comparison with the expectation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "state", rename_all = "kebab-case")]
 pub enum State {
@@ -69,7 +69,7 @@ pub enum State {
 pub struct Finding {
     /// The picture's or claim's name.
     pub name: String,
-    /// How it stands.
+    /// Its comparison with the expectation.
     #[serde(flatten)]
     pub state: State,
 }
@@ -204,7 +204,8 @@ impl Folder {
         Ok(findings)
     }
 
-    /// Makes what was made the expectation, with a line that says why. Gives what changed; nothing is written if nothing did.
+    /// Makes the current results the expectation, and records the reason. Returns the changes;
+    /// writes nothing if there are none.
     ///
     /// # Errors
     /// If a claim could not be scored, or a file cannot be written.
@@ -276,7 +277,7 @@ impl Made<'_> {
         Outcomes { version: 1, verdicts: self.claims.iter().filter_map(|s| s.verdict.as_ref().ok().cloned()).collect() }
     }
 
-    /// What panels say of themselves (`says`), and whether it holds.
+    /// The claims of panels (`says`), and whether they hold.
     pub fn panels(&self) -> impl Iterator<Item = &PanelVerdict> {
         self.pictures.iter().flat_map(|p| &p.verdicts)
     }

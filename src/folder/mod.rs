@@ -77,12 +77,12 @@ pub struct Folder {
     pub claims: Vec<Claim>,
 }
 
-/// What a claim reads.
+/// A source of numbers for claims.
 #[derive(Clone, Debug)]
 pub struct Source {
-    /// In the words of the file.
+    /// The file's text.
     pub said: Said,
-    /// What is asked for.
+    /// The kind of question.
     pub ask: Ask,
     /// The question.
     pub question: AnyQuestion,
@@ -334,7 +334,7 @@ impl Folder {
         Self::read_from(root, Files::Disk(root.to_owned()))
     }
 
-    /// The same of a folder that the program carries with it.
+    /// The same for a folder that is embedded in the program.
     ///
     /// # Errors
     /// As [`Folder::read`].

@@ -1,4 +1,4 @@
-//! The page about a paper, and what archives and CODECHECK take.
+//! The page about a paper, and the metadata for archives and CODECHECK.
 
 use std::fmt::Write as _;
 

@@ -46,7 +46,7 @@ struct Flag {
 /// A file of the folder: its path there and its text.
 type Origin = Arc<(String, String)>;
 
-/// What a question asks for.
+/// The kind of a question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ask {
     /// `twofold run`.

@@ -1,7 +1,8 @@
 //! Every figure of Jeffrey (2013), and the project's own about it, with the committed references.
 //!
-//! What the paper computed stands in `papers/jeffrey-2013`, as anybody's paper does ([`crate::folder`]); sketches and studies, which are more than
-//! runs, are Rust beside their data in `figures/`.
+//! The paper's computed figures are in `papers/jeffrey-2013`, a paper's folder like any other
+//! ([`crate::folder`]); sketches and studies, which are more than runs, are Rust beside their data
+//! in `figures/`.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;

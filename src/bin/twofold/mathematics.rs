@@ -5,8 +5,9 @@
 //! of the platform's, so that a program cannot compute differently where that library is another one; `tests/it/binary.rs` looks that none is asked for. What is unsafe about it
 //! is the promise that these names have the types and meanings that C gives them (C17, 7.12), which they have.
 //!
-//! Only on Linux, where that is tested; not in the library, which must not change what other programs call. The Python module has them too, bound so that nobody
-//! else sees them called (`python/build.rs`).
+//! Only on Linux, where that is tested; not in the library, which must not change the functions
+//! that other programs call. The Python module defines them too, with local binding
+//! (`python/build.rs`).
 #![allow(unsafe_code)]
 
 use twofold::num::elementary;

@@ -1,4 +1,4 @@
-//! `twofold audit`: rows of sweeps, chosen by chance, computed again.
+//! `twofold audit`: recomputes a random sample of a sweep's rows.
 
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! `twofold bless`: make today's figures the reference, with a reason that stays.
+//! `twofold bless`: makes the current figures the reference, and records the reason.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

@@ -1,4 +1,4 @@
-//! `twofold inspect`: what a picture says of itself, and whether that is still so.
+//! `twofold inspect`: prints a picture's provenance and checks its seal.
 
 use std::path::{Path, PathBuf};
 

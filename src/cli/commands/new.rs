@@ -1,4 +1,4 @@
-//! `twofold new`: a system of one's own, to begin with.
+//! `twofold new`: writes a system file to start from.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `twofold check --against DIR`: pictures that somebody published, held against a fresh computation.
+//! `twofold check --against DIR`: compares published pictures with a fresh computation.
 
 use std::path::Path;
 
@@ -30,7 +30,8 @@ struct Finding {
     comparison: Option<Comparison>,
 }
 
-/// Computes every figure of which the folder holds a picture, and says for each picture which criterion is met.
+/// Computes every figure of which the folder holds a picture, and prints for each picture the
+/// criterion that it meets.
 pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool, json: bool) -> Result<Exit, CliError> {
     let tree = read_tree(folder, &|path| path.ends_with(".png"))?;
     let published = tree.files;

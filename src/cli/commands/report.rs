@@ -1,4 +1,4 @@
-//! `twofold report`: one page about everything that was made.
+//! `twofold report`: writes one page about all figures that were made.
 
 use std::path::{Path, PathBuf};
 

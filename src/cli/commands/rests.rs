@@ -1,4 +1,4 @@
-//! `twofold rests`: states that do not move.
+//! `twofold rests`: finds equilibria and pseudo-equilibria.
 
 use serde_json::json;
 

@@ -1,4 +1,4 @@
-//! `twofold run`: any run, not only the paper's.
+//! `twofold run`: computes one run of any system.
 
 use std::io::{self, Write};
 use std::path::Path;

@@ -1,11 +1,12 @@
-//! `twofold store`: what is kept of earlier computations.
+//! `twofold store`: shows and prunes the answers kept from earlier computations.
 
 use std::path::PathBuf;
 
 use crate::cli::{CliError, Exit, print};
 use crate::job::Store;
 
-/// Say how many answers are kept and how much room they take; with --prune remove those that can never be used again.
+/// Print the number of answers kept and the disk space they take; with --prune remove those that
+/// can never be used again.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  twofold store\n  twofold store --prune\n  twofold store --clear")]
 pub struct Arguments {
