@@ -19,7 +19,7 @@ text += ["| " + " | ".join(rows[0]) + " |", "|" + "---|" * len(rows[0])]
 text += ["| " + " | ".join(value or "" for value in row.values()) + " |" for row in rows]
 (HERE / "cost.md").write_text("\n".join(text) + "\n")
 
-# Okabe and Ito's colours, and a mark of its own for each: nobody needs to tell colours apart.
+# Okabe and Ito's colours, and a mark of its own for each: no reader needs to tell colours apart.
 STYLES = {
     "dopri5": ("#d55e00", "circle"),
     "lsoda": ("#0072b2", "square"),

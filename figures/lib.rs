@@ -1,6 +1,7 @@
 //! The figures of Jeffrey (2013) and our own about it: every number of the captions, the committed references and the data they rest on.
 //!
-//! A figure's file calls the library by its public name and paths, as anybody's own figure would (`examples/own_figure.rs`).
+//! A figure's file calls the library by its public name and paths, as a user's figure does
+//! (`examples/own_figure.rs`).
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
 

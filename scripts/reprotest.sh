@@ -33,7 +33,7 @@ else
     cp "$what" "$work/tree/twofold" || exit 2
     make="./twofold $make"
 fi
-# Another user and group for the second run: nobody's. Not for a build, whose toolchain only its owner may read; nor is the time varied there: rustc hangs under faketime.
+# Another user and group for the second run. Not for a build, whose toolchain only its owner may read; nor is the time varied there: rustc hangs under faketime.
 users="--vary=domain_host.use_sudo=1 --vary=user_group.available+=nobody:nogroup"
 [ "$what" != sources ] || users="--vary=domain_host.use_sudo=1 --vary=-user_group --vary=-time"
 # reprotest asks sudo for a host, as sudo no longer allows (since CVE-2025-32462); it means this one.

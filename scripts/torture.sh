@@ -155,7 +155,7 @@ limited -f 1200 30 "2"
 limited -n 40 1 "2 3 127"
 limited -v 400000 8000 "2 3 127 134 139"
 
-# Threads: root has no such limit, so somebody else tries.
+# Threads: root has no such limit, so another user tries.
 if command -v setpriv > /dev/null && [ "$(id -u)" -eq 0 ]; then
     mkdir -p "$work/free" && chmod 755 "$work" && chmod 777 "$work/free"
     cp "$program" "$work/twofold"

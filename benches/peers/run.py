@@ -23,7 +23,7 @@ ROUNDS = int(sys.argv[2]) if len(sys.argv) > 2 else 3
 PYTHON = BUILD / "python/bin/python"
 OURS = BUILD / "units"
 
-# What is asked of whom: name, command, units of work, the row that it is measured against and the most that the ratio should be.
+# The commands that are timed: name, command, units of work, the row that it is compared with, and the limit of the ratio.
 W1 = ["W1 A", "W1 B"]
 W3 = ["W3 A", "W3 B"]
 CRATES = BUILD / "crates-units"

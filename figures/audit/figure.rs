@@ -94,7 +94,7 @@ pub fn support(panel: &str, reading: Reading) -> Result<Support, JobError> {
     let panel = known.ok_or_else(|| JobError::Other(format!("the audit has no runs of {panel} alone")))?;
     let table = table_of(&committed("alpha9.csv")?)?;
     let runs = panel.runs(&table, vec![("params.alpha", reading.caricature().alpha.into())]);
-    Ok(Support { support: census::bears_out(panel.said, &runs, &claims().rules), runs: runs.len() as u64 })
+    Ok(Support { support: census::supporting(panel.said, &runs, &claims().rules), runs: runs.len() as u64 })
 }
 
 /// The printed and the reconstructed alpha and beta.

@@ -125,7 +125,7 @@ pub fn runs(panel: &str, reading: Reading) -> Result<Vec<census::Run>, JobError>
 /// As [`runs`].
 pub fn support(panel: &str, reading: Reading) -> Result<Support, JobError> {
     let (said, runs) = (census::PANELS[place(panel)?].said, runs(panel, reading)?);
-    Ok(Support { support: census::bears_out(said, &runs, &claims().rules), runs: runs.len() as u64 })
+    Ok(Support { support: census::supporting(said, &runs, &claims().rules), runs: runs.len() as u64 })
 }
 
 fn tables(reading: Reading) -> Result<Vec<Table>, JobError> {

@@ -248,7 +248,7 @@ fn side_by_side<A: Send, B: Send>(
     pool.install(|| jobs.into_par_iter().enumerate().map(one).collect())
 }
 
-/// What becomes of start number `k`, counted from 0.
+/// The outcome of start number `k`, counted from 0.
 fn outcome(spec: &RunSpec, k: usize, start: Vec<f64>, work: &Work) -> Result<Value, JobError> {
     let mut run = RunSpec { start, ..spec.clone() };
     // Chance of its own in every run, as the rows of a sweep have it.

@@ -90,7 +90,7 @@ pub fn supervise<T: Send + 'static>(
     let (sender, mut receiver) = mpsc::sync_channel(1);
     let theirs = Arc::clone(&work);
     let thread = thread::Builder::new().name("twofold".into()).stack_size(STACK);
-    // Nobody may be waiting any more.
+    // The receiver may be gone.
     let thread = thread.spawn(move || drop(sender.send(job(&theirs))));
     thread.map_err(|e| PyOSError::new_err(format!("no thread could be started: {e}")))?;
     loop {

@@ -848,7 +848,7 @@ def written(spec: Union[str, bytes, Mapping[str, Any]], format: str = "csv", *, 
         return bytes(_native.written(json.dumps(data, allow_nan=False), format, show))
 
 
-# What becomes of runs -------------------------------------------------------------------------------------------------------------
+# Outcomes of runs ------------------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

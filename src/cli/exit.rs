@@ -97,7 +97,7 @@ pub enum CliError {
     /// Standard output could not be written.
     #[error("cannot write to standard output: {0}")]
     Output(#[from] io::Error),
-    /// Somebody asked to stop; what was finished has been kept.
+    /// The user asked to stop; finished results are kept.
     #[error("{said}")]
     Stopped {
         /// What was kept, and where.

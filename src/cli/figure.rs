@@ -162,9 +162,10 @@ pub fn run(figures: Vec<Figure>, arguments: &FigureFlags) -> Result<(), CliError
     Ok(())
 }
 
-/// Makes these figures, each in a folder of its own under `out`: all their questions first, side by side, the longest first; then the
-/// pictures. Answers that the executor's store keeps are not lost if this is killed. What this program has made in `out` before and nobody has changed since stands,
-/// if there is a store to know it by.
+/// Makes these figures, each in a folder of its own under `out`: all their questions first, side by
+/// side, the longest first; then the pictures. Answers that the executor's store keeps are not lost
+/// if this is killed. Pictures that this program made in `out` before and that are unchanged are
+/// reused, if the store records them.
 ///
 /// # Errors
 ///

@@ -15,8 +15,8 @@ use crate::record::files::write;
 ///
 /// # Errors
 ///
-/// [`CliError::Differs`] if a row comes out otherwise, with how many and the first; [`CliError::Stopped`] if somebody asked to stop; if a
-/// file cannot be read or written.
+/// [`CliError::Differs`] if a row comes out otherwise, with how many and the first;
+/// [`CliError::Stopped`] if the user asked to stop; if a file cannot be read or written.
 pub fn recompute(data: &[(&str, &[u8])], folder: &Path, threads: usize, progress: &Progress) -> Result<(), CliError> {
     let mut otherwise = Vec::new();
     for (name, bytes) in data {
@@ -28,7 +28,8 @@ pub fn recompute(data: &[(&str, &[u8])], folder: &Path, threads: usize, progress
         if lines.is_empty() {
             journal.append(&rows.journal_heading())?;
         } else {
-            // A journal of another program version or other data says nothing about this one: it is begun anew by whoever removes it.
+            // A journal of another program version or of other data is of no use here; the user
+            // removes it to begin anew.
             let old = Rows::from_journal(&lines).map_err(|e| unusable(&e))?;
             if old.numerics().any(|n| n != NUMERICS) {
                 let path = journal_of(&file);

@@ -63,8 +63,8 @@ impl Pending {
     }
 }
 
-/// Computes the rows of these numbers on so many threads (0: one per core) and adds them to `rows`, and to `journal` as they finish. Whoever
-/// asks to stop gets what is finished.
+/// Computes the rows of these numbers on so many threads (0: one per core) and adds them to `rows`,
+/// and to `journal` as they finish. A request to stop keeps the finished rows.
 ///
 /// # Errors
 ///

@@ -181,9 +181,9 @@ struct PanelFile {
     /// What a reading changes in the run.
     #[serde(default)]
     r#in: BTreeMap<Spanned<String>, Spanned<Words>>,
-    /// What the paper says of a section or path drawn as `halves` or `surface`; the verdict stands on its face.
+    /// What the paper says of a section or path drawn as `halves` or `surface`; the picture shows the verdict.
     says: Option<Spanned<PanelClaim>>,
-    /// Committed runs that repeat it, by study and name; the share that bears out what the paper says stands on its face.
+    /// Committed runs that repeat it, by study and name; the picture shows the share that supports the claim.
     repeats: Option<Spanned<String>>,
     /// States on the axes.
     axes: Option<Spanned<Vec<String>>>,

@@ -66,7 +66,7 @@ fn imports(file: &[u8]) -> Vec<String> {
         let (start, length) = (number(file, section(i) + 0x18, 8), number(file, section(i) + 0x20, 8));
         let strings = number(file, section(number(file, section(i) + 0x28, 4)) + 0x18, 8);
         for symbol in (start..start + length).step_by(24) {
-            // SHN_UNDEF: somebody else's.
+            // SHN_UNDEF: an imported symbol.
             if number(file, symbol + 6, 2) == 0 {
                 found.push(name(file, strings + number(file, symbol, 4)));
             }

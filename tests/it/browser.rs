@@ -3,7 +3,8 @@
 use std::path::Path;
 use std::process::Command;
 
-// Not run where nobody asked for it: a test that finds no Node or no browser has not passed. `make browser-test` does ask.
+// Run only on request (`make browser-test`): a test that finds no Node or no browser has not
+// passed.
 #[test]
 #[ignore = "needs Node and a Chromium: make browser-test"]
 fn the_report_works_in_a_browser() {

@@ -17,7 +17,7 @@ use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::job::{Executor, PathComparison};
 use twofold::num::random::RandomStream;
-use twofold::paper::census::{Kind, PANELS, bears_out, tally};
+use twofold::paper::census::{Kind, PANELS, supporting, tally};
 use twofold::paper::claims::{Quantity, claims};
 use twofold::paper::{Figure, Reading, figures};
 use twofold::record::Manifest;
@@ -84,7 +84,7 @@ fn every_quantity_is_read_by_the_test_that_claims_toml_names() {
             "{test} begins with `{first}`: it must begin with the quantities that it reads"
         );
     }
-    // And nobody asks for what is not named.
+    // And no quantity is read that is not named.
     let files = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
     for file in files.filter(|file| file.extension().is_some_and(|e| e == "rs")) {
         let text = fs::read_to_string(file).unwrap();
@@ -426,7 +426,7 @@ fn the_census_counts_outcomes() {
     for reading in Reading::ALL {
         let of = |quantity| of(reading, quantity);
         let runs = PANELS.map(|panel| figures::census::runs(panel.name, reading).unwrap());
-        let support: Vec<u64> = PANELS.iter().zip(&runs).map(|(p, runs)| bears_out(p.said, runs, &rules)).collect();
+        let support: Vec<u64> = PANELS.iter().zip(&runs).map(|(p, runs)| supporting(p.said, runs, &rules)).collect();
         for (id, hits) in ["7.1", "7.2", "7.3", "8.1", "8.2", "8.3"].into_iter().zip(&support) {
             reads.read(id, &of("runs of the panel with this outcome"), *hits as f64);
         }

@@ -124,7 +124,7 @@ fn pictures_that_cannot_be_are_refused_with_reasons() {
     assert_eq!(fs::read_dir(at).unwrap().count(), 1, "something was written");
 }
 
-/// A table in a file that is called a picture would be noticed by whoever opens it.
+/// A table in a file with a picture's name is refused: it would fail only when it is opened.
 #[test]
 fn numbers_go_into_files_that_are_named_for_them() {
     let folder = tempfile::tempdir().unwrap();

@@ -93,7 +93,8 @@ fn versions_agree() {
     assert!(text(".github/workflows/ci.yml").contains(&format!("rust-version: {channel}\n")));
 }
 
-/// Git for Windows ends lines with two characters if nobody says otherwise, also of files that are compiled in or compared byte for byte.
+/// Git for Windows ends lines with two characters by default, also in files that are compiled in or
+/// compared byte for byte.
 #[test]
 fn files_are_checked_out_as_they_are_committed() {
     if workflows().is_empty() {

@@ -27,7 +27,7 @@ impl Running {
         self.0.as_mut().unwrap()
     }
 
-    /// Nobody reads what it says any more.
+    /// Standard error has no reader any more.
     fn unread(mut self) -> Self {
         self.child().stdout = None;
         self.child().stderr = None;
@@ -294,7 +294,7 @@ fn a_full_disk_is_an_error() {
     }
 }
 
-/// Nobody reads standard error any more (`2>&1 | head -1`): every file is there all the same.
+/// Standard error has no reader any more (`2>&1 | head -1`): every file is there all the same.
 #[test]
 fn an_unread_standard_error_costs_nothing() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! What a Filippov run decides by itself, and what it leaves to the one who asked: values known in closed form.
+//! What a Filippov run decides, and what it leaves to the user: values known in closed form.
 
 use assert_cmd::Command;
 

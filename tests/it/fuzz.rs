@@ -1,6 +1,8 @@
-//! Every reader of foreign bytes (fuzz/targets.rs) against inputs that nobody meant: the committed corpus as it is, then changed by chance. An input that comes to an answer
-//! which none came to before is kept and changed further, so that a search goes deeper without looking into the program. `make fuzz FUZZ_SECONDS=600` searches so long a
-//! target; without the variable each target gets a few hundred inputs, always the same.
+//! Every reader of foreign bytes (fuzz/targets.rs) against malformed inputs: the committed corpus
+//! as it is, then with random changes. An input that comes to an answer which none came to before
+//! is kept and changed further, so that a search goes deeper without looking into the program.
+//! `make fuzz FUZZ_SECONDS=600` searches so long a target; without the variable each target gets a
+//! few hundred inputs, always the same.
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -1,4 +1,4 @@
-//! `twofold inspect` and `twofold check --against DIR`: what somebody who only has the files can find out.
+//! `twofold inspect` and `twofold check --against DIR`: what the files alone show.
 
 use crate::common;
 

@@ -152,7 +152,8 @@ fn rows_that_lanes_do_not_take_are_computed_alone() {
     are_the_rows(&Sweep::new(five, axes(&["shift.x=1e-3*4"]), None).unwrap());
 }
 
-/// Rows whose verdict waits for an exponent: these share lanes too. (`job::exponent` has more of them, over shorter times.)
+/// Rows whose verdict needs an exponent: these share lanes too. (`job::exponent` has more of them,
+/// over shorter times.)
 #[test]
 fn rows_wait_for_exponents_together() {
     let run = RunSpec { switch: SwitchSpec::tanh(1e-2), ..run(Caricature::with_reinjection(0.1, 1e-4).into(), 1000.0) };
@@ -170,7 +171,8 @@ fn rows_wait_for_exponents_together() {
     methods.rows_together(&[0, 1, 2, 3, 4, 5], &groups, &mut take).unwrap();
     assert!(words.iter().filter(|word| ["irregular", "undecided"].contains(&word.as_str())).count() >= 3, "{words:?}");
     assert_eq!(groups.0.into_inner(), u64::from(InstructionSet::best() != InstructionSet::Portable));
-    // Whoever asks to stop while they are computed gets no rows, and who wants no more than one gets no more.
+    // A request to stop while they are computed gives no rows; a receiver that wants one row gets
+    // one.
     let numbers = [0, 1, 2];
     let mut none = |row: Row| panic!("row {}", row.number());
     let stopped = sweep.rows_together(&numbers, &NoExponents, &mut none);
@@ -239,7 +241,7 @@ fn who_asks_to_stop_gets_the_finished_rows() {
     });
     assert_eq!(stopped, Err(JobError::Interrupted));
     assert!(taken.len() < numbers.len(), "{taken:?}");
-    // Whoever wants no more gets no more, and that is no error.
+    // A receiver that wants no more rows gets no more, without an error.
     let mut count = 0;
     let enough = sweep.rows_together(&numbers, &(), &mut |_| {
         count += 1;

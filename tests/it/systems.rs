@@ -1,4 +1,4 @@
-//! Anybody's system, from a file to recorded data, in any dimension.
+//! A user's system, from a file to recorded data, in any dimension.
 #![cfg(feature = "cli")]
 #![allow(clippy::disallowed_methods)] // compared with tolerances, not with hashes
 

@@ -103,7 +103,7 @@ pub fn digits<F: VectorField<3>>(field: &F, question: &DigitsQuestion) -> Result
     Ok(answer)
 }
 
-/// A comparison that waits for its method.
+/// A comparison as a computation over any stepper.
 struct Follow<'a, F> {
     field: &'a F,
     x0: SVector<f64, 3>,

@@ -36,7 +36,7 @@ where
     delayed.with_tangent(settings.tolerance, Waiting { settings, watch }).map_err(refused)?
 }
 
-/// An estimate that waits for its stepper.
+/// An estimate as a computation over any stepper.
 struct Waiting<'a> {
     settings: &'a LyapunovOptions,
     watch: &'a dyn Watch,

@@ -100,7 +100,7 @@ pub fn work_precision<F: VectorField<N>, const N: usize>(
     Ok(rows.collect())
 }
 
-/// A run that waits for its method.
+/// A run as a computation over any stepper.
 struct Run<'a, F, const N: usize> {
     field: &'a F,
     x0: SVector<f64, N>,

@@ -35,7 +35,7 @@ pub enum Method {
 
 /// A computation over any stepper. It is a trait because a stepper's type depends on the method.
 pub trait WithStepper<const N: usize> {
-    /// What comes of it.
+    /// The result.
     type Answer;
     /// Does it.
     fn with<M: Stepper<N>>(self, stepper: M) -> Self::Answer;

@@ -757,7 +757,8 @@ fn lanes_are_runs_alone() {
                     assert_eq!(met, met_alone[often(i)], "run {i} of {count}, {set:?}");
                 }
             }
-            // A watch that refuses ends what is not finished; nothing is asked of it before so many steps.
+            // A watch that refuses ends the unfinished runs; it is first asked after a number of
+            // steps.
             let mut finished = 0;
             let long = [EnsembleRun {
                 start: START.into(),

@@ -53,11 +53,11 @@ impl Question for Classification {
     }
 
     fn label(&self) -> String {
-        format!("what becomes of {}", Run(self.run.clone()).label())
+        format!("outcome of {}", Run(self.run.clone()).label())
     }
 
     fn cost(&self) -> f64 {
-        // Most runs are judged at a glance; some want an exponent.
+        // Most runs are classified from their section; some need an exponent.
         0.02 * Run(self.run.clone()).cost()
     }
 
@@ -101,7 +101,7 @@ const LENGTHS: Lengths = Lengths {
     hysteretic_average: 2_000.0,
 };
 
-/// A judgement, or what it waits for.
+/// A classification, or the exponent that it needs.
 pub(super) enum SoFar<T> {
     Judged(T),
     /// Neighbours part, or not: the points do not say.
@@ -148,7 +148,7 @@ impl Classification {
         Ok(classify(&section, &attractor::Question { lyapunov: exponent, ..self.asked() }, &self.thresholds))
     }
 
-    /// What is asked of the section's points.
+    /// The question about the section's points.
     fn asked(&self) -> attractor::Question<'static> {
         let run = &self.run;
         let random_exits = matches!(run.switch, SwitchSpec::Filippov { exit: ExitRule::Random { .. }, .. });
@@ -304,7 +304,8 @@ mod tests {
         Classification::of(crate::cases::run(system, switch, t_end, Observation::Section { coordinate: 0, value: 0.0 }))
     }
 
-    /// A run rests on itself; a kicked one on its eight twins too; one without section on nothing, and is refused.
+    /// A classification depends on its run; of a kicked run also on eight noise-free runs; of a run
+    /// without a section on nothing, and it is refused.
     #[test]
     fn what_a_verdict_rests_on() {
         use twofold_integrate::{Kick, KickLaw};

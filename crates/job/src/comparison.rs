@@ -45,7 +45,7 @@ impl Question for PathComparison {
 }
 
 fn path(executor: &Executor<'_>, run: &RunSpec) -> Result<Vec<Sample>, JobError> {
-    // Many pairs are compared, of paths that nobody else looks at and that together fill much memory.
+    // Many pairs are compared, of paths that have no other use and together fill much memory.
     let recording = Recording::of_answer(run, &*executor.ask_in_passing(&Run(run.clone()))?)?.whole()?;
     match recording.data {
         Data::Path(samples) => Ok(samples),

@@ -559,7 +559,7 @@ mod tests {
         }
     }
 
-    /// Columns of different lengths, a word that is not there, a kind that nobody knows, bytes behind the end.
+    /// Columns of different lengths, a missing word, an unknown kind, bytes after the end.
     #[test]
     fn bits_that_are_no_table_are_refused() {
         let t = table(vec![1.0, 2.0], vec!["up".into(), "down".into()]);

@@ -217,7 +217,7 @@ mod tests {
         let executor = Executor::new(Some(Store::new(folder.path())), &());
         executor.gather(&questions);
         assert_eq!((COUNT.load(Ordering::Relaxed), held(&executor)), (8, 0));
-        // Asked for, they come from the store; what somebody holds stays.
+        // Forgotten answers come from the store; answers with another owner stay in memory.
         let held_by_us = executor.ask(&Fibonacci(7, &COUNT)).unwrap();
         executor.ask(&Fibonacci(6, &COUNT)).unwrap();
         executor.forget();

@@ -57,7 +57,7 @@ pub trait Question: fmt::Debug + Send + Sync {
         Vec::new()
     }
 
-    /// Computes the answer. Other questions may be asked of `executor`; each is computed once.
+    /// Computes the answer. It may put other questions to `executor`; each is computed once.
     ///
     /// # Errors
     ///
@@ -162,7 +162,7 @@ mod tests {
     use twofold_integrate::{StepCap, Tolerance};
     use twofold_system::{Caricature, System, Transition};
 
-    /// What the one who asked can mend, and what nobody can by asking otherwise.
+    /// Distinguishes wrong questions from failed computations.
     #[test]
     fn a_question_is_at_fault_or_its_computation_is() {
         let spec = SpecError { field: "start", value: "x".into(), rule: "give numbers" };

@@ -152,7 +152,7 @@ fn streamed<const D: usize>(
     let mut give = |data: Data<D>| {
         let more = Recording::part(spec, &data, first_piece).is_none_or(|table| {
             count += table.len() as u64;
-            // One step may hold more samples than anybody waits for.
+            // One step may hold very many samples, so the watch is asked between them.
             let t = table.numbers("t").last().copied();
             stopped.set(t.filter(|t| !watch.reached(*t)));
             rows(&table) && stopped.get().is_none()
@@ -305,7 +305,7 @@ fn full(t: f64) -> JobError {
     JobError::TooManyPoints { t, limit: MOST_POINTS }
 }
 
-/// What a dimension that is not provided for looks like to the one who asked.
+/// The error for a number of states that is not compiled.
 fn too_many_states(spec: &RunSpec, rule: &'static str) -> JobError {
     SpecError { field: "system", value: format!("one of {} states", spec.system.dimension()), rule }.into()
 }

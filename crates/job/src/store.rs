@@ -156,7 +156,7 @@ impl Store {
                 if key.get(..2) != Some(folder.as_str()) {
                     continue;
                 }
-                // A file that cannot be read is nobody's to remove.
+                // A file that cannot be read is not removed.
                 let Ok(bytes) = files::read(&self.folder.join(&folder).join(&file)) else { continue };
                 let whole = read(&bytes).ok().map(|(header, _)| header);
                 if whole.is_some() || is_entry_of(key, &bytes) {

@@ -55,7 +55,7 @@ impl PartialEq for Words {
     }
 }
 
-/// A longer vocabulary is not looked through word by word: somebody else's file may have a million.
+/// Vocabulary length above which words are found through a map: a foreign file may have a million.
 const SHORT: usize = 32;
 
 impl Words {

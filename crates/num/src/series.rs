@@ -278,7 +278,8 @@ impl<S: Elementary + FromDecimal> Solution<S> {
         for (i, value) in x.iter().enumerate() {
             self.coefficients[i * width] = *value;
         }
-        // Asked of the type and not of a constant of it: what is compiled for each degree is compiled for this type alone.
+        // A test of the type, not of a constant of it, so that the code for each degree is compiled
+        // for this type alone.
         if let Some(solution) = (self as &mut dyn Any).downcast_mut::<Solution<f64>>().filter(|s| !s.rows.is_empty()) {
             solution.expand_rows();
         } else {

@@ -112,7 +112,7 @@ pub struct Parameter {
 #[derive(Clone, Debug, Default)]
 pub struct Tape {
     variables: usize,
-    /// The variables' names, for messages; none where nobody gave them.
+    /// The variables' names, for messages; empty if none were given.
     names: Vec<String>,
     operations: Vec<Operation>,
     constants: Vec<Decimal>,

@@ -102,7 +102,7 @@ pub fn cells(sweeps: &Sweeps, most: [usize; 7], rules: &Rules) -> Vec<Cell> {
             let runs = sweeps[i / 3].iter().flat_map(|table| runs_at(table, at, panel));
             let runs: Vec<Run> = runs.take(most[i]).collect();
             let far = runs.iter().filter(|r| r.outcome == "far").count() as u64;
-            *found = (runs.len() as u64, census::bears_out(panel.said, &runs, rules), far);
+            *found = (runs.len() as u64, census::supporting(panel.said, &runs, rules), far);
         }
         Cell::of(at[0], at[1], found)
     };

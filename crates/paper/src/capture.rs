@@ -286,7 +286,7 @@ fn mapped([fig7, fig8]: [&Table; 2], rules: &Rules) -> Vec<Mapped> {
         let panels: Vec<Vec<Run>> =
             PANELS.iter().enumerate().map(|(i, p)| p.runs([fig7, fig8][i / 3], chosen())).collect();
         let share = |(panel, runs): (&census::Panel, &Vec<Run>)| {
-            let hits = census::bears_out(panel.said, runs, rules);
+            let hits = census::supporting(panel.said, runs, rules);
             log10((hits as f64 + 0.5) / (runs.len() as f64 + 1.0))
         };
         Mapped { at, log_likelihood: PANELS.iter().zip(&panels).map(share).sum(), runs: panels.concat() }

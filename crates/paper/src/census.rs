@@ -155,7 +155,7 @@ pub fn tally(runs: &[Run], t: f64) -> [u64; 6] {
 }
 
 /// Number of runs that support a claim: periodic from `shown_from` on, or irregular to the end.
-pub fn bears_out(said: Said, runs: &[Run], rules: &Rules) -> u64 {
+pub fn supporting(said: Said, runs: &[Run], rules: &Rules) -> u64 {
     let is = |run: &&Run| match said {
         Said::Periodic => {
             run.kind(rules.shown_from) != Kind::Irregular && run.outcome == format!("period-{}", run.period)
@@ -202,7 +202,7 @@ pub struct PanelShare {
 
 /// A panel's runs, judged.
 pub fn share(panel: &Panel, reading: Reading, runs: &[Run], rules: &Rules) -> PanelShare {
-    let hits = bears_out(panel.said, runs, rules);
+    let hits = supporting(panel.said, runs, rules);
     let at_end = tally(runs, rules.end);
     let captured: Vec<f64> = captures(runs, |_| true).iter().map(|p| p[0]).collect();
     let quartile = |q: usize| captured.get((captured.len() * q / 4).min(captured.len().saturating_sub(1)));
@@ -427,14 +427,14 @@ pub const LIMITS: [&str; 5] =
 
 /// Number of a panel's runs that support the claim, for each limit in [`LIMITS`].
 pub fn influence(said: Said, runs: &[Run], rules: &Rules) -> [u64; 5] {
-    let from = |shown_from: f64| bears_out(said, runs, &Rules { shown_from, ..*rules });
+    let from = |shown_from: f64| supporting(said, runs, &Rules { shown_from, ..*rules });
     let undecided = if said == Said::Chaos { tally(runs, rules.end)[5] } else { 0 };
     [
-        bears_out(said, runs, rules),
+        supporting(said, runs, rules),
         from(0.5 * rules.shown_from),
         from(1.5 * rules.shown_from),
-        bears_out(said, runs, &Rules { end: rules.shown_from, ..*rules }),
-        bears_out(said, runs, rules) + undecided,
+        supporting(said, runs, &Rules { end: rules.shown_from, ..*rules }),
+        supporting(said, runs, rules) + undecided,
     ]
 }
 
@@ -716,9 +716,9 @@ mod tests {
             run("irregular", 0, f64::NAN),
         ];
         // Period three is periodic; captured too late, rings and orbits that leave are not.
-        assert_eq!(bears_out(Said::Periodic, &runs, &rules), 3);
-        assert_eq!(bears_out(Said::PeriodThree, &runs, &rules), 1);
-        assert_eq!(bears_out(Said::Chaos, &runs, &rules), 1);
+        assert_eq!(supporting(Said::Periodic, &runs, &rules), 3);
+        assert_eq!(supporting(Said::PeriodThree, &runs, &rules), 1);
+        assert_eq!(supporting(Said::Chaos, &runs, &rules), 1);
         assert_eq!(tally(&runs, rules.end), [1, 2, 3, 1, 0, 0]);
     }
 

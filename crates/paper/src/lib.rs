@@ -1,9 +1,10 @@
 //! Figures as data.
 //!
-//! A [`Figure`] is a list of pictures, a picture a list of panels, a panel a question ([`RunSpec`]). The way of every
-//! figure is the same: questions -> [`pipeline`] (asked of an [`Executor`](twofold_job::Executor) side by side, each computed once) -> answers
-//! -> [`drawing`] -> bytes -> files. The figures themselves stand in a paper's folder or in `figures/NAME/figure.rs`: every number of the
-//! paper's caption, and nothing else.
+//! A [`Figure`] is a list of pictures, a picture a list of panels, a panel a question
+//! ([`RunSpec`]). The way of every figure is the same: questions -> [`pipeline`] (put to an
+//! [`Executor`](twofold_job::Executor) in parallel, each computed once) -> answers -> [`drawing`]
+//! -> bytes -> files. The figures themselves stand in a paper's folder or in
+//! `figures/NAME/figure.rs`: every number of the paper's caption, and nothing else.
 //!
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use super::Reading;
 use super::capture::time;
-use super::census::{self, Kind, PANELS, Panel, Run, bears_out, p_in_words, percent, tally};
+use super::census::{self, Kind, PANELS, Panel, Run, supporting, p_in_words, percent, tally};
 use super::claims::Rules;
 use super::effects::{self, LogRank};
 use twofold_analyse::counts::{homogeneity, wilson};
@@ -86,7 +86,7 @@ impl Belongs {
 
 /// Runs that show the panel's outcome, and all.
 fn shown(panel: &Panel, runs: &[Run], rules: &Rules) -> [u64; 2] {
-    [bears_out(panel.said, runs, rules), runs.len() as u64]
+    [supporting(panel.said, runs, rules), runs.len() as u64]
 }
 
 /// Each panel's outcome by both methods, and its attribution.

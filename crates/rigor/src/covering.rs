@@ -1,10 +1,12 @@
 //! Covering relations: proofs of chaos.
 //!
-//! An h-set is a parallelogram in a plane of section with a direction to be stretched and one to be squeezed, c + u U + v V with u and v in [-1, 1]. It
-//! *covers* another under a map if the image of its two edges u = -1 and u = 1 lies on either side of the other, beyond *its* edges
-//! u = -1 and u = 1, and the image of all of it keeps away from the other's edges v = -1 and v = 1 (Zgliczynski & Gidea 2004, Definitions 1
-//! and 2, for one direction of stretching). Whoever finds, for every symbol of a chain or of a loop, a set that covers the next one, has an orbit that visits them in this order,
-//! and for a loop a periodic one (their Theorem 4): two sets that both cover both make a horseshoe.
+//! An h-set is a parallelogram in a plane of section with a direction to be stretched and one to be
+//! squeezed, c + u U + v V with u and v in [-1, 1]. It *covers* another under a map if the image of
+//! its two edges u = -1 and u = 1 lies on either side of the other, beyond *its* edges u = -1 and u
+//! = 1, and the image of all of it keeps away from the other's edges v = -1 and v = 1 (Zgliczynski
+//! & Gidea 2004, Definitions 1 and 2, for one direction of stretching). If in a chain or loop of
+//! sets each covers the next one, there is an orbit that visits them in this order, and for a loop
+//! a periodic one (their Theorem 4): two sets that both cover both make a horseshoe.
 //!
 //! The map is the return to the plane by a flow. The set is cut across the direction of stretching into pieces small enough for each image to be decided; the
 //! image of a piece is enclosed in the other set's own coordinates (u, v), so that an image much longer than wide is seen as what it is.

@@ -5,10 +5,11 @@
 //! vector field: on h = 0 its motion is defined by Filippov's convention ([`filippov`]) and at a two-fold it is
 //! set-valued.
 //!
-//! Both exist as data of any dimension: a [`Definition`] is read from a file, a [`System`] is a definition with values for its
-//! parameters, and a [`Field`] is what becomes of a system by smoothing, hysteresis, reversing time, sliding, or carrying tangent
-//! vectors along. [`library`] holds the built-in ones. Bound to a dimension ([`System::bind`], [`Field::bind`]) they are evaluated over
-//! any number type.
+//! Both exist as data of any dimension: a [`Definition`] is read from a file, a [`System`] is a
+//! definition with values for its parameters, and a [`Field`] is an equation made from a system by
+//! smoothing, hysteresis, time reversal or sliding, with or without tangent vectors. [`library`]
+//! holds the built-in ones. Bound to a dimension ([`System::bind`], [`Field::bind`]) they are
+//! evaluated over any number type.
 //!
 //! The paper's own two, [`Caricature`] and [`Wheel`], exist as Rust too, with [`Smoothed`] and [`Hysteretic`] on top: fast paths, tested to
 //! give the bits of the files. Equations in Rust are generic over [`Elementary`], so that each is written once.
@@ -62,7 +63,8 @@ pub trait VectorField<const N: usize>: Sync {
     const INTERPRETED: bool = false;
     /// The right-hand side f(x).
     fn eval<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
-    /// How many bundles of registers [`VectorField::eval_in_registers`] wants for what lies between: a power of two, or none.
+    /// Number of register bundles that [`VectorField::eval_in_registers`] needs for intermediate
+    /// results: a power of two, or 0.
     #[doc(hidden)]
     fn scratch_len(&self) -> usize {
         0
@@ -106,7 +108,7 @@ pub trait PiecewiseSmooth<const N: usize>: Sync {
     fn plus<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
     /// The vector field f- that holds where h < 0; smooth and defined on both sides.
     fn minus<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
-    /// The states' names, which messages use; none if nobody gave them.
+    /// The states' names, which messages use; empty if none were given.
     fn names(&self) -> Vec<String> {
         Vec::new()
     }

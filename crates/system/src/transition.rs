@@ -30,7 +30,8 @@ impl Transition {
     #[inline(always)]
     pub fn eval<S: Elementary>(&self, h: S, eps: f64) -> S {
         let width = S::from_f64(eps);
-        // h/eps in every arm, and not once before them: where tanh is known beforehand (`num::Given`) nobody asks for it.
+        // h/eps in every arm, and not once before them: where tanh is prescribed (`num::Given`) it
+        // is not needed.
         match *self {
             Transition::Tanh => half((h / width).tanh()),
             Transition::PerturbedTanh { sigma } => {

@@ -33,7 +33,8 @@ pub struct Arguments {
     /// Rows that are recomputed, of each figure or file.
     #[arg(long, value_name = "N", default_value_t = 8)]
     rows: usize,
-    /// Another choice of them: a number that only you know makes sure that nobody chose them for you.
+    /// Seed of the random choice of rows: with a number that only you know, the rows cannot have
+    /// been prepared.
     #[arg(long, value_name = "SEED", default_value_t = 0)]
     seed: u64,
     /// Recompute all of them.

@@ -11,7 +11,8 @@ use crate::paper::pipeline::pixel_hash;
 use crate::record::{self, Hash, Manifest, PictureEntry};
 use crate::render::{Format, Provenance, ProvenanceError, decode_png, read_provenance};
 
-/// Print the provenance inside a PNG, SVG or PDF file and say whether twofold made it and nobody changed it.
+/// Print the provenance inside a PNG, SVG or PDF file and say whether twofold made it and it is
+/// unchanged.
 ///
 /// Exit code 0: made by twofold and unchanged. 1: not made by twofold, or changed, or of the name of a committed picture but not its bytes. 2: the file cannot
 /// be read as a picture. The seal inside a file tells damage and editing; only the committed hash tells forgery.

@@ -60,7 +60,8 @@ impl Arguments {
         })
     }
 
-    /// What is asked of a motion that is followed from switch to switch: a general system, or Filippov's motion.
+    /// The question about a motion that is followed from switch to switch: a general system, or
+    /// Filippov's motion.
     fn all_exponents(&self) -> Result<Option<GeneralExponents>, CliError> {
         if let Some(run) = general::run_of(&self.flags)? {
             return Ok(Some(self.of_general(run)?));
@@ -69,7 +70,7 @@ impl Arguments {
         Ok(Some(self.averaged(run)?))
     }
 
-    /// What is asked of a system with h, plus and minus.
+    /// The question about a system with h, plus and minus.
     fn of_surfaces(&self) -> Result<LargestExponent, CliError> {
         let spec = self.flags.spec(Use::Exponent)?;
         let transient = self.transient.unwrap_or(0.1 * spec.t_end);
@@ -88,7 +89,7 @@ impl Arguments {
         Ok(LargestExponent { system: spec.system, switch: spec.switch, start: spec.start, settings })
     }
 
-    /// What is asked of a general system.
+    /// The question about a general system.
     fn of_general(&self, mut run: GeneralRun) -> Result<GeneralExponents, CliError> {
         for flag in ["--section", "--chord", "--every"] {
             if self.flags.given().contains(&flag) {

@@ -106,7 +106,8 @@ pub fn main() -> ExitCode {
 
 /// Prints what clap has to say: help and version on standard output, errors on standard error.
 pub(super) fn usage(error: &clap::Error) -> Exit {
-    // A stream that nobody reads loses the text, and nothing else; help that cannot be written is an error as any output is.
+    // A closed stream loses the text without an error; help that cannot be written is an error as
+    // any output is.
     let printed = error.print().and_then(|()| std::io::Write::flush(&mut std::io::stdout()));
     match printed {
         _ if error.use_stderr() => Exit::Usage,

@@ -86,7 +86,7 @@ impl Arguments {
         })
     }
 
-    /// What is asked of a system with h, plus and minus.
+    /// The question about a system with h, plus and minus.
     fn of_surfaces(&self) -> Result<ClosedOrbit, CliError> {
         if self.period.is_some() {
             let why = "equations with h, plus and minus do not see the time; leave it out, and give --section";
@@ -120,7 +120,7 @@ impl Arguments {
         })
     }
 
-    /// What is asked of a general system.
+    /// The question about a general system.
     fn of_general(&self, mut run: GeneralRun) -> Result<GeneralOrbit, CliError> {
         let given = self.flags.given();
         let refused = [

@@ -671,7 +671,7 @@ mod tests {
             |by: f64| -> Vec<Point> { (0..60).map(|i| if i < 40 { [1.0, 2.0] } else { [1.0, 2.0 + by] }).collect() };
         assert!(drifts(&step(0.26), 1, 40, 0.5, &th) && !drifts(&step(0.24), 1, 40, 0.5, &th));
         assert!(drifts(&step(1.3), 1, 40, 2.5, &th) && !drifts(&step(1.2), 1, 40, 2.5, &th));
-        // Beyond the window it is nobody's business.
+        // Beyond the window no test applies.
         assert!(!drifts(&step(9.0), 1, 20, 0.5, &th));
         // One of two phases is enough.
         let one: Vec<Point> = (0..60).map(|i| if i < 40 || i % 2 == 0 { [1.0, 2.0] } else { [1.3, 2.0] }).collect();

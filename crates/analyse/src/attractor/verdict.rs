@@ -162,7 +162,7 @@ impl std::fmt::Display for Verdict {
                 }
                 match contrast {
                     Some(c) => {
-                        // As a ratio of densities: "1109 % fuller" would say the same to nobody.
+                        // A ratio of densities: "1109 % fuller" would not be understood.
                         let [value, low, high, free] =
                             [c.value, c.interval[1], c.interval[0], c.free[0]].map(|v| 1.0 - v);
                         write!(

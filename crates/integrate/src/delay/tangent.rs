@@ -154,7 +154,7 @@ pub trait TangentStepper<const M: usize>: Stepper<M> {
 
 /// A computation over any [`TangentStepper`].
 pub trait WithTangent<const M: usize> {
-    /// What comes of it.
+    /// The result.
     type Answer;
     /// Does it.
     fn with<S: TangentStepper<M>>(self, stepper: S) -> Self::Answer;

@@ -1,7 +1,7 @@
 //! Filippov motion where two switching surfaces meet.
 //!
-//! At a point of both surfaces four fields are at hand, one for each pair of signs. What is decided there (Filippov 1988, ch. 2;
-//! Dieci & Lopez 2009, 2011) follows from their Lie derivatives:
+//! At a point of both surfaces there are four fields, one for each pair of signs. What is decided
+//! there (Filippov 1988, ch. 2; Dieci & Lopez 2009, 2011) follows from their Lie derivatives:
 //!
 //! - a field that points into its own quadrant leaves there;
 //! - sliding on one surface leaves where it moves away from the other;

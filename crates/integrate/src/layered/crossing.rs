@@ -425,7 +425,7 @@ impl<F: VectorField<N>, const N: usize, const K: usize> WithSimd for In<Collocat
             if sweep > 0 && contraction >= 0.5 {
                 return (false, evaluations);
             }
-            // Only now, since after the last iteration nobody asks for them.
+            // Computed here, since they are not needed after the last iteration.
             for i in 0..N {
                 let start = full(first[i]);
                 for j in 0..STAGES {

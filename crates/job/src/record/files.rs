@@ -139,7 +139,7 @@ impl Growing {
 /// As [`write()`].
 pub fn try_place(path: &Path) -> Result<(), FileError> {
     match place(path).map_err(FileError::new("write", path))? {
-        // Opening a pipe would wait for its reader.
+        // Opening a pipe would block until it has a reader.
         Place::Stream => Ok(()),
         Place::File { at, old } => {
             if cfg!(windows) && old.is_some() {
@@ -205,7 +205,7 @@ fn place(path: &Path) -> io::Result<Place> {
     Err(io::Error::other("links that lead to each other"))
 }
 
-/// Whether the path names an open descriptor of a process: what stands behind it is somebody's open file.
+/// Whether the path names an open descriptor of a process, such as /dev/fd/3.
 fn is_descriptor(path: &Path) -> bool {
     let folder = fs::canonicalize(folder_of(path)).unwrap_or_default();
     folder == Path::new("/dev/fd") || folder.starts_with("/proc") && folder.ends_with("fd")
@@ -282,7 +282,8 @@ impl Temporary {
             match temporary.file().try_lock() {
                 Ok(()) if temporary.file.path().exists() => return Ok(temporary),
                 Ok(()) | Err(TryLockError::WouldBlock) => {}
-                // No locks on this file system: then nobody can take it for a dead process's either.
+                // Without locks on this file system, no process takes the file for an abandoned one
+                // either.
                 Err(TryLockError::Error(_)) => return Ok(temporary),
             }
         }
@@ -297,7 +298,8 @@ impl Temporary {
     fn persist(self, place: &Path) -> io::Result<()> {
         let Self { file, known } = self;
         let mine = under_way();
-        // Not tempfile's own way: of the two that Windows has to replace a file, it knows only the one that stops at a file which somebody reads.
+        // Not by tempfile: of the two ways in which Windows replaces a file, it uses only the one
+        // that fails while the file is open.
         let (open, temporary) = file.into_parts();
         let done = temporary.keep().map_err(|e| e.error).and_then(|temporary| {
             patiently(|| fs::rename(&temporary, place)).inspect_err(|_| drop(fs::remove_file(&temporary)))
@@ -309,12 +311,12 @@ impl Temporary {
     }
 }
 
-/// How often something is tried again that another process stands in the way of, and how long is waited between.
+/// Number of retries while another process holds a file, and the pause between them.
 const TRIES: usize = 50;
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// Does something to a file that Windows refuses for as long as somebody else looks at the file: another of our processes, a search index, a
-/// virus scanner. That is over soon. Other systems let everybody look at what is replaced.
+/// Retries an operation that Windows refuses while another process holds the file: another of our
+/// processes, a search index, a virus scanner. Other systems never refuse it.
 fn patiently(mut act: impl FnMut() -> io::Result<()>) -> io::Result<()> {
     // "Access is denied" and "it is being used by another process", by Windows' numbers.
     let in_use = |e: &io::Error| cfg!(windows) && matches!(e.raw_os_error(), Some(5 | 32));
@@ -400,8 +402,8 @@ pub const LARGEST: u64 = 512 << 20;
 /// The largest text that [`read_text`] reads: a spec has 1 kB, a manifest 10.
 pub const LARGEST_TEXT: u64 = 16 << 20;
 
-/// Opens a file that somebody else may have put there: only a plain file, because reading a pipe, a socket or a device may
-/// wait for ever or never end. Links are followed.
+/// Opens a file of unknown origin: only a plain file, because reading a pipe, a socket or a device
+/// may block or never end. Links are followed.
 ///
 /// # Errors
 /// If it cannot be opened, or is no plain file.
@@ -792,7 +794,7 @@ mod tests {
         assert_eq!((read(&path).unwrap().as_slice(), names(folder.path())), (&b"new"[..], vec!["x".to_owned()]));
     }
 
-    /// Windows: while somebody reads it, a file is replaced as soon as he is done.
+    /// Windows: a file that another process reads is replaced when it is closed.
     #[cfg(windows)]
     #[test]
     fn a_file_that_is_read_is_replaced_after_that() {

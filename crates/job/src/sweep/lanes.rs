@@ -28,7 +28,8 @@ const FEWEST: usize = 3;
 /// other parameters can have.
 const ENOUGH: usize = 32;
 
-/// Rows that lanes do not compute wait for others' exponents until so many are asked for: lanes are full then, twice over, and a run that is killed has not lost many.
+/// Number of pending exponents at which they are computed together: enough to fill the lanes twice,
+/// few enough that a killed run loses little.
 const TOGETHER: usize = 32;
 
 /// States of the systems that run in lanes: compiled once for each number of them, the usual ones.
@@ -143,7 +144,7 @@ impl Group {
     }
 }
 
-/// Asks the display, and whoever takes the rows.
+/// Asks both the display and the receiver of the rows whether to go on.
 struct Both<'a> {
     display: &'a dyn Watch,
     enough: &'a AtomicBool,
@@ -155,7 +156,7 @@ impl Watch for Both<'_> {
     }
 }
 
-/// A row, or a run that has come to its end and waits for an exponent.
+/// A finished row, or a finished run whose verdict needs an exponent.
 enum Begun {
     Row(Row),
     Waits(Box<Cell>, Answer, Box<LargestExponent>),
@@ -332,7 +333,8 @@ fn side_by_side<const N: usize>(
     };
     let mut interrupted = false;
     let mut unfinished = cells.len();
-    // Runs whose verdict waits for an exponent, which costs many times what the run does: those are computed together too.
+    // Runs whose verdict needs an exponent, which costs many times the run: exponents are computed
+    // together too.
     let mut waiting: Vec<Waiting> = Vec::new();
     let computed = equations.sections(set, &runs, common, &section, &mut |i, end| {
         unfinished -= 1;
@@ -340,7 +342,7 @@ fn side_by_side<const N: usize>(
             return;
         }
         let question = &cells[i].question;
-        // What is asked of a run's end is asked at an executor of its own, as if the row were alone.
+        // Questions about a run's end go to an executor of its own, as if the row were alone.
         let executor = Executor::new(None, progress);
         let outcome = recorded(end).and_then(|recording| {
             let answer = recording.to_answer(&question.0.run);
@@ -379,7 +381,7 @@ fn side_by_side<const N: usize>(
     Ok(true)
 }
 
-/// A run that has come to its end, and the exponent that its verdict waits for.
+/// A finished run, and the exponent that its verdict needs.
 struct Waiting {
     /// Which of the cells.
     cell: usize,
@@ -387,7 +389,8 @@ struct Waiting {
     exponent: Box<LargestExponent>,
 }
 
-/// The rows of runs that wait for exponents: these side by side, if there are enough and they share an equation, else one after the other.
+/// The rows of runs whose verdict needs an exponent: exponents side by side if there are enough and
+/// they share an equation, else one after the other.
 fn exponents(
     set: InstructionSet,
     cells: &[Cell],
@@ -407,7 +410,7 @@ fn exponents(
             Ok(_) => display.done(""),
         }
         match together {
-            // Nobody wants the rows.
+            // The receiver wants no more rows.
             Err(_) if enough.load(Ordering::Relaxed) => return Ok(()),
             together => found = together?,
         }
@@ -508,7 +511,7 @@ mod tests {
         assert_eq!(groups(caricature(), &["shift.x=1e-3*4"]), 1);
     }
 
-    /// Whoever shows progress can stop it, and so can whoever takes the rows.
+    /// Both the progress display and the receiver of the rows can stop the computation.
     #[test]
     fn lanes_stop_when_asked_to() {
         struct Never;

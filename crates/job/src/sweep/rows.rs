@@ -443,7 +443,7 @@ impl Rows {
         let mut rows = Self::of_heading(&heading)?;
         let columns = rows.columns();
         for line in rest {
-            // Whoever goes on with a journal by another version of the program says so.
+            // A journal that another version of the program continues names that version.
             if line.starts_with('{') {
                 let heading = serde_json::from_str(line).map_err(|e| Malformed(format!("its heading: {e}")))?;
                 rows.merge_rechecked(Self::of_heading(&heading)?)?;
@@ -454,7 +454,7 @@ impl Rows {
         rows.checked()
     }
 
-    /// The rows, if each is that of its number: a digest tells damage, and anybody can make one.
+    /// The rows, if each is that of its number. A digest reveals damage, not forgery.
     fn checked(self) -> Result<Self, RowsError> {
         self.iter().try_for_each(|row| row.check(&self.sweep))?;
         Ok(self)
@@ -610,7 +610,7 @@ mod tests {
         assert_eq!(rows.journal(), journal);
     }
 
-    /// A row that is not what its number says is refused, though anybody can give it a digest.
+    /// A row that does not belong to its number is refused, even if its digest is right.
     #[test]
     fn rows_are_those_of_their_numbers() {
         let sweep = sweep(&["eps=1e-2,1e-3"], None);

@@ -56,7 +56,7 @@ impl Compiled {
     }
 }
 
-/// An entry of a list: its series, and the number at hand where the list names one.
+/// An entry of a list: its series, and the current number where the list names one.
 macro_rules! entry {
     ($kind:ident::$name:ident($($series:literal),* $(; $number:ident)?), $value:expr) => {
         $kind::$name($($series,)* $(entry!($number = $value))?)

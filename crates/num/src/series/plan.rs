@@ -16,13 +16,14 @@ use super::table::Table;
 use super::{LayerKind, Mark, Recurrence, Series, Weights};
 use crate::Elementary;
 
-/// What one instruction does at degree k >= 1. The number at hand is the result of the instruction before.
+/// What one instruction does at degree k >= 1. The current number is the result of the instruction
+/// before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Action<S> {
     /// Zero.
     Clear,
     Copy(Series),
-    /// The number at hand.
+    /// The current number.
     Keep,
     Neg(Series),
     NegThis,
@@ -31,7 +32,7 @@ pub(super) enum Action<S> {
     /// -a - b.
     NegLess(Series, Series),
     Add(Series, Series),
-    /// The number at hand + a.
+    /// The current number + a.
     ThisPlus(Series),
     PlusThis(Series),
     Sub(Series, Series),
@@ -75,7 +76,7 @@ pub(super) enum Action<S> {
     Sqrt(Series),
     /// tanh, and its slope, the series after it.
     Tanh(Series, Weights),
-    /// Of the number at hand.
+    /// Of the current number.
     TanhThis(Weights),
     /// Sine, and cosine, the series after it.
     Sin(Series, Weights),
@@ -214,7 +215,7 @@ pub(super) fn advance<S: Elementary, T: Table<S>>(plan: &Plan<S>, table: &mut T)
     }
 }
 
-/// Carries one instruction out, `this` being the number at hand. Returns the next.
+/// Carries one instruction out, `this` being the current number. Returns the next.
 #[inline(always)]
 pub(super) fn carry_out<S: Elementary, T: Table<S>>(instruction: Instruction<S>, this: S, table: &mut T) -> S {
     let Instruction { action, to } = instruction;
@@ -457,7 +458,8 @@ impl Tails {
         }
     }
 
-    /// Finds out what is read, from the end to the beginning: what nobody reads, reads nothing.
+    /// Finds the series that are read, from the end to the beginning: a series that is not read,
+    /// reads none.
     fn count<S: Elementary>(&mut self, equation: &Equation<S>) {
         for output in equation.outputs {
             self.read(self.place(*output));
@@ -526,7 +528,7 @@ struct Planner<'a, S> {
     equation: &'a Equation<'a, S>,
     tails: &'a Tails,
     instructions: Vec<Instruction<S>>,
-    /// The series whose coefficient is the number at hand.
+    /// The series whose coefficient is the current number.
     at_hand: Option<Series>,
 }
 
@@ -536,7 +538,7 @@ impl<S: Elementary> Planner<'_, S> {
         self.at_hand = Some(to);
     }
 
-    /// Constant series that somebody reads. Another plan may have written to them.
+    /// Constant series that are read. Another plan may have written to them.
     fn clear(&mut self) {
         for this in self.equation.dimension..self.tails.of.len() {
             if self.tails.is_zero(this) && self.tails.uses[this] > 0 {
@@ -592,7 +594,8 @@ impl<S: Elementary> Planner<'_, S> {
         self.put(action, this);
     }
 
-    /// The last instruction and this one in one, if they are a common pair and the last one's result is for nobody else; and so on.
+    /// Merges the last instruction with this one, if they are a known pair and the last one's
+    /// result has no other use; and so on.
     fn fused(&mut self, action: Action<S>) -> Action<S> {
         let (last, to) = match self.instructions.last() {
             Some(last) if self.tails.uses[last.to] == 1 => (last.action, last.to),
@@ -631,7 +634,7 @@ mod tests {
 
     const DEGREE: usize = 13;
 
-    /// What a solution gives away, zeros with their signs; NaN or infinity as `None`.
+    /// The coefficients of a solution, zeros with their signs; NaN or infinity as `None`.
     fn shown<S: Elementary + FromDecimal>(solution: &Solution<S>, dimension: usize) -> Option<String> {
         let components: Vec<_> = (0..dimension).map(|i| solution.component(i)).collect();
         let text = format!("{components:?} {:?}", solution.layer_arguments().collect::<Vec<_>>());

@@ -70,7 +70,7 @@ pub(super) struct Rows<'a, const T: usize> {
     next: &'a mut [f64; ROW],
 }
 
-/// A series' place in a row; never beyond, so that nobody need look.
+/// A series' place in a row, always within it, so that no bounds check is needed.
 #[inline(always)]
 fn place(series: Series) -> usize {
     series % ROW

@@ -53,7 +53,7 @@ impl Program {
     /// The function's values at `x`: in every lane the bits of [`Program::evaluate`]. `N` is the number of variables and of values;
     /// `scratch` is as long as [`Program::scratch_len`] says, and what is in it, before and after, means nothing.
     ///
-    /// Always inlined, so that it is compiled with the instructions of whoever calls.
+    /// Always inlined, so that it is compiled with the caller's instruction set.
     #[inline(always)]
     pub fn evaluate_in_registers<S: Simd, const K: usize, const N: usize>(
         &self,
@@ -93,7 +93,8 @@ impl Program {
         for i in 0..N {
             results[i & last] = Aligned(x[i]);
         }
-        // Most instructions use the result of the one before: it is at hand sooner than it could be written and read again.
+        // Most instructions use the result of the one before, which is available sooner than it
+        // could be stored and loaded.
         let (mut value, mut written) = (x[0], u16::MAX);
         for (place, i) in self.code.iter().enumerate() {
             let a = if i.a == written { value } else { results[usize::from(i.a) & last].0 };

@@ -21,7 +21,7 @@ pub(super) fn findings(html: &mut String, report: &Report) {
     }
     put!(
         html,
-        "<p>A panel is one run, and which orbit a run ends on can hang on the ninth digit of its start: a verdict says what happened once, the \
+        "<p>A panel is one run, and a shift of its start by 1e-9 can change where it ends: a verdict says what happened once, the \
          census how often it does.</p>\n<h3>In the published figures of this version</h3>"
     );
     for block in &report.findings {

@@ -91,7 +91,7 @@ fn head(html: &mut String, report: &Report) {
     put!(
         html,
         "<p class=\"lead\">What {} finds when it computes the figures of <cite>{}</cite>: the pictures, the paper’s claims held \
-         against them, the work behind them, and the hashes by which anybody can check them.</p>",
+         against them, the work behind them, and the hashes by which any reader can check them.</p>",
         escape(&report.made_by),
         escape(a.title)
     );
