@@ -48,7 +48,7 @@ const LN_2: ([u64; MOST], i64) = (
 );
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum NumberClass {
     Zero,
     Finite,
     NotANumber,
@@ -64,7 +64,7 @@ enum Kind {
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct MultiFloat<const L: usize> {
-    kind: Kind,
+    kind: NumberClass,
     negative: bool,
     exponent: i64,
     /// Least significant first.
@@ -79,8 +79,8 @@ impl<const L: usize> MultiFloat<L> {
     /// tanh is 1 to all digits beyond this argument: 2 exp(-2 w) < EPSILON/4.
     pub const TANH_SATURATION: f64 = 22.2 * L as f64 + 1.5;
 
-    const ZERO: Self = Self { kind: Kind::Zero, negative: false, exponent: 0, limbs: [0; L] };
-    const NAN: Self = Self { kind: Kind::NotANumber, ..Self::ZERO };
+    const ZERO: Self = Self { kind: NumberClass::Zero, negative: false, exponent: 0, limbs: [0; L] };
+    const NAN: Self = Self { kind: NumberClass::NotANumber, ..Self::ZERO };
 
     /// From a significand whose top bit is set, and a guard limb to be rounded away.
     fn rounded(negative: bool, mut exponent: i64, mut limbs: [u64; L], guard: u64) -> Self {
@@ -94,7 +94,7 @@ impl<const L: usize> MultiFloat<L> {
         if exponent > RANGE {
             return Self::NAN;
         }
-        Self { kind: Kind::Finite, negative, exponent, limbs }
+        Self { kind: NumberClass::Finite, negative, exponent, limbs }
     }
 
     fn constant((limbs, exponent): ([u64; MOST], i64)) -> Self {
@@ -112,12 +112,12 @@ impl<const L: usize> MultiFloat<L> {
         let zeros = n.leading_zeros();
         let mut limbs = [0; L];
         limbs[L - 1] = n << zeros;
-        Self { kind: Kind::Finite, negative: false, exponent: 64 - i64::from(zeros), limbs }
+        Self { kind: NumberClass::Finite, negative: false, exponent: 64 - i64::from(zeros), limbs }
     }
 
     /// self * 2^k, exactly.
     fn times_power_of_two(self, k: i64) -> Self {
-        if self.kind == Kind::Finite {
+        if self.kind == NumberClass::Finite {
             Self::rounded(self.negative, self.exponent.saturating_add(k), self.limbs, 0)
         } else {
             self
@@ -127,9 +127,9 @@ impl<const L: usize> MultiFloat<L> {
     /// log2 of the absolute value, to the digits of `f64`; minus infinity for zero.
     pub fn log2(self) -> f64 {
         match self.kind {
-            Kind::Zero => f64::NEG_INFINITY,
-            Kind::NotANumber => f64::NAN,
-            Kind::Finite => {
+            NumberClass::Zero => f64::NEG_INFINITY,
+            NumberClass::NotANumber => f64::NAN,
+            NumberClass::Finite => {
                 let significand = Self { negative: false, exponent: 0, ..self }.to_f64();
                 self.exponent as f64 + elementary::ln(significand) * std::f64::consts::LOG2_E
             }
@@ -265,7 +265,7 @@ impl<const L: usize> MultiFloat<L> {
 
     /// Whether adding this to `sum` would change it.
     fn is_felt_by(&self, sum: &Self) -> bool {
-        self.kind == Kind::Finite && self.exponent >= sum.exponent - i64::from(Self::BITS) - 1
+        self.kind == NumberClass::Finite && self.exponent >= sum.exponent - i64::from(Self::BITS) - 1
     }
 
     /// (sin, cos) by reduction modulo pi/2 and series.
@@ -335,9 +335,9 @@ impl<const L: usize> PartialEq for MultiFloat<L> {
 impl<const L: usize> PartialOrd for MultiFloat<L> {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         let sign = |x: &Self| match x.kind {
-            Kind::NotANumber => None,
-            Kind::Zero => Some(0),
-            Kind::Finite => Some(if x.negative { -1 } else { 1 }),
+            NumberClass::NotANumber => None,
+            NumberClass::Zero => Some(0),
+            NumberClass::Finite => Some(if x.negative { -1 } else { 1 }),
         };
         let (a, b) = (sign(self)?, sign(other)?);
         Some(a.cmp(&b).then_with(|| match a {
@@ -352,9 +352,9 @@ impl<const L: usize> Add for MultiFloat<L> {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         match (self.kind, other.kind) {
-            (Kind::NotANumber, _) | (_, Kind::NotANumber) => Self::NAN,
-            (Kind::Zero, _) => other,
-            (_, Kind::Zero) => self,
+            (NumberClass::NotANumber, _) | (_, NumberClass::NotANumber) => Self::NAN,
+            (NumberClass::Zero, _) => other,
+            (_, NumberClass::Zero) => self,
             _ => {
                 let subtract = self.negative != other.negative;
                 match self.compare_magnitudes(&other) {
@@ -384,8 +384,8 @@ impl<const L: usize> Mul for MultiFloat<L> {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
         match (self.kind, other.kind) {
-            (Kind::NotANumber, _) | (_, Kind::NotANumber) => return Self::NAN,
-            (Kind::Zero, _) | (_, Kind::Zero) => return Self::ZERO,
+            (NumberClass::NotANumber, _) | (_, NumberClass::NotANumber) => return Self::NAN,
+            (NumberClass::Zero, _) | (_, NumberClass::Zero) => return Self::ZERO,
             _ => {}
         }
         let mut product = [0_u64; 2 * MOST];
@@ -418,8 +418,8 @@ impl<const L: usize> Div for MultiFloat<L> {
     /// The product with the reciprocal, corrected once.
     fn div(self, other: Self) -> Self {
         match (self.kind, other.kind) {
-            (Kind::NotANumber, _) | (_, Kind::NotANumber | Kind::Zero) => return Self::NAN,
-            (Kind::Zero, _) => return Self::ZERO,
+            (NumberClass::NotANumber, _) | (_, NumberClass::NotANumber | NumberClass::Zero) => return Self::NAN,
+            (NumberClass::Zero, _) => return Self::ZERO,
             _ => {}
         }
         let r = other.reciprocal();
@@ -458,9 +458,9 @@ impl<const L: usize> Scalar for MultiFloat<L> {
     fn to_f64(self) -> f64 {
         let sign = if self.negative { -1.0 } else { 1.0 };
         match self.kind {
-            Kind::Zero => return 0.0,
-            Kind::NotANumber => return f64::NAN,
-            Kind::Finite => {}
+            NumberClass::Zero => return 0.0,
+            NumberClass::NotANumber => return f64::NAN,
+            NumberClass::Finite => {}
         }
         let top = self.limbs[L - 1];
         let sticky = u64::from(self.limbs[..L - 1].iter().any(|x| *x != 0));
@@ -483,7 +483,7 @@ impl<const L: usize> Scalar for MultiFloat<L> {
 
 impl<const L: usize> Elementary for MultiFloat<L> {
     fn tanh(self) -> Self {
-        if self.kind != Kind::Finite {
+        if self.kind != NumberClass::Finite {
             return self;
         }
         if self.magnitude().to_f64() > Self::TANH_SATURATION {
@@ -513,7 +513,7 @@ impl<const L: usize> Elementary for MultiFloat<L> {
     }
 
     fn ln(self) -> Self {
-        if self.kind != Kind::Finite || self.negative {
+        if self.kind != NumberClass::Finite || self.negative {
             return Self::NAN;
         }
         // 2 atanh z, z = (m - 1)/(m + 1), of the significand between 1/sqrt 2 and sqrt 2: nothing is lost near 1.
@@ -539,7 +539,7 @@ impl<const L: usize> Elementary for MultiFloat<L> {
     }
 
     fn atan(self) -> Self {
-        if self.kind != Kind::Finite {
+        if self.kind != NumberClass::Finite {
             return self;
         }
         if self.exponent > i64::from(Self::BITS) + 2 {
@@ -561,7 +561,7 @@ impl<const L: usize> Elementary for MultiFloat<L> {
     }
 
     fn erf(self) -> Self {
-        if self.kind != Kind::Finite {
+        if self.kind != NumberClass::Finite {
             return self;
         }
         // 1 - erf x < exp(-x^2)/x: beyond this the nearest number is +-1.
@@ -586,16 +586,16 @@ impl<const L: usize> Elementary for MultiFloat<L> {
 
     fn sign(self) -> Self {
         match self.kind {
-            Kind::NotANumber => self,
-            _ if self.negative && self.kind == Kind::Finite => -Self::whole(1),
+            NumberClass::NotANumber => self,
+            _ if self.negative && self.kind == NumberClass::Finite => -Self::whole(1),
             _ => Self::whole(1),
         }
     }
 
     fn sqrt(self) -> Self {
         match self.kind {
-            Kind::Finite if self.negative => return Self::NAN,
-            Kind::Finite => {}
+            NumberClass::Finite if self.negative => return Self::NAN,
+            NumberClass::Finite => {}
             _ => return self,
         }
         // 1/sqrt a by Newton's method for a in [1/2, 2), then a/sqrt a, corrected once.
@@ -833,11 +833,11 @@ mod tests {
     #[test]
     fn one_limb_is_rounded_like_an_integer() {
         let integer = |x: MultiFloat<1>| {
-            assert!(x.kind != Kind::NotANumber);
+            assert!(x.kind != NumberClass::NotANumber);
             let shift = x.exponent - 64;
             let size = u128::from(x.limbs[0]);
             let size = if shift >= 0 { size << shift } else { size >> -shift } as i128;
-            if x.kind == Kind::Zero {
+            if x.kind == NumberClass::Zero {
                 0
             } else if x.negative {
                 -size
@@ -893,7 +893,7 @@ mod tests {
         for x in [one, zero, nan, -one] {
             assert!(not(x + nan) && not(nan - x) && not(x * nan) && not(nan * x) && not(x / nan) && not(nan / x));
             assert!(not(x / zero));
-            assert!(not(x) || (x + zero == x && zero + x == x && (x * zero).kind == Kind::Zero));
+            assert!(not(x) || (x + zero == x && zero + x == x && (x * zero).kind == NumberClass::Zero));
         }
         assert_eq!((zero / one).to_f64(), 0.0);
         let mut difference = one;
