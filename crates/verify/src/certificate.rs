@@ -389,7 +389,7 @@ pub(super) fn tight(claimed: &Range, exact: &Range, scale: &Rational, what: &str
 
 /// What is claimed of a closed orbit.
 #[derive(Clone, Copy, PartialEq)]
-enum Kind {
+enum CycleStability {
     Attracts,
     Saddle,
 }
@@ -400,7 +400,7 @@ fn cycle(
     c: &Cycle,
     alpha: &str,
     crossings: usize,
-    kind: Kind,
+    kind: CycleStability,
     name: &str,
 ) -> Check<(Vec<String>, Rc<Vec<Crossing>>)> {
     let named = |what: &str| format!("{name}: {what}");
@@ -425,8 +425,8 @@ fn cycle(
     }
     // The preconditioner is near the inverse of D - 1: that is what makes the inclusion sharp. (A saddle's derivative is known less well.)
     let near = match kind {
-        Kind::Attracts => Rational::tenth_to(2),
-        Kind::Saddle => decimal("0.05")?,
+        CycleStability::Attracts => Rational::tenth_to(2),
+        CycleStability::Saddle => decimal("0.05")?,
     };
     for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         let df = |k: usize| &slope[k][j] - &unit(k, j);
@@ -486,7 +486,7 @@ fn cycle(
     let (above, below) = (&(&one + &determinant) - &trace, &(&one + &determinant) + &trace);
     let zero = Rational::whole(0);
     let stability = match kind {
-        Kind::Attracts => {
+        CycleStability::Attracts => {
             need(determinant.high < one.low, named("the determinant is below 1"))?;
             need(
                 above.low > zero && below.low > zero,
@@ -498,7 +498,7 @@ fn cycle(
                 above.low.clone().min(below.low.clone()).approximately()
             )
         }
-        Kind::Saddle => {
+        CycleStability::Saddle => {
             need(
                 above.low > zero && below.high < zero || above.high < zero && below.low > zero,
                 named("the characteristic polynomial has different signs at 1 and -1"),
@@ -527,11 +527,11 @@ fn printed_cycle(known: &Known, c: &Cycle) -> Check<Vec<String>> {
     for b in ranges(c.candidate)? {
         need(b.width() < Rational::tenth_to(8), "the candidate is narrower than 1e-8")?;
     }
-    Ok(cycle(known, c, "1e-3", 2, Kind::Attracts, "the cycle")?.0)
+    Ok(cycle(known, c, "1e-3", 2, CycleStability::Attracts, "the cycle")?.0)
 }
 
 /// Several closed orbits at alpha = 0.1, which must all be different, with their crossings a turn.
-fn cycles(known: &Known, orbits: &[(&Cycle, usize, &str)], kind: Kind) -> Check<Vec<String>> {
+fn cycles(known: &Known, orbits: &[(&Cycle, usize, &str)], kind: CycleStability) -> Check<Vec<String>> {
     let (mut said, mut points) = (Vec::new(), Vec::<[Range; 2]>::new());
     for (orbit, crossings, name) in orbits {
         let (findings, rows) = cycle(known, orbit, "0.1", *crossings, kind, name)?;
@@ -552,7 +552,7 @@ fn cycles(known: &Known, orbits: &[(&Cycle, usize, &str)], kind: Kind) -> Check<
 }
 
 fn coexistence(known: &Known, c: &Coexistence) -> Check<Vec<String>> {
-    cycles(known, &[(&c.one, 2, "period one"), (&c.three, 6, "period three")], Kind::Attracts)
+    cycles(known, &[(&c.one, 2, "period one"), (&c.three, 6, "period three")], CycleStability::Attracts)
 }
 
 fn saddles(known: &Known, c: &Saddles) -> Check<Vec<String>> {
@@ -562,7 +562,7 @@ fn saddles(known: &Known, c: &Saddles) -> Check<Vec<String>> {
         (&c.four, 8, "period four"),
         (&c.five, 10, "period five"),
     ];
-    cycles(known, &orbits, Kind::Saddle)
+    cycles(known, &orbits, CycleStability::Saddle)
 }
 
 /// Compares claimed crossings of the orbit from (x, 0, z) with the checker's own, and returns these.
