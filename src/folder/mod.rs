@@ -29,7 +29,7 @@ use toml::Spanned;
 use crate::cli::flags::Use;
 use crate::job::AnyQuestion;
 use crate::job::spec::RunSpec;
-use crate::paper::draw::plot::{self, Kind, Look};
+use crate::paper::draw::plot::{self, Look, PictureKind};
 use crate::paper::plots::{Columns, Drawing, Plot, Plots, Points, Recorded};
 use crate::paper::verdict::Claim as PanelClaim;
 use crate::paper::{Camera, Figure, Panel, Picture, Reading, Repeats, View, figures};
@@ -550,14 +550,16 @@ impl Folder {
         let wrong = |at: Range<usize>, why: String| FolderError::at(origin, at, why, None);
         let frame = plot::Frame::from(&spec);
         let given = drawn.axes.map_or(Ok(Vec::new()), |axes| states(origin, axes, &frame))?;
-        let kind = if *drawn.draw.get_ref() == Draw::Halves { Kind::Section } else { Kind::Space };
+        let kind = if *drawn.draw.get_ref() == Draw::Halves { PictureKind::Section } else { PictureKind::Space };
         let axes = plot::axes(&frame, kind, &given).map_err(|e| wrong(drawn.draw.span(), e.to_string()))?;
         let view = match (kind, axes.as_slice(), drawn.camera) {
-            (Kind::Section, _, Some(camera)) => {
+            (PictureKind::Section, _, Some(camera)) => {
                 return Err(wrong(camera.span(), "`camera` has no effect on a section".to_owned()));
             }
-            (Kind::Section, &[horizontal, vertical], None) => View::Section { horizontal, vertical },
-            (Kind::Section, ..) => return Err(wrong(drawn.draw.span(), "a section in halves has two axes".to_owned())),
+            (PictureKind::Section, &[horizontal, vertical], None) => View::Section { horizontal, vertical },
+            (PictureKind::Section, ..) => {
+                return Err(wrong(drawn.draw.span(), "a section in halves has two axes".to_owned()));
+            }
             (_, axes, camera) => {
                 let (azimuth, elevation) = camera.map_or(Ok((-60.0, 18.0)), |c| angles(origin, c))?;
                 View::Space { camera: Camera { axes: [axes[0], axes[1], axes[2]], azimuth, elevation } }
@@ -643,15 +645,15 @@ impl Folder {
         let recorded = said.recorded(&self.root, Use::Picture)?;
         let frame = recorded.frame();
         let kind = match draw {
-            Draw::Series => Kind::Series,
-            Draw::Plane => Kind::Plane,
-            Draw::Space => Kind::Space,
-            Draw::Section | Draw::Columns | Draw::Halves | Draw::Surface => Kind::Section,
+            Draw::Series => PictureKind::Series,
+            Draw::Plane => PictureKind::Plane,
+            Draw::Space => PictureKind::Space,
+            Draw::Section | Draw::Columns | Draw::Halves | Draw::Surface => PictureKind::Section,
         };
         let axes = drawn.axes.map_or(Ok(Vec::new()), |axes| states(origin, axes, &frame))?;
         let camera = match (drawn.camera, kind) {
             (None, _) => None,
-            (Some(camera), Kind::Space) => Some(angles(origin, camera)?),
+            (Some(camera), PictureKind::Space) => Some(angles(origin, camera)?),
             (Some(camera), _) => {
                 return Err(wrong(
                     camera.span(),

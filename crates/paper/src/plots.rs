@@ -272,7 +272,7 @@ mod tests {
     }
 
     fn plane(recorded: &Recorded) -> Plot {
-        let look = Look { kind: plot::Kind::Plane, axes: vec![0, 1], camera: None, title: None };
+        let look = Look { kind: plot::PictureKind::Plane, axes: vec![0, 1], camera: None, title: None };
         Plot {
             label: "a".into(),
             title: "<b> & *c*".into(),
@@ -313,7 +313,7 @@ mod tests {
     #[test]
     fn each_state_of_a_series_has_the_time_below_it_when_they_stand_side_by_side() {
         let ball = ball();
-        let look = Look { kind: plot::Kind::Series, axes: vec![0, 1], camera: None, title: None };
+        let look = Look { kind: plot::PictureKind::Series, axes: vec![0, 1], camera: None, title: None };
         let series = Plot { drawing: Drawing::Run(ball.clone().into(), look), points: None, ..plane(&ball) };
         let answer = Executor::quiet().ask(&*series.question).unwrap();
         let titles = |columns| {

@@ -40,7 +40,7 @@ pub struct Arguments {
     from: Option<PathBuf>,
     /// What is shown [default: section with --section, else by the number of axes that the system suggests].
     #[arg(long, value_enum, help_heading = "Picture")]
-    kind: Option<Kind>,
+    kind: Option<KindFlag>,
     /// The states on the axes, by name: horizontal, (depth,) vertical; of a series, its panels [default: the system's].
     #[arg(long, value_name = "X,Y,...", value_delimiter = ',', help_heading = "Picture")]
     axes: Vec<String>,
@@ -73,7 +73,7 @@ pub struct Arguments {
 
 /// A kind of picture.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Kind {
+enum KindFlag {
     /// States against time, a panel for each.
     Series,
     /// One state against another.
@@ -84,13 +84,13 @@ enum Kind {
     Section,
 }
 
-impl From<Kind> for plot::Kind {
-    fn from(kind: Kind) -> Self {
+impl From<KindFlag> for plot::PictureKind {
+    fn from(kind: KindFlag) -> Self {
         match kind {
-            Kind::Series => plot::Kind::Series,
-            Kind::Plane => plot::Kind::Plane,
-            Kind::Space => plot::Kind::Space,
-            Kind::Section => plot::Kind::Section,
+            KindFlag::Series => plot::PictureKind::Series,
+            KindFlag::Plane => plot::PictureKind::Plane,
+            KindFlag::Space => plot::PictureKind::Space,
+            KindFlag::Section => plot::PictureKind::Section,
         }
     }
 }
@@ -260,7 +260,7 @@ pub(super) fn small_print(spec: &RunSpec) -> Vec<String> {
 
 /// How the flags want it.
 fn look(arguments: &Arguments, frame: &plot::Frame) -> Result<Look, CliError> {
-    let kind = arguments.kind.map_or_else(|| plot::Kind::suiting(frame), Into::into);
+    let kind = arguments.kind.map_or_else(|| plot::PictureKind::suiting(frame), Into::into);
     let names: Vec<&str> = frame.states.iter().map(|s| s.name.as_str()).collect();
     let mut axes = Vec::new();
     for name in &arguments.axes {
@@ -277,7 +277,7 @@ fn look(arguments: &Arguments, frame: &plot::Frame) -> Result<Look, CliError> {
     }
     let camera = match arguments.camera.as_deref() {
         None => None,
-        Some(_) if kind != plot::Kind::Space => {
+        Some(_) if kind != plot::PictureKind::Space => {
             return Err(CliError::no_effect(
                 "--camera",
                 "only a picture in space has one; leave it out, or give --kind space",

@@ -85,7 +85,7 @@ impl Frame<'_> {
 
 /// The kind of picture of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum PictureKind {
     /// States against time, a panel for each.
     Series,
     /// One state against another.
@@ -96,26 +96,26 @@ pub enum Kind {
     Section,
 }
 
-impl Kind {
+impl PictureKind {
     /// The word for it.
     pub fn word(self) -> &'static str {
         match self {
-            Kind::Series => "series",
-            Kind::Plane => "plane",
-            Kind::Space => "space",
-            Kind::Section => "section",
+            PictureKind::Series => "series",
+            PictureKind::Plane => "plane",
+            PictureKind::Space => "space",
+            PictureKind::Section => "section",
         }
     }
 
     /// What suits a run: a section if passages were recorded, else by the number of axes that the system suggests, or of its states.
     pub fn suiting(run: &Frame) -> Self {
         if run.section.is_some() {
-            return Kind::Section;
+            return PictureKind::Section;
         }
         match if run.axes.is_empty() { run.states.len() } else { run.axes.len() } {
-            1 => Kind::Series,
-            2 => Kind::Plane,
-            _ => Kind::Space,
+            1 => PictureKind::Series,
+            2 => PictureKind::Plane,
+            _ => PictureKind::Space,
         }
     }
 }
@@ -124,7 +124,7 @@ impl Kind {
 #[derive(Clone, Debug)]
 pub struct Look {
     /// The kind of picture.
-    pub kind: Kind,
+    pub kind: PictureKind,
     /// The states on the axes (of a series: the panels); empty for the ones that suit.
     pub axes: Vec<usize>,
     /// Azimuth and elevation of the camera in degrees, of a picture in space.
@@ -168,7 +168,7 @@ pub enum PlotError {
 ///
 /// # Errors
 /// If the number of axes does not suit the kind.
-pub fn axes(run: &Frame, kind: Kind, given: &[usize]) -> Result<Vec<usize>, PlotError> {
+pub fn axes(run: &Frame, kind: PictureKind, given: &[usize]) -> Result<Vec<usize>, PlotError> {
     let n = run.states.len();
     let wrong = |wanted| Err(PlotError::Axes { kind: kind.word(), wanted, given: given.len() });
     let few = |wanted| PlotError::States { kind: kind.word(), wanted, states: n };
@@ -176,13 +176,15 @@ pub fn axes(run: &Frame, kind: Kind, given: &[usize]) -> Result<Vec<usize>, Plot
     let others: Vec<usize> = suggested.iter().copied().chain((0..n).filter(|i| !suggested.contains(i))).collect();
     match (kind, given.len()) {
         // A system's axes are horizontal, depth, vertical; of two panels in the plane the first and the last of them.
-        (Kind::Series, 0) => Ok((0..n.min(MOST_PANELS)).collect()),
-        (Kind::Series, count) if count > MOST_PANELS => wrong("at most eight panels"),
-        (Kind::Plane, 0) if n < 2 => Err(few(2)),
-        (Kind::Plane, 0) => Ok(if suggested.len() == 2 { suggested.to_vec() } else { vec![others[0], others[1]] }),
-        (Kind::Space, 0) if n < 3 => Err(few(3)),
-        (Kind::Space, 0) => Ok(others[..3].to_vec()),
-        (Kind::Section, 0) => {
+        (PictureKind::Series, 0) => Ok((0..n.min(MOST_PANELS)).collect()),
+        (PictureKind::Series, count) if count > MOST_PANELS => wrong("at most eight panels"),
+        (PictureKind::Plane, 0) if n < 2 => Err(few(2)),
+        (PictureKind::Plane, 0) => {
+            Ok(if suggested.len() == 2 { suggested.to_vec() } else { vec![others[0], others[1]] })
+        }
+        (PictureKind::Space, 0) if n < 3 => Err(few(3)),
+        (PictureKind::Space, 0) => Ok(others[..3].to_vec()),
+        (PictureKind::Section, 0) => {
             let flat = match run.section.ok_or(SECTION_NEEDED)? {
                 Crossed::Plane(coordinate, _) => Some(coordinate),
                 Crossed::Surface(_) => None,
@@ -190,11 +192,13 @@ pub fn axes(run: &Frame, kind: Kind, given: &[usize]) -> Result<Vec<usize>, Plot
             // The only state of a system, against time.
             Ok(others.into_iter().filter(|i| n == 1 || Some(*i) != flat).take(2).collect())
         }
-        (Kind::Plane | Kind::Section, 2) | (Kind::Space, 3) | (Kind::Series, _) => Ok(given.to_vec()),
-        (Kind::Plane, _) => wrong("two axes"),
-        (Kind::Space, _) => wrong("three axes"),
-        (Kind::Section, 1) => Ok(given.to_vec()),
-        (Kind::Section, _) => wrong("two axes, or one against time"),
+        (PictureKind::Plane | PictureKind::Section, 2) | (PictureKind::Space, 3) | (PictureKind::Series, _) => {
+            Ok(given.to_vec())
+        }
+        (PictureKind::Plane, _) => wrong("two axes"),
+        (PictureKind::Space, _) => wrong("three axes"),
+        (PictureKind::Section, 1) => Ok(given.to_vec()),
+        (PictureKind::Section, _) => wrong("two axes, or one against time"),
     }
 }
 
@@ -212,19 +216,19 @@ pub fn sheet(run: &Frame, answer: &Answer, look: &Look, small_print: Vec<String>
     let title = look.title.clone().unwrap_or_else(|| run.title.to_owned());
     let said = if title.is_empty() { "a system of its own".to_owned() } else { title.clone() };
     let width = match look.kind {
-        Kind::Series | Kind::Space => ColumnWidth::Wide,
-        Kind::Plane | Kind::Section => ColumnWidth::Single,
+        PictureKind::Series | PictureKind::Space => ColumnWidth::Wide,
+        PictureKind::Plane | PictureKind::Section => ColumnWidth::Single,
     };
     let mut sheet = Sheet::new(width, 1, format!("{}: {said}", describe(run, look.kind, &shown)));
     sheet.title = (!title.is_empty()).then(|| markup::literal(&title));
     sheet.footer = small_print;
     match look.kind {
-        Kind::Section => section(sheet, run, answer, &shown),
+        PictureKind::Section => section(sheet, run, answer, &shown),
         kind => {
             let lines = lines(answer, run)?;
             Ok(match kind {
-                Kind::Series => series(sheet, run, &lines, &shown),
-                Kind::Plane => plane(sheet, run, &lines, &shown),
+                PictureKind::Series => series(sheet, run, &lines, &shown),
+                PictureKind::Plane => plane(sheet, run, &lines, &shown),
                 _ => space(sheet, run, answer, &lines, &shown, look.camera),
             })
         }
@@ -232,14 +236,14 @@ pub fn sheet(run: &Frame, answer: &Answer, look: &Look, small_print: Vec<String>
 }
 
 /// For readers who cannot see it.
-fn describe(run: &Frame, kind: Kind, shown: &[usize]) -> String {
+fn describe(run: &Frame, kind: PictureKind, shown: &[usize]) -> String {
     let names = run.names();
     let listed = shown.iter().map(|i| names[*i]).collect::<Vec<_>>().join(", ");
     match kind {
-        Kind::Series => format!("{listed} against time"),
-        Kind::Plane => format!("phase plane of {listed}"),
-        Kind::Space => format!("path in the space of {listed}"),
-        Kind::Section => format!("Poincaré section, {listed}"),
+        PictureKind::Series => format!("{listed} against time"),
+        PictureKind::Plane => format!("phase plane of {listed}"),
+        PictureKind::Space => format!("path in the space of {listed}"),
+        PictureKind::Section => format!("Poincaré section, {listed}"),
     }
 }
 
