@@ -5,7 +5,7 @@ use std::sync::Arc;
 use twofold::job::sweep::Rows;
 use twofold::job::table::{Column, Entry, Table};
 use twofold::job::{AnyQuestion, JobError};
-use twofold::paper::census::{self, Kind};
+use twofold::paper::census::{self, MotionKind};
 use twofold::paper::study::Computed;
 use twofold::paper::{Figure, Reading, Study};
 use twofold::record::Hash;
@@ -19,7 +19,7 @@ const RECONSTRUCTED: &[u8] = include_bytes!("reconstructed.csv");
 /// Both, under the files' names.
 pub const DATA: &[(&str, &[u8])] = &[("printed.csv", PRINTED), ("reconstructed.csv", RECONSTRUCTED)];
 
-/// Colours of the kinds, in the order of `Kind::ALL`.
+/// Colours of the kinds, in the order of `MotionKind::ALL`.
 const COLOURS: [Colour; 6] = [style::BLUE, style::GREEN, style::SKY, style::VERMILLION, style::INK, style::FAINT];
 
 fn data(reading: Reading) -> &'static [u8] {
@@ -72,7 +72,7 @@ fn draw(tables: &[Table]) -> Sheet {
     let mut map = PlanePanel::new(Axis::linear("*x*", x0, x1), Axis::linear("*z*", z0, z1)).equal();
     let mut counts = [0_u64; 6];
     for (i, word) in basin.words("kind").enumerate() {
-        let Some(kind) = Kind::ALL.iter().position(|k| k.words() == word) else { continue };
+        let Some(kind) = MotionKind::ALL.iter().position(|k| k.words() == word) else { continue };
         counts[kind] += 1;
         let (a, b) = (x[i], z[i]);
         // A little beyond its edge, under the next cell: between cells that only touch, paper shines through.
@@ -86,7 +86,7 @@ fn draw(tables: &[Table]) -> Sheet {
         .panel_aspect(1.0)
         .panel("", "starts on *y* = 0", map)
         .legend(LegendEntry::new(LegendKey::Marker(start), "the paper's start"));
-    for (i, kind) in Kind::ALL.into_iter().enumerate().filter(|(i, _)| counts[*i] > 0) {
+    for (i, kind) in MotionKind::ALL.into_iter().enumerate().filter(|(i, _)| counts[*i] > 0) {
         sheet = sheet.legend(LegendEntry::new(LegendKey::Area(COLOURS[i], 100), kind.words()));
     }
     sheet.footer(format!(

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use twofold::job::sweep::Rows;
 use twofold::job::table::Table;
 use twofold::job::{AnyQuestion, JobError};
-use twofold::paper::census::{self, Data, Found, Kind, Shorter};
+use twofold::paper::census::{self, Data, Found, MotionKind, Shorter};
 use twofold::paper::claims::claims;
 use twofold::paper::study::Computed;
 use twofold::paper::{Figure, Reading, Study, Support};
@@ -41,7 +41,7 @@ const SHORTER: [(&str, &str, &str); 3] = [
     ("extended", "Taylor 1e-20, double-double", "10^{-20}"),
 ];
 
-/// Colours of the kinds, in the order of `Kind::ALL`.
+/// Colours of the kinds, in the order of `MotionKind::ALL`.
 const COLOURS: [Colour; 6] = [style::BLUE, style::GREEN, style::SKY, style::VERMILLION, style::INK, style::FAINT];
 
 fn rows_of(bytes: &[u8]) -> Result<Rows, JobError> {
@@ -166,7 +166,7 @@ fn bars(names: &[String], counts: &[Vec<f64>], below: &[Vec<String>]) -> PlanePa
 fn draw(tables: &[Table]) -> Sheet {
     let [shares, found, curves, ways, shorter] = tables else { unreachable!("the census has five tables") };
     let count = |table: &Table, row: usize, suffix: &str| -> Vec<f64> {
-        Kind::ALL.map(|k| table.integers(&format!("{}{suffix}", k.words().replace(' ', "_")))[row] as f64).to_vec()
+        MotionKind::ALL.map(|k| table.integers(&format!("{}{suffix}", k.words().replace(' ', "_")))[row] as f64).to_vec()
     };
     let names: Vec<String> = shares.words("panel").map(str::to_owned).collect();
     let at_end: Vec<Vec<f64>> = (0..shares.len()).map(|row| count(shares, row, "_at_end")).collect();
@@ -234,7 +234,7 @@ fn draw(tables: &[Table]) -> Sheet {
             format!("interval 100 to *t* = {horizon}, by local error"),
             bars(&shorter_names, &shorter_counts, &shorter_totals),
         );
-    for (kind, colour) in Kind::ALL.into_iter().zip(COLOURS) {
+    for (kind, colour) in MotionKind::ALL.into_iter().zip(COLOURS) {
         sheet = sheet.legend(LegendEntry::new(LegendKey::Area(colour, 100), kind.words()));
     }
     sheet

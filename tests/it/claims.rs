@@ -17,7 +17,7 @@ use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::job::{Executor, PathComparison};
 use twofold::num::random::RandomStream;
-use twofold::paper::census::{Kind, PANELS, supporting, tally};
+use twofold::paper::census::{MotionKind, PANELS, supporting, tally};
 use twofold::paper::claims::{Quantity, claims};
 use twofold::paper::{Figure, Reading, figures};
 use twofold::record::Manifest;
@@ -436,7 +436,7 @@ fn the_census_counts_outcomes() {
             reads.read("5.2", quantity, seen as f64);
         }
         let decided = |counts: [u64; 6]| {
-            Kind::ALL.into_iter().zip(counts).filter(|(kind, n)| *kind != Kind::Undecided && *n > 0).count()
+            MotionKind::ALL.into_iter().zip(counts).filter(|(kind, n)| *kind != MotionKind::Undecided && *n > 0).count()
         };
         let kinds = |runs: &[twofold::paper::census::Run]| decided(tally(runs, rules.end));
         for (id, panels) in [("7.4", &runs[..3]), ("8.4", &runs[3..])] {

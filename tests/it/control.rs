@@ -10,7 +10,7 @@ use twofold::job::recording::Data;
 use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::job::sweep::Rows;
-use twofold::paper::census::{Kind, PANELS, Run, tally};
+use twofold::paper::census::{MotionKind, PANELS, Run, tally};
 use twofold::paper::claims::claims;
 use twofold::paper::{Reading, figures};
 use twofold::system::filippov::two_fold;
@@ -47,7 +47,7 @@ fn shifted() -> System {
 /// The kinds of outcome among runs, undecided ones aside.
 fn kinds(runs: &[Run]) -> usize {
     let counts = tally(runs, claims().rules.end);
-    Kind::ALL.into_iter().zip(counts).filter(|(kind, n)| *kind != Kind::Undecided && *n > 0).count()
+    MotionKind::ALL.into_iter().zip(counts).filter(|(kind, n)| *kind != MotionKind::Undecided && *n > 0).count()
 }
 
 #[test]

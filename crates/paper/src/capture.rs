@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use super::Reading;
 use super::audit::{self, Cell, Sweeps};
-use super::census::{self, Kind, PANELS, Run, tally};
+use super::census::{self, MotionKind, PANELS, Run, tally};
 use super::claims::Rules;
 use super::effects::{self, Estimate, LogRank, Time};
 use twofold_analyse::counts::wilson;
@@ -31,7 +31,7 @@ pub struct ByMethod {
 /// When a run was captured, or that it was not until `end`. An undecided run counts as not captured.
 pub fn time(run: &Run, end: f64) -> Time {
     match run.kind(end) {
-        Kind::Irregular | Kind::Undecided => (end, false),
+        MotionKind::Irregular | MotionKind::Undecided => (end, false),
         _ if run.captured_at.is_finite() => (run.captured_at, true),
         _ => (0.0, true),
     }
@@ -110,7 +110,7 @@ pub fn effects_text(fig7: &Table, fig8: &Table, rules: &Rules) -> String {
     let mut text = String::from(
         "| kind at t = 2·10⁵ | interval 20 less interval 100 | 40 less 100 | fig. 7 less fig. 8 |\n|---|---|---|---|\n",
     );
-    for (i, kind) in Kind::ALL.into_iter().enumerate() {
+    for (i, kind) in MotionKind::ALL.into_iter().enumerate() {
         let cells: Vec<String> = contrasts
             .iter()
             .map(|(a, b)| {

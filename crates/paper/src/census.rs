@@ -16,7 +16,7 @@ use twofold_num::random::RandomStream;
 /// The kind of motion of a run at a given time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum MotionKind {
     /// Captured by a closed orbit of one return.
     PeriodOne,
     /// Captured by a closed orbit of three returns.
@@ -31,20 +31,26 @@ pub enum Kind {
     Undecided,
 }
 
-impl Kind {
+impl MotionKind {
     /// All kinds.
-    pub const ALL: [Kind; 6] =
-        [Kind::PeriodOne, Kind::PeriodThree, Kind::OtherRegular, Kind::Irregular, Kind::Far, Kind::Undecided];
+    pub const ALL: [MotionKind; 6] = [
+        MotionKind::PeriodOne,
+        MotionKind::PeriodThree,
+        MotionKind::OtherRegular,
+        MotionKind::Irregular,
+        MotionKind::Far,
+        MotionKind::Undecided,
+    ];
 
     /// For tables and legends.
     pub fn words(self) -> &'static str {
         match self {
-            Kind::PeriodOne => "period one",
-            Kind::PeriodThree => "period three",
-            Kind::OtherRegular => "other regular",
-            Kind::Irregular => "irregular",
-            Kind::Far => "far",
-            Kind::Undecided => "undecided",
+            MotionKind::PeriodOne => "period one",
+            MotionKind::PeriodThree => "period three",
+            MotionKind::OtherRegular => "other regular",
+            MotionKind::Irregular => "irregular",
+            MotionKind::Far => "far",
+            MotionKind::Undecided => "undecided",
         }
     }
 }
@@ -115,17 +121,17 @@ pub struct Run {
 impl Run {
     /// The kind of motion at time `t`: regular once captured, irregular before. Regular motion
     /// without a time of capture counts as regular from the start.
-    pub fn kind(&self, t: f64) -> Kind {
+    pub fn kind(&self, t: f64) -> MotionKind {
         let later = self.captured_at > t;
         match self.outcome.as_str() {
-            "irregular" => Kind::Irregular,
-            "far" if later => Kind::Irregular,
-            "far" => Kind::Far,
-            "failed" | "undecided" | "too-few" | "escaped" | "rest" => Kind::Undecided,
-            _ if later => Kind::Irregular,
-            "period-1" => Kind::PeriodOne,
-            "period-3" => Kind::PeriodThree,
-            _ => Kind::OtherRegular,
+            "irregular" => MotionKind::Irregular,
+            "far" if later => MotionKind::Irregular,
+            "far" => MotionKind::Far,
+            "failed" | "undecided" | "too-few" | "escaped" | "rest" => MotionKind::Undecided,
+            _ if later => MotionKind::Irregular,
+            "period-1" => MotionKind::PeriodOne,
+            "period-3" => MotionKind::PeriodThree,
+            _ => MotionKind::OtherRegular,
         }
     }
 }
@@ -149,19 +155,19 @@ pub fn runs(table: &Table, chosen: &[(&str, Entry)]) -> Vec<Run> {
         .collect()
 }
 
-/// The number of runs of each kind at time `t`, in the order of [`Kind::ALL`].
+/// The number of runs of each kind at time `t`, in the order of [`MotionKind::ALL`].
 pub fn tally(runs: &[Run], t: f64) -> [u64; 6] {
-    Kind::ALL.map(|kind| runs.iter().filter(|r| r.kind(t) == kind).count() as u64)
+    MotionKind::ALL.map(|kind| runs.iter().filter(|r| r.kind(t) == kind).count() as u64)
 }
 
 /// Number of runs that support a claim: periodic from `shown_from` on, or irregular to the end.
 pub fn supporting(said: Said, runs: &[Run], rules: &Rules) -> u64 {
     let is = |run: &&Run| match said {
         Said::Periodic => {
-            run.kind(rules.shown_from) != Kind::Irregular && run.outcome == format!("period-{}", run.period)
+            run.kind(rules.shown_from) != MotionKind::Irregular && run.outcome == format!("period-{}", run.period)
         }
-        Said::PeriodThree => run.kind(rules.shown_from) == Kind::PeriodThree,
-        Said::Chaos => run.kind(rules.end) == Kind::Irregular,
+        Said::PeriodThree => run.kind(rules.shown_from) == MotionKind::PeriodThree,
+        Said::Chaos => run.kind(rules.end) == MotionKind::Irregular,
     };
     runs.iter().filter(is).count() as u64
 }
@@ -190,7 +196,7 @@ pub struct PanelShare {
     pub hits: u64,
     /// Interval of their share (Wilson).
     pub interval: [f64; 2],
-    /// Kinds at `shown_from`, in the order of [`Kind::ALL`].
+    /// Kinds at `shown_from`, in the order of [`MotionKind::ALL`].
     pub at_shown: [u64; 6],
     /// Kinds at the end.
     pub at_end: [u64; 6],
@@ -325,10 +331,10 @@ pub fn panel_table(shares: &[PanelShare]) -> Table {
     ];
     columns.extend(["share", "low", "high"].map(Column::numbers));
     for at in ["shown", "end"] {
-        columns.extend(Kind::ALL.map(|k| Column::integers(&format!("{} at {at}", k.words()).replace(' ', "_"))));
+        columns.extend(MotionKind::ALL.map(|k| Column::integers(&format!("{} at {at}", k.words()).replace(' ', "_"))));
     }
-    let bounds = |k: Kind| ["low", "high"].map(|e| format!("{} at end {e}", k.words()).replace(' ', "_"));
-    columns.extend(Kind::ALL.into_iter().flat_map(bounds).map(|name| Column::numbers(&name)));
+    let bounds = |k: MotionKind| ["low", "high"].map(|e| format!("{} at end {e}", k.words()).replace(' ', "_"));
+    columns.extend(MotionKind::ALL.into_iter().flat_map(bounds).map(|name| Column::numbers(&name)));
     columns.extend(["capture_q1", "capture_median", "capture_q3"].map(Column::numbers));
     let mut table = Table::new("census", columns);
     for s in shares {
@@ -528,7 +534,7 @@ impl Found {
                 );
             }
         }
-        let kinds = || Kind::ALL.map(|k| Column::integers(&k.words().replace(' ', "_")));
+        let kinds = || MotionKind::ALL.map(|k| Column::integers(&k.words().replace(' ', "_")));
         let mut ways = Table::new("ways", [Column::words("group")].into_iter().chain(kinds()));
         for (name, counts) in &self.ways {
             ways.push([Entry::Word(name.clone())].into_iter().chain(counts.map(|n| Entry::Integer(n as i64))));
@@ -674,7 +680,7 @@ pub fn limits_text(found: &[Found; 2]) -> String {
 
 /// Counts by kind, for texts: "12 period one, 3 irregular".
 pub fn in_words(counts: &[u64; 6]) -> String {
-    let said: BTreeMap<usize, String> = Kind::ALL
+    let said: BTreeMap<usize, String> = MotionKind::ALL
         .iter()
         .enumerate()
         .filter(|(i, _)| counts[*i] > 0)
@@ -695,12 +701,15 @@ mod tests {
     #[test]
     fn what_a_run_is_depends_on_when_it_is_looked_at() {
         let late = run("period-3", 3, 1.5e5);
-        assert_eq!((late.kind(1e5), late.kind(2e5)), (Kind::Irregular, Kind::PeriodThree));
-        assert_eq!(run("quasi-periodic", 3, 5.0).kind(1e5), Kind::OtherRegular);
-        assert_eq!(run("period-18", 18, 5.0).kind(1e5), Kind::OtherRegular);
-        assert_eq!(run("irregular", 0, f64::NAN).kind(2e5), Kind::Irregular);
-        assert_eq!(run("failed", 0, f64::NAN).kind(2e5), Kind::Undecided);
-        assert_eq!((run("far", 0, 30.0).kind(10.0), run("far", 0, 30.0).kind(1e5)), (Kind::Irregular, Kind::Far));
+        assert_eq!((late.kind(1e5), late.kind(2e5)), (MotionKind::Irregular, MotionKind::PeriodThree));
+        assert_eq!(run("quasi-periodic", 3, 5.0).kind(1e5), MotionKind::OtherRegular);
+        assert_eq!(run("period-18", 18, 5.0).kind(1e5), MotionKind::OtherRegular);
+        assert_eq!(run("irregular", 0, f64::NAN).kind(2e5), MotionKind::Irregular);
+        assert_eq!(run("failed", 0, f64::NAN).kind(2e5), MotionKind::Undecided);
+        assert_eq!(
+            (run("far", 0, 30.0).kind(10.0), run("far", 0, 30.0).kind(1e5)),
+            (MotionKind::Irregular, MotionKind::Far)
+        );
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use super::Reading;
 use super::capture::time;
-use super::census::{self, Kind, PANELS, Panel, Run, supporting, p_in_words, percent, tally};
+use super::census::{self, MotionKind, PANELS, Panel, Run, p_in_words, percent, supporting, tally};
 use super::claims::Rules;
 use super::effects::{self, LogRank};
 use twofold_analyse::counts::{homogeneity, wilson};
@@ -146,7 +146,7 @@ pub fn kinds_text(all: &[Compared], named: [&str; 2], rules: &Rules) -> String {
     for (i, c) in all.iter().enumerate() {
         let ends = |runs: &[Run]| {
             let counts = tally(runs, rules.end);
-            let said = Kind::ALL.iter().zip(counts).filter(|(_, n)| *n > 0);
+            let said = MotionKind::ALL.iter().zip(counts).filter(|(_, n)| *n > 0);
             said.map(|(kind, n)| format!("{n} {}", kind.words())).collect::<Vec<_>>().join(", ")
         };
         let ratio = ranks[i].hazard_ratio(rules.confidence);
