@@ -318,7 +318,7 @@ mod tests {
         let answer = Executor::quiet().ask(&*series.question).unwrap();
         let titles = |columns| {
             let sheet = Plots { columns, plots: vec![series.clone()] }.sheet(std::slice::from_ref(&answer)).unwrap();
-            let title = |p: &twofold_render::sheet::Panel| match &p.content {
+            let title = |p: &twofold_render::sheet::SheetPanel| match &p.content {
                 Content::Plane(plane) => plane.x.title.clone(),
                 _ => "no plane".into(),
             };

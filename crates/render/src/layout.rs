@@ -9,7 +9,7 @@ use super::font::{CAP_HEIGHT, FontFace};
 use super::plane::{self, Insets};
 use super::rich_text;
 use super::scene::{DPI, Scene, UNITS_PER_PIXEL, UNITS_PER_POINT, units};
-use super::sheet::{Colour, ColumnWidth, Content, LegendEntry, Panel, Sheet};
+use super::sheet::{Colour, ColumnWidth, Content, LegendEntry, Sheet, SheetPanel};
 use super::space;
 use super::style;
 
@@ -134,7 +134,7 @@ struct HeadingLine {
 }
 
 /// The title of a panel beside its label and the notes below, broken at the panel's width.
-fn panel_heading(panel: &Panel, width: i32) -> Vec<HeadingLine> {
+fn panel_heading(panel: &SheetPanel, width: i32) -> Vec<HeadingLine> {
     let points = |units: i32| f64::from(units) / f64::from(UNITS_PER_POINT);
     let label = rich_text::width(&panel.label, FontFace::Bold, style::LABEL_PT);
     let indent = if panel.label.is_empty() { 0 } else { units(label + 4.0) };
@@ -155,13 +155,13 @@ fn panel_heading(panel: &Panel, width: i32) -> Vec<HeadingLine> {
     lines
 }
 
-fn title_height(panel: &Panel, width: i32) -> i32 {
+fn title_height(panel: &SheetPanel, width: i32) -> i32 {
     let last = panel_heading(panel, width).last().map(|line| line.below);
     let below = if panel.label.is_empty() { last } else { last.or(Some(0)) };
     below.map_or(0, |below| below + units(CAP_HEIGHT * style::LABEL_PT + 4.5))
 }
 
-fn content_insets(panel: &Panel, w: i32, h: i32) -> Insets {
+fn content_insets(panel: &SheetPanel, w: i32, h: i32) -> Insets {
     match &panel.content {
         Content::Plane(p) => plane::insets(p, w, h),
         Content::Space(_) | Content::Blank => Insets::default(),
@@ -169,7 +169,7 @@ fn content_insets(panel: &Panel, w: i32, h: i32) -> Insets {
 }
 
 /// Height of a panel's drawing area at a width.
-fn height(panel: &Panel, sheet: &Sheet, w: i32) -> i32 {
+fn height(panel: &SheetPanel, sheet: &Sheet, w: i32) -> i32 {
     let at = |aspect: f64| (f64::from(w) * aspect).round() as i32;
     match &panel.content {
         Content::Plane(p) => at(plane::natural_aspect(p).unwrap_or(sheet.panel_aspect)),
@@ -185,7 +185,7 @@ fn height(panel: &Panel, sheet: &Sheet, w: i32) -> i32 {
 fn plan_panels(sheet: &Sheet, inner: i32, margin: i32, y: &mut i32) -> Vec<(Rect, i32)> {
     let columns = sheet.columns.clamp(1, sheet.panels.len().max(1));
     let gutter = units(style::GUTTER_PT);
-    let rows: Vec<&[Panel]> = sheet.panels.chunks(columns).collect();
+    let rows: Vec<&[SheetPanel]> = sheet.panels.chunks(columns).collect();
     // Tick labels depend on the size of the drawing area and that on the room for tick labels: two rounds settle it.
     let mut w = (inner - gutter * (columns as i32 - 1)) / columns as i32 - units(28.0);
     let mut left = vec![0; columns];

@@ -161,7 +161,7 @@ pub fn render(sheet: &Sheet) -> Result<Rendered, RenderError> {
 }
 
 fn left_out(sheet: &Sheet) -> usize {
-    let count = |panel: &sheet::Panel| match &panel.content {
+    let count = |panel: &sheet::SheetPanel| match &panel.content {
         sheet::Content::Plane(p) => {
             let bad = |axis: &sheet::Axis, v: f64| !v.is_finite() || (axis.logarithmic && v <= 0.0);
             let bad = |q: &&[f64; 2]| bad(&p.x, q[0]) || bad(&p.y, q[1]);

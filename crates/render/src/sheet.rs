@@ -27,7 +27,7 @@ pub struct Sheet {
     /// Number of panels in a row.
     pub columns: usize,
     /// Panels, row by row.
-    pub panels: Vec<Panel>,
+    pub panels: Vec<SheetPanel>,
     /// Height of a panel's drawing area divided by its width, for panels that do not fix it themselves.
     pub panel_aspect: f64,
     /// Legend shared by all panels, set in one row below them.
@@ -66,7 +66,7 @@ impl Sheet {
 
     /// Adds a panel.
     pub fn panel(mut self, label: impl Into<String>, title: impl Into<String>, content: impl Into<Content>) -> Self {
-        self.panels.push(Panel {
+        self.panels.push(SheetPanel {
             label: label.into(),
             title: title.into(),
             notes: Vec::new(),
@@ -128,7 +128,7 @@ impl Sheet {
 
 /// One panel of a sheet.
 #[derive(Clone, Debug)]
-pub struct Panel {
+pub struct SheetPanel {
     /// Its name, for example `(i)`.
     pub label: String,
     /// What it shows, set beside the name.
