@@ -8,7 +8,7 @@ use twofold::cli::{CliError, make};
 use twofold::integrate::Schedule;
 use twofold::job::Executor;
 use twofold::job::spec::*;
-use twofold::paper::{Figure, Panel, Picture, Reading, View};
+use twofold::paper::{Figure, FigurePanel, Picture, Reading, View};
 
 /// The figure's specification.
 pub fn figure() -> Figure {
@@ -23,7 +23,7 @@ pub fn figure() -> Figure {
             schedule: Schedule { restart_every: Some(100.0), kick: None },
             observe: Observation::Section { coordinate: 1, value: 0.0 },
         };
-        Panel::new(label, format!("*ε* = {eps}"), run)
+        FigurePanel::new(label, format!("*ε* = {eps}"), run)
     };
     Figure {
         id: "own".into(),

@@ -4,7 +4,7 @@
 use twofold::integrate::filippov::ExitRule;
 use twofold::integrate::{Schedule, StepCap, Tolerance};
 use twofold::job::spec::*;
-use twofold::paper::{Camera, Figure, Panel, Reading, View};
+use twofold::paper::{Camera, Figure, FigurePanel, Reading, View};
 
 /// The figure's specification.
 pub fn figure() -> Figure {
@@ -25,7 +25,7 @@ pub fn figure() -> Figure {
                 Reading::Printed => (2.0, 60.0, "35 of 40 futures come back within 300"),
                 Reading::Reconstructed => (0.8, 16.0, "40 of 40 futures come back within 300"),
             };
-            vec![Panel::new(
+            vec![FigurePanel::new(
                 "i",
                 format!("{back}; drawn are 10, followed for {horizon}"),
                 RunSpec {

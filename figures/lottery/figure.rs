@@ -5,7 +5,7 @@
 use twofold::integrate::Schedule;
 use twofold::job::spec::*;
 use twofold::paper::verdict::{Claim, SectionClaim};
-use twofold::paper::{Figure, Panel, View};
+use twofold::paper::{Figure, FigurePanel, View};
 
 /// The figure's specification.
 pub fn figure() -> Figure {
@@ -37,7 +37,7 @@ pub fn figure() -> Figure {
                     };
                     let label = format!("{row}-{column}");
                     let title = format!("{}, interval {interval}", method.name());
-                    panels.push(Panel::new(&label, title, run).claimed(Claim::Section(claim)));
+                    panels.push(FigurePanel::new(&label, title, run).claimed(Claim::Section(claim)));
                 }
             }
             panels

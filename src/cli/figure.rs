@@ -16,7 +16,7 @@ use crate::job::spec::{RunSpec, SwitchSpec};
 use crate::job::{Executor, Store};
 use crate::paper::pipeline::{Computed, PictureRecord, PipelineError, compute_with_tables, questions};
 use crate::paper::standing::{Standing, Stands};
-use crate::paper::{Alterations, Figure, Panel, Picture, View, figures};
+use crate::paper::{Alterations, Figure, FigurePanel, Picture, View, figures};
 use crate::record::files::{read, still_there, try_folder};
 use crate::record::{FileError, write};
 use crate::report::{Making, Makings, Timed, names};
@@ -317,7 +317,7 @@ fn refuse_idle(figures: &[Figure], arguments: &FigureFlags) -> Result<(), CliErr
     if arguments.reading.is_some() && pictures().all(|p| p.reading.is_none()) {
         return Err(CliError::no_effect("--reading", format!("{names}: the same in every reading; leave it out")));
     }
-    let wanted = |panel: &&Panel| arguments.only.as_deref().is_none_or(|only| panel.label == label(only));
+    let wanted = |panel: &&FigurePanel| arguments.only.as_deref().is_none_or(|only| panel.label == label(only));
     if arguments.seed.is_some() && !pictures().flat_map(|p| &p.panels).filter(wanted).any(|panel| is_random(&panel.run))
     {
         return Err(CliError::no_effect(

@@ -32,7 +32,7 @@ use crate::job::spec::RunSpec;
 use crate::paper::draw::plot::{self, Look, PictureKind};
 use crate::paper::plots::{Columns, Drawing, Plot, Plots, Points, Recorded};
 use crate::paper::verdict::Claim as PanelClaim;
-use crate::paper::{Camera, Figure, Panel, Picture, Reading, Repeats, View, figures};
+use crate::paper::{Camera, Figure, FigurePanel, Picture, Reading, Repeats, View, figures};
 use crate::record::FileError;
 use crate::record::files::read_text;
 use crate::record::manifest::is_plain_name;
@@ -468,7 +468,7 @@ impl Folder {
             let said = said.transpose()?;
             let question = if let Draw::Halves | Draw::Surface = draw.get_ref() {
                 let (spec, view) = self.spec_and_view(origin, place, said.as_ref(), &drawn)?;
-                let mut shown = Panel::new(label.get_ref(), panel.title.clone(), spec);
+                let mut shown = FigurePanel::new(label.get_ref(), panel.title.clone(), spec);
                 shown.claim = panel.says.as_ref().map(|c| *c.get_ref());
                 shown.repeats =
                     panel.repeats.as_ref().map(|name| Self::repeats(origin, name, &reading.name)).transpose()?;

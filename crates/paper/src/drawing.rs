@@ -1,7 +1,7 @@
 //! From recordings to a drawing: which points, lines and surfaces, in which colours and ranges.
 
 use super::verdict::{Grounds, PanelVerdict};
-use super::{Camera, Panel, Picture, Support, View, wording};
+use super::{Camera, FigurePanel, Picture, Support, View, wording};
 use crate::draw::surface;
 use twofold_analyse::attractor::Verdict;
 use twofold_analyse::{Crossing, Motion, Sample};
@@ -95,7 +95,7 @@ fn methods(picture: &Picture) -> String {
 }
 
 /// "(ii)"; nothing where there is only one panel.
-fn label(picture: &Picture, panel: &Panel) -> String {
+fn label(picture: &Picture, panel: &FigurePanel) -> String {
     if picture.panels.len() > 1 { format!("({})", panel.label) } else { String::new() }
 }
 
@@ -116,10 +116,10 @@ fn section_panels(
     axes: [usize; 2],
     halves: &[Half],
 ) -> Sheet {
-    let late = |panel: &Panel, c: &Crossing| c.t > 0.5 * panel.run.t_end;
-    let half = |panel: &Panel, c: &Crossing| if late(panel, c) { Half::Late } else { Half::Early };
+    let late = |panel: &FigurePanel, c: &Crossing| c.t > 0.5 * panel.run.t_end;
+    let half = |panel: &FigurePanel, c: &Crossing| if late(panel, c) { Half::Late } else { Half::Early };
     let seen = || {
-        let crossings = |(p, r): (&'_ Panel, &'_ Recording)| {
+        let crossings = |(p, r): (&'_ FigurePanel, &'_ Recording)| {
             let kept = crossings(&r.data).iter().filter(|c| halves.contains(&half(p, c)));
             kept.map(|c| axes.map(|i| c.x[i])).collect::<Vec<_>>()
         };
@@ -155,7 +155,7 @@ fn section_panels(
 
 /// What stands below the title of each panel: the paper's claim, whether the panel's run supports it, and how many runs do.
 fn verdict_notes(picture: &Picture, verdicts: &[PanelVerdict]) -> Result<Vec<Vec<String>>, JobError> {
-    let of = |panel: &Panel| -> Result<Vec<String>, JobError> {
+    let of = |panel: &FigurePanel| -> Result<Vec<String>, JobError> {
         let Some(verdict) = verdicts.iter().find(|v| v.panel == panel.label) else { return Ok(Vec::new()) };
         let mut notes = vec![format!("paper: {}", verdict.claim_text), format!("this run {}", outcome(verdict))];
         if let Some(repeats) = &panel.repeats {
@@ -255,7 +255,7 @@ fn space_panels(
 /// The switching surface around the two-fold at `centre`, over the coordinates `axes`: what slides there, where it leaves, and the flights over
 /// it. So wide that half of the exits lie well inside; nothing if there is no exit.
 fn passage(
-    panel: &Panel,
+    panel: &FigurePanel,
     recording: &Recording,
     curves: &[Curve],
     centre: [f64; 3],

@@ -81,14 +81,14 @@ pub struct Picture {
     /// How panels are drawn.
     pub view: View,
     /// The panels, in the paper's order.
-    pub panels: Vec<Panel>,
+    pub panels: Vec<FigurePanel>,
     /// What sets this picture apart from the published one ("t = 500 instead of 200000"), empty for the real thing.
     pub alterations: Vec<String>,
 }
 
 /// One panel: a label and a question.
 #[derive(Clone, Debug)]
-pub struct Panel {
+pub struct FigurePanel {
     /// "i", "ii", ... as in the paper.
     pub label: String,
     /// A few words above the panel.
@@ -221,7 +221,7 @@ impl Figure {
         title: &'static str,
         view: View,
         caption: impl Fn(Reading) -> String,
-        panels: impl Fn(Reading) -> Vec<Panel>,
+        panels: impl Fn(Reading) -> Vec<FigurePanel>,
     ) -> Self {
         let (id, title) = (Cow::from(id), Cow::from(title));
         let pictures = Reading::ALL
@@ -239,20 +239,20 @@ impl Figure {
     }
 }
 
-impl Panel {
+impl FigurePanel {
     /// A panel.
     pub fn new(label: &str, title: impl Into<String>, run: RunSpec) -> Self {
-        Panel { label: label.to_owned(), title: title.into(), run, claim: None, repeats: None }
+        FigurePanel { label: label.to_owned(), title: title.into(), run, claim: None, repeats: None }
     }
 
     /// The panel with the paper's claim about it.
     pub fn claimed(self, claim: Claim) -> Self {
-        Panel { claim: Some(claim), ..self }
+        FigurePanel { claim: Some(claim), ..self }
     }
 
     /// The panel with the runs that repeat it.
     pub fn repeated(self, repeats: Repeats) -> Self {
-        Panel { repeats: Some(repeats), ..self }
+        FigurePanel { repeats: Some(repeats), ..self }
     }
 }
 

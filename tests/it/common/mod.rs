@@ -12,7 +12,7 @@ use twofold::integrate::Schedule;
 use twofold::job::Executor;
 use twofold::job::spec::*;
 use twofold::paper::verdict::{Claim, SectionClaim};
-use twofold::paper::{Figure, Panel, View};
+use twofold::paper::{Figure, FigurePanel, View};
 use twofold::record::manifest::VERSION;
 use twofold::record::{Manifest, PictureEntry};
 
@@ -34,7 +34,7 @@ pub fn small_figure(t_end: f64) -> Figure {
                     schedule: Schedule { restart_every: Some(every), kick: None },
                     observe: Observation::Section { coordinate: 1, value: 0.0 },
                 };
-                Panel::new(label, format!("interval {every}"), run).claimed(Claim::Section(claim))
+                FigurePanel::new(label, format!("interval {every}"), run).claimed(Claim::Section(claim))
             };
             vec![panel("i", 20.0, SectionClaim::Period(1)), panel("ii", 40.0, SectionClaim::Chaos)]
         },
