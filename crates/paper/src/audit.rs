@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::census::{self, Panel, Probability, Run, Said};
+use super::census::{self, CensusPanel, Probability, Run, Said};
 use super::claims::Rules;
 use twofold_job::table::{Column, Entry, Table};
 use twofold_num::elementary::{exp10, log10};
@@ -11,9 +11,9 @@ use twofold_num::random::RandomStream;
 
 /// The panels whose outcomes are judged: the six of the census, and 9(i), fig. 7(iii) with
 /// hysteresis.
-pub const PANELS: [Panel; 7] = {
+pub const PANELS: [CensusPanel; 7] = {
     let [a, b, c, d, e, f] = census::PANELS;
-    [a, b, c, d, e, f, Panel { name: "9(i)", said: Said::Chaos, column: None }]
+    [a, b, c, d, e, f, CensusPanel { name: "9(i)", said: Said::Chaos, column: None }]
 };
 
 /// Sweeps of the three figures, in their order: of fig. 7's intervals, of fig. 8's sigmas, and of fig. 9's first panel.
@@ -69,7 +69,7 @@ impl Cell {
 }
 
 /// Runs of a table at a pair of parameters. What a table does not vary has the paper's value in it.
-fn runs_at(table: &Table, [alpha, beta]: [f64; 2], panel: &Panel) -> Vec<Run> {
+fn runs_at(table: &Table, [alpha, beta]: [f64; 2], panel: &CensusPanel) -> Vec<Run> {
     let mut chosen = Vec::new();
     for (name, wanted, printed) in [("params.alpha", alpha, PRINTED[0]), ("params.beta", beta, PRINTED[1])] {
         if table.column(name).is_some() {
@@ -264,7 +264,8 @@ mod tests {
             table.push(head.into_iter().chain(["period-1".into(), Entry::Integer(1), Entry::Number(10.0)]));
             table
         };
-        let of = |axis: (&str, f64), panel: &Panel| sweep(&[axis].into_iter().chain(panel.column).collect::<Vec<_>>());
+        let of =
+            |axis: (&str, f64), panel: &CensusPanel| sweep(&[axis].into_iter().chain(panel.column).collect::<Vec<_>>());
         let all = |axis, range: std::ops::Range<usize>| PANELS[range].iter().map(|p| of(axis, p)).collect::<Vec<_>>();
         for (axis, expected) in [(("params.alpha", 0.1), [0.1, 1e-5]), (("params.beta", 1e-4), [1e-3, 1e-4])] {
             let sweeps = [all(axis, 0..3), all(axis, 3..6), all(axis, 6..7)];

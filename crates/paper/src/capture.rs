@@ -285,7 +285,7 @@ fn mapped([fig7, fig8]: [&Table; 2], rules: &Rules) -> Vec<Mapped> {
         let chosen = || vec![("params.alpha", Entry::Number(at[0])), ("params.beta", Entry::Number(at[1]))];
         let panels: Vec<Vec<Run>> =
             PANELS.iter().enumerate().map(|(i, p)| p.runs([fig7, fig8][i / 3], chosen())).collect();
-        let share = |(panel, runs): (&census::Panel, &Vec<Run>)| {
+        let share = |(panel, runs): (&census::CensusPanel, &Vec<Run>)| {
             let hits = census::supporting(panel.said, runs, rules);
             log10((hits as f64 + 0.5) / (runs.len() as f64 + 1.0))
         };

@@ -80,7 +80,7 @@ impl Said {
 
 /// A panel: its name, the paper's claim, and the rows of a sweep that are its runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Panel {
+pub struct CensusPanel {
     /// "7(i)".
     pub name: &'static str,
     /// The claim.
@@ -89,7 +89,7 @@ pub struct Panel {
     pub column: Option<(&'static str, f64)>,
 }
 
-impl Panel {
+impl CensusPanel {
     /// The runs of the panel in a sweep's table, among those in which every column of `chosen` has its value.
     pub fn runs(&self, table: &Table, mut chosen: Vec<(&str, Entry)>) -> Vec<Run> {
         chosen.extend(self.column.map(|(name, value)| (name, Entry::Number(value))));
@@ -98,13 +98,13 @@ impl Panel {
 }
 
 /// Figs 7 and 8.
-pub const PANELS: [Panel; 6] = [
-    Panel { name: "7(i)", said: Said::Periodic, column: Some(("interval", 20.0)) },
-    Panel { name: "7(ii)", said: Said::PeriodThree, column: Some(("interval", 40.0)) },
-    Panel { name: "7(iii)", said: Said::Chaos, column: Some(("interval", 100.0)) },
-    Panel { name: "8(i)", said: Said::Chaos, column: Some(("sigma", 0.01)) },
-    Panel { name: "8(ii)", said: Said::Periodic, column: Some(("sigma", 0.1)) },
-    Panel { name: "8(iii)", said: Said::Periodic, column: Some(("sigma", 0.13)) },
+pub const PANELS: [CensusPanel; 6] = [
+    CensusPanel { name: "7(i)", said: Said::Periodic, column: Some(("interval", 20.0)) },
+    CensusPanel { name: "7(ii)", said: Said::PeriodThree, column: Some(("interval", 40.0)) },
+    CensusPanel { name: "7(iii)", said: Said::Chaos, column: Some(("interval", 100.0)) },
+    CensusPanel { name: "8(i)", said: Said::Chaos, column: Some(("sigma", 0.01)) },
+    CensusPanel { name: "8(ii)", said: Said::Periodic, column: Some(("sigma", 0.1)) },
+    CensusPanel { name: "8(iii)", said: Said::Periodic, column: Some(("sigma", 0.13)) },
 ];
 
 /// One finished run of a panel.
@@ -207,7 +207,7 @@ pub struct PanelShare {
 }
 
 /// A panel's runs, judged.
-pub fn share(panel: &Panel, reading: Reading, runs: &[Run], rules: &Rules) -> PanelShare {
+pub fn share(panel: &CensusPanel, reading: Reading, runs: &[Run], rules: &Rules) -> PanelShare {
     let hits = supporting(panel.said, runs, rules);
     let at_end = tally(runs, rules.end);
     let captured: Vec<f64> = captures(runs, |_| true).iter().map(|p| p[0]).collect();

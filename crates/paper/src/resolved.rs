@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use super::Reading;
 use super::capture::time;
-use super::census::{self, MotionKind, PANELS, Panel, Run, p_in_words, percent, supporting, tally};
+use super::census::{self, CensusPanel, MotionKind, PANELS, Run, p_in_words, percent, supporting, tally};
 use super::claims::Rules;
 use super::effects::{self, LogRank};
 use twofold_analyse::counts::{homogeneity, wilson};
@@ -23,7 +23,7 @@ pub struct Compared {
     /// The reading.
     pub reading: Reading,
     /// The panel.
-    pub panel: Panel,
+    pub panel: CensusPanel,
     /// Runs of the method that the other is compared with.
     pub reference: Vec<Run>,
     /// Runs of the other.
@@ -85,7 +85,7 @@ impl Belongs {
 }
 
 /// Runs that show the panel's outcome, and all.
-fn shown(panel: &Panel, runs: &[Run], rules: &Rules) -> [u64; 2] {
+fn shown(panel: &CensusPanel, runs: &[Run], rules: &Rules) -> [u64; 2] {
     [supporting(panel.said, runs, rules), runs.len() as u64]
 }
 
