@@ -85,7 +85,7 @@ pub fn work_precision<F: VectorField<N>, const N: usize>(
     let options = DriveOptions { step_cap: q.step_cap, max_steps: q.max_steps, ..DriveOptions::to(q.t_end) };
     let runs = q.methods.iter().flat_map(|m| q.tolerances.iter().map(move |t| (*m, *t)));
     let rows = runs.map(|(method, tolerance)| {
-        let run = Run { field, x0: SVector::from(start), options };
+        let run = WorkPrecisionRun { field, x0: SVector::from(start), options };
         let mut row = WorkPrecisionRow { method, tolerance, error: None, statistics: None, stop: None, failure: None };
         match method.with_stepper(tolerance, run) {
             Ok(end) => {
@@ -101,13 +101,13 @@ pub fn work_precision<F: VectorField<N>, const N: usize>(
 }
 
 /// A run as a computation over any stepper.
-struct Run<'a, F, const N: usize> {
+struct WorkPrecisionRun<'a, F, const N: usize> {
     field: &'a F,
     x0: SVector<f64, N>,
     options: DriveOptions,
 }
 
-impl<F: VectorField<N>, const N: usize> WithStepper<N> for Run<'_, F, N> {
+impl<F: VectorField<N>, const N: usize> WithStepper<N> for WorkPrecisionRun<'_, F, N> {
     type Answer = Result<Summary<N>, Failure>;
     fn with<M: Stepper<N>>(self, mut stepper: M) -> Self::Answer {
         drive(self.field, self.x0, &self.options, &mut stepper, &mut Ignore, &())
