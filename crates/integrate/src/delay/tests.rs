@@ -24,13 +24,13 @@ impl<const N: usize> Observer<N> for Seen<N> {
     }
 }
 
-struct Run<const N: usize> {
+struct Recording<const N: usize> {
     course: DriveOptions,
     coordinate: usize,
     x0: SVector<f64, N>,
 }
 
-impl<const N: usize> WithStepper<N> for Run<N> {
+impl<const N: usize> WithStepper<N> for Recording<N> {
     type Answer = (Seen<N>, Summary<N>);
     fn with<M: Stepper<N>>(self, mut stepper: M) -> Self::Answer {
         let mut seen = Seen {
@@ -90,7 +90,7 @@ impl How {
             None => LateSwitch::Delayed { delay: self.delay, smooth: self.smooth, history: self.history },
         };
         let delayed = Delayed { sides, switch, x0 };
-        let run = Run { course: self.course, coordinate: self.coordinate, x0 };
+        let run = Recording { course: self.course, coordinate: self.coordinate, x0 };
         delayed.with_stepper(self.method, None, tolerance(self.tolerance), run)
     }
 }
@@ -612,7 +612,7 @@ fn disturbances_are_those_of_neighbouring_orbits() {
     for switch in switches() {
         let end = |x0: SVector<f64, 3>| {
             let delayed = Delayed { sides: Sides::new(&system, &data), switch, x0 };
-            let run = Run { course: DriveOptions::to(until), coordinate: 0, x0 };
+            let run = Recording { course: DriveOptions::to(until), coordinate: 0, x0 };
             let (seen, end) = delayed.with_stepper(Method::Dopri5, None, tolerance(1e-13), run).unwrap();
             let in_layer = matches!(switch, LateSwitch::Delayed { smooth: Some((Transition::Algebraic, _)), .. });
             assert!(in_layer || seen.crossings.len() > 3, "{switch:?}: {}", seen.crossings.len());

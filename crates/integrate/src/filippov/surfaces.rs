@@ -89,8 +89,17 @@ where
         return Err(Failure::NotFinite { t: 0.0, state: Failure::state(&x0) }.into());
     }
     let mut chooser = Chooser::new(rule);
-    let mut run =
-        Run { faces, settings, t_end, observer, watch, t: 0.0, x: x0, events: 0, statistics: Statistics::default() };
+    let mut run = SurfacesRun {
+        faces,
+        settings,
+        t_end,
+        observer,
+        watch,
+        t: 0.0,
+        x: x0,
+        events: 0,
+        statistics: Statistics::default(),
+    };
     run.statistics.highest_order = 5;
     let near = [0, 1].map(|surface: usize| near_surface(&faces[surface][0], &x0));
     let start = if near == [true; 2] { run.corner(&x0, 1.0) } else { None };
@@ -198,7 +207,7 @@ struct Arrival {
 }
 
 /// A run on its way.
-struct Run<'a, P, const N: usize> {
+struct SurfacesRun<'a, P, const N: usize> {
     faces: &'a Faces<P>,
     settings: &'a FilippovOptions,
     t_end: f64,
@@ -210,7 +219,7 @@ struct Run<'a, P, const N: usize> {
     statistics: Statistics,
 }
 
-impl<P: PiecewiseSmooth<N>, const N: usize> Run<'_, P, N> {
+impl<P: PiecewiseSmooth<N>, const N: usize> SurfacesRun<'_, P, N> {
     fn summary(self, mode: Option<Mode>, stop: StopReason) -> FilippovSummary<N> {
         FilippovSummary { t: self.t, x: self.x, mode, stop, events: self.events, statistics: self.statistics }
     }
