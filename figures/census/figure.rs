@@ -112,7 +112,7 @@ fn place(panel: &str) -> Result<usize, JobError> {
 /// # Errors
 ///
 /// If there is no such panel, or the committed data are not the files that `make census` writes.
-pub fn runs(panel: &str, reading: Reading) -> Result<Vec<census::Run>, JobError> {
+pub fn runs(panel: &str, reading: Reading) -> Result<Vec<census::CensusRun>, JobError> {
     let at = place(panel)?;
     let table = rows_of(&committed(["fig7.csv", "fig8.csv"][at / 3])?)?.table();
     Ok(census::PANELS[at].runs(&table, vec![("params.alpha", reading.caricature().alpha.into())]))

@@ -121,7 +121,7 @@ fn table(name: &str, text: &str) -> Result<Table, JobError> {
 /// # Errors
 ///
 /// If they are not such as `make delay-data` writes.
-pub fn runs() -> Result<Vec<similarity::Run>, JobError> {
+pub fn runs() -> Result<Vec<similarity::RuleRun>, JobError> {
     similarity::runs(DATA[3].1)
         .ok_or_else(|| JobError::Other("figures/delay/runs.csv has other columns or rows".into()))
 }

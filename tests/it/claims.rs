@@ -438,10 +438,11 @@ fn the_census_counts_outcomes() {
         let decided = |counts: [u64; 6]| {
             MotionKind::ALL.into_iter().zip(counts).filter(|(kind, n)| *kind != MotionKind::Undecided && *n > 0).count()
         };
-        let kinds = |runs: &[twofold::paper::census::Run]| decided(tally(runs, rules.end));
+        let kinds = |runs: &[twofold::paper::census::CensusRun]| decided(tally(runs, rules.end));
         for (id, panels) in [("7.4", &runs[..3]), ("8.4", &runs[3..])] {
-            let share =
-                |runs: &[twofold::paper::census::Run]| tally(runs, rules.end).map(|n| n as f64 / runs.len() as f64);
+            let share = |runs: &[twofold::paper::census::CensusRun]| {
+                tally(runs, rules.end).map(|n| n as f64 / runs.len() as f64)
+            };
             let alike: f64 = (0..6).map(|k| panels.iter().map(|runs| share(runs)[k]).product::<f64>()).sum();
             let quantity = "probability that three runs, one of each panel, do not all end alike";
             reads.read(id, &of(quantity), 1.0 - alike);

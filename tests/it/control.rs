@@ -10,7 +10,7 @@ use twofold::job::recording::Data;
 use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::job::sweep::Rows;
-use twofold::paper::census::{MotionKind, PANELS, Run, tally};
+use twofold::paper::census::{CensusRun, MotionKind, PANELS, tally};
 use twofold::paper::claims::claims;
 use twofold::paper::{Reading, figures};
 use twofold::system::filippov::two_fold;
@@ -27,12 +27,12 @@ fn rows(name: &str) -> Rows {
 }
 
 /// The runs of all three intervals.
-fn runs(name: &str) -> Vec<Run> {
+fn runs(name: &str) -> Vec<CensusRun> {
     let table = rows(name).table();
     PANELS[..3].iter().flat_map(|panel| panel.runs(&table, Vec::new())).collect()
 }
 
-fn with_singularity() -> Vec<Run> {
+fn with_singularity() -> Vec<CensusRun> {
     PANELS[..3].iter().flat_map(|p| figures::census::runs(p.name, Reading::Reconstructed).unwrap()).collect()
 }
 
@@ -45,7 +45,7 @@ fn shifted() -> System {
 }
 
 /// The kinds of outcome among runs, undecided ones aside.
-fn kinds(runs: &[Run]) -> usize {
+fn kinds(runs: &[CensusRun]) -> usize {
     let counts = tally(runs, claims().rules.end);
     MotionKind::ALL.into_iter().zip(counts).filter(|(kind, n)| *kind != MotionKind::Undecided && *n > 0).count()
 }
@@ -61,9 +61,9 @@ fn what_remains_without_the_singularity() {
     // The findings say these numbers.
     let page = fs::read_to_string(path("docs/findings.md")).unwrap();
     let page = page.split_whitespace().collect::<Vec<_>>().join(" ");
-    let latest = |runs: &[Run]| runs.iter().map(|r| r.captured_at).fold(0.0, f64::max).ceil();
-    let ends = |runs: &[Run], outcome: &str| runs.iter().filter(|r| r.outcome == outcome).count();
-    let returns = |runs: &[Run], period: i64| runs.iter().all(|r| r.period == period);
+    let latest = |runs: &[CensusRun]| runs.iter().map(|r| r.captured_at).fold(0.0, f64::max).ceil();
+    let ends = |runs: &[CensusRun], outcome: &str| runs.iter().filter(|r| r.outcome == outcome).count();
+    let returns = |runs: &[CensusRun], period: i64| runs.iter().all(|r| r.period == period);
     assert!(ends(&without, "period-1") == 90 && returns(&without, 1) && returns(&wide, 2));
     let radii = rows(WIDE).table().numbers("radius").to_vec();
     for said in [

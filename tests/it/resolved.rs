@@ -69,7 +69,7 @@ fn outcomes_belong_to_whom_the_page_says() {
     assert_eq!(found, [printed, [OtherOdds, System, System, System, OtherOdds, OtherOdds]].concat());
     let methods = compared(&taylor(), &tables(&["resolved/layered7"]));
     let ratio = |c: &resolved::Compared| {
-        let times = |runs: &[census::Run]| runs.iter().map(|r| capture::time(r, rules.end)).collect::<Vec<_>>();
+        let times = |runs: &[census::CensusRun]| runs.iter().map(|r| capture::time(r, rules.end)).collect::<Vec<_>>();
         LogRank::of(&times(&c.runs), &times(&c.reference)).hazard_ratio(rules.confidence)
     };
     assert!(methods[..3].iter().all(|c| ratio(c).interval[1] < 0.5));

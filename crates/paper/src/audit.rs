@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::census::{self, CensusPanel, Probability, Run, Said};
+use super::census::{self, CensusPanel, CensusRun, Probability, Said};
 use super::claims::Rules;
 use twofold_job::table::{Column, Entry, Table};
 use twofold_num::elementary::{exp10, log10};
@@ -69,7 +69,7 @@ impl Cell {
 }
 
 /// Runs of a table at a pair of parameters. What a table does not vary has the paper's value in it.
-fn runs_at(table: &Table, [alpha, beta]: [f64; 2], panel: &CensusPanel) -> Vec<Run> {
+fn runs_at(table: &Table, [alpha, beta]: [f64; 2], panel: &CensusPanel) -> Vec<CensusRun> {
     let mut chosen = Vec::new();
     for (name, wanted, printed) in [("params.alpha", alpha, PRINTED[0]), ("params.beta", beta, PRINTED[1])] {
         if table.column(name).is_some() {
@@ -100,7 +100,7 @@ pub fn cells(sweeps: &Sweeps, most: [usize; 7], rules: &Rules) -> Vec<Cell> {
         let mut found = [(0, 0, 0); 7];
         for (i, (panel, found)) in PANELS.iter().zip(&mut found).enumerate() {
             let runs = sweeps[i / 3].iter().flat_map(|table| runs_at(table, at, panel));
-            let runs: Vec<Run> = runs.take(most[i]).collect();
+            let runs: Vec<CensusRun> = runs.take(most[i]).collect();
             let far = runs.iter().filter(|r| r.outcome == "far").count() as u64;
             *found = (runs.len() as u64, census::supporting(panel.said, &runs, rules), far);
         }

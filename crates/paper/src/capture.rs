@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use super::Reading;
 use super::audit::{self, Cell, Sweeps};
-use super::census::{self, MotionKind, PANELS, Run, tally};
+use super::census::{self, CensusRun, MotionKind, PANELS, tally};
 use super::claims::Rules;
 use super::effects::{self, Estimate, LogRank, Time};
 use twofold_analyse::counts::wilson;
@@ -25,11 +25,11 @@ pub struct ByMethod {
     /// The method, in words.
     pub name: &'static str,
     /// Its runs.
-    pub runs: Vec<Run>,
+    pub runs: Vec<CensusRun>,
 }
 
 /// When a run was captured, or that it was not until `end`. An undecided run counts as not captured.
-pub fn time(run: &Run, end: f64) -> Time {
+pub fn time(run: &CensusRun, end: f64) -> Time {
     match run.kind(end) {
         MotionKind::Irregular | MotionKind::Undecided => (end, false),
         _ if run.captured_at.is_finite() => (run.captured_at, true),
@@ -100,7 +100,7 @@ pub fn capture_text(readings: &[(Reading, Vec<ByMethod>)], rules: &Rules) -> Str
 /// perturbation. `fig7` and `fig8` are the census' sweeps.
 pub fn effects_text(fig7: &Table, fig8: &Table, rules: &Rules) -> String {
     let alpha = || ("params.alpha", Entry::Number(Reading::Reconstructed.caricature().alpha));
-    let panels: Vec<Vec<Run>> =
+    let panels: Vec<Vec<CensusRun>> =
         PANELS.iter().enumerate().map(|(i, p)| p.runs([fig7, fig8][i / 3], vec![alpha()])).collect();
     let contrasts = [
         (panels[0].clone(), panels[2].clone()),
@@ -114,7 +114,7 @@ pub fn effects_text(fig7: &Table, fig8: &Table, rules: &Rules) -> String {
         let cells: Vec<String> = contrasts
             .iter()
             .map(|(a, b)| {
-                let of = |runs: &[Run]| [tally(runs, rules.end)[i], runs.len() as u64];
+                let of = |runs: &[CensusRun]| [tally(runs, rules.end)[i], runs.len() as u64];
                 let d = effects::difference(of(a), of(b), rules.confidence);
                 let [v, low, high] = [d.value, d.interval[0], d.interval[1]].map(|v| 100.0 * v);
                 format!("{v:+.1} [{low:+.1}, {high:+.1}]")
@@ -270,7 +270,7 @@ pub fn priors_text(candidates: &[Candidate], rules: &Rules) -> String {
 struct Mapped {
     at: [f64; 2],
     log_likelihood: f64,
-    runs: Vec<Run>,
+    runs: Vec<CensusRun>,
 }
 
 fn mapped([fig7, fig8]: [&Table; 2], rules: &Rules) -> Vec<Mapped> {
@@ -283,9 +283,9 @@ fn mapped([fig7, fig8]: [&Table; 2], rules: &Rules) -> Vec<Mapped> {
     let pairs = values("params.alpha").into_iter().flat_map(|a| values("params.beta").into_iter().map(move |b| [a, b]));
     let cell = |at: [f64; 2]| {
         let chosen = || vec![("params.alpha", Entry::Number(at[0])), ("params.beta", Entry::Number(at[1]))];
-        let panels: Vec<Vec<Run>> =
+        let panels: Vec<Vec<CensusRun>> =
             PANELS.iter().enumerate().map(|(i, p)| p.runs([fig7, fig8][i / 3], chosen())).collect();
-        let share = |(panel, runs): (&census::CensusPanel, &Vec<Run>)| {
+        let share = |(panel, runs): (&census::CensusPanel, &Vec<CensusRun>)| {
             let hits = census::supporting(panel.said, runs, rules);
             log10((hits as f64 + 0.5) / (runs.len() as f64 + 1.0))
         };

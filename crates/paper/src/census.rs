@@ -91,7 +91,7 @@ pub struct CensusPanel {
 
 impl CensusPanel {
     /// The runs of the panel in a sweep's table, among those in which every column of `chosen` has its value.
-    pub fn runs(&self, table: &Table, mut chosen: Vec<(&str, Entry)>) -> Vec<Run> {
+    pub fn runs(&self, table: &Table, mut chosen: Vec<(&str, Entry)>) -> Vec<CensusRun> {
         chosen.extend(self.column.map(|(name, value)| (name, Entry::Number(value))));
         runs(table, &chosen)
     }
@@ -109,7 +109,7 @@ pub const PANELS: [CensusPanel; 6] = [
 
 /// One finished run of a panel.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Run {
+pub struct CensusRun {
     /// The row's outcome, in the sweep's words.
     pub outcome: String,
     /// Period of the closed orbit, 0 without one.
@@ -118,7 +118,7 @@ pub struct Run {
     pub captured_at: f64,
 }
 
-impl Run {
+impl CensusRun {
     /// The kind of motion at time `t`: regular once captured, irregular before. Regular motion
     /// without a time of capture counts as regular from the start.
     pub fn kind(&self, t: f64) -> MotionKind {
@@ -137,7 +137,7 @@ impl Run {
 }
 
 /// The runs of a sweep's table in which every column of `chosen` has its value.
-pub fn runs(table: &Table, chosen: &[(&str, Entry)]) -> Vec<Run> {
+pub fn runs(table: &Table, chosen: &[(&str, Entry)]) -> Vec<CensusRun> {
     let columns: Option<Vec<(&Column, &Entry)>> =
         chosen.iter().map(|(name, v)| Some((table.column(name)?, v))).collect();
     let (Some(columns), Some(outcomes), Some(periods), Some(captured)) =
@@ -147,7 +147,7 @@ pub fn runs(table: &Table, chosen: &[(&str, Entry)]) -> Vec<Run> {
     };
     (0..table.len())
         .filter(|row| columns.iter().all(|(c, v)| c.get(*row) == **v))
-        .map(|row| Run {
+        .map(|row| CensusRun {
             outcome: outcomes.get(row).word().to_owned(),
             period: periods.get(row).value() as i64,
             captured_at: captured.get(row).value(),
@@ -156,13 +156,13 @@ pub fn runs(table: &Table, chosen: &[(&str, Entry)]) -> Vec<Run> {
 }
 
 /// The number of runs of each kind at time `t`, in the order of [`MotionKind::ALL`].
-pub fn tally(runs: &[Run], t: f64) -> [u64; 6] {
+pub fn tally(runs: &[CensusRun], t: f64) -> [u64; 6] {
     MotionKind::ALL.map(|kind| runs.iter().filter(|r| r.kind(t) == kind).count() as u64)
 }
 
 /// Number of runs that support a claim: periodic from `shown_from` on, or irregular to the end.
-pub fn supporting(said: Said, runs: &[Run], rules: &Rules) -> u64 {
-    let is = |run: &&Run| match said {
+pub fn supporting(said: Said, runs: &[CensusRun], rules: &Rules) -> u64 {
+    let is = |run: &&CensusRun| match said {
         Said::Periodic => {
             run.kind(rules.shown_from) != MotionKind::Irregular && run.outcome == format!("period-{}", run.period)
         }
@@ -173,7 +173,7 @@ pub fn supporting(said: Said, runs: &[Run], rules: &Rules) -> u64 {
 }
 
 /// The share of runs that is captured by time `t`, as a step function: (time, share) at every capture.
-pub fn captures(runs: &[Run], of: impl Fn(&Run) -> bool) -> Vec<[f64; 2]> {
+pub fn captures(runs: &[CensusRun], of: impl Fn(&CensusRun) -> bool) -> Vec<[f64; 2]> {
     let mut times: Vec<f64> =
         runs.iter().filter(|r| of(r) && r.captured_at.is_finite()).map(|r| r.captured_at).collect();
     times.sort_by(f64::total_cmp);
@@ -207,7 +207,7 @@ pub struct PanelShare {
 }
 
 /// A panel's runs, judged.
-pub fn share(panel: &CensusPanel, reading: Reading, runs: &[Run], rules: &Rules) -> PanelShare {
+pub fn share(panel: &CensusPanel, reading: Reading, runs: &[CensusRun], rules: &Rules) -> PanelShare {
     let hits = supporting(panel.said, runs, rules);
     let at_end = tally(runs, rules.end);
     let captured: Vec<f64> = captures(runs, |_| true).iter().map(|p| p[0]).collect();
@@ -227,7 +227,7 @@ pub fn share(panel: &CensusPanel, reading: Reading, runs: &[Run], rules: &Rules)
 }
 
 /// Tests whether groups of runs have the same distribution of outcomes at the end.
-pub fn same_odds(groups: &[Vec<Run>], rules: &Rules) -> Homogeneity {
+pub fn same_odds(groups: &[Vec<CensusRun>], rules: &Rules) -> Homogeneity {
     let rows: Vec<Vec<u64>> = groups.iter().map(|g| tally(g, rules.end).to_vec()).collect();
     homogeneity(&rows, rules.permutations, rules.permutation_seed)
 }
@@ -351,7 +351,7 @@ pub fn panel_table(shares: &[PanelShare]) -> Table {
 }
 
 /// Groups of a table's runs by the values of a column, in order of first appearance.
-pub fn grouped(table: &Table, column: &str, chosen: &[(&str, Entry)]) -> Vec<(Entry, Vec<Run>)> {
+pub fn grouped(table: &Table, column: &str, chosen: &[(&str, Entry)]) -> Vec<(Entry, Vec<CensusRun>)> {
     let Some(values) = table.column(column) else { return Vec::new() };
     let mut order: Vec<Entry> = Vec::new();
     for row in 0..table.len() {
@@ -432,7 +432,7 @@ pub const LIMITS: [&str; 5] =
     ["as ruled", "periodic from 5e4 on", "periodic from 1.5e5 on", "chaos until 1e5 is enough", "undecided is chaos"];
 
 /// Number of a panel's runs that support the claim, for each limit in [`LIMITS`].
-pub fn influence(said: Said, runs: &[Run], rules: &Rules) -> [u64; 5] {
+pub fn influence(said: Said, runs: &[CensusRun], rules: &Rules) -> [u64; 5] {
     let from = |shown_from: f64| supporting(said, runs, &Rules { shown_from, ..*rules });
     let undecided = if said == Said::Chaos { tally(runs, rules.end)[5] } else { 0 };
     [
@@ -457,7 +457,7 @@ impl Found {
             groups.push(runs);
         }
         let chosen = [("params.alpha", alpha)];
-        let in_parts = |parts: &[Table], column: &str| -> Vec<(Entry, Vec<Run>)> {
+        let in_parts = |parts: &[Table], column: &str| -> Vec<(Entry, Vec<CensusRun>)> {
             let groups = parts.iter().flat_map(|part| grouped(part, column, &chosen));
             let mut groups: Vec<_> = groups.filter(|(_, runs)| !runs.is_empty()).collect();
             if column == "tolerance" {
@@ -469,9 +469,9 @@ impl Found {
         by_method.insert(0, ("lsoda".into(), groups[2].clone()));
         let by_tolerance = in_parts(&data.tolerances, "tolerance");
         let below: Vec<_> = by_tolerance.iter().filter(|(tolerance, _)| tolerance.value() < 1e-6).cloned().collect();
-        let shorter: Vec<(&Shorter, Vec<Run>)> =
+        let shorter: Vec<(&Shorter, Vec<CensusRun>)> =
             data.shorter.iter().map(|s| (s, runs(&s.table, &chosen))).filter(|(_, runs)| !runs.is_empty()).collect();
-        let only = |g: &[(Entry, Vec<Run>)]| g.iter().map(|(_, runs)| runs.clone()).collect::<Vec<_>>();
+        let only = |g: &[(Entry, Vec<CensusRun>)]| g.iter().map(|(_, runs)| runs.clone()).collect::<Vec<_>>();
         let between = [
             groups[..3].to_vec(),
             groups[3..].to_vec(),
@@ -694,8 +694,8 @@ mod tests {
     use super::super::claims::claims;
     use super::*;
 
-    fn run(outcome: &str, period: i64, captured_at: f64) -> Run {
-        Run { outcome: outcome.into(), period, captured_at }
+    fn run(outcome: &str, period: i64, captured_at: f64) -> CensusRun {
+        CensusRun { outcome: outcome.into(), period, captured_at }
     }
 
     #[test]

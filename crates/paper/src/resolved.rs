@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use super::Reading;
 use super::capture::time;
-use super::census::{self, CensusPanel, MotionKind, PANELS, Run, p_in_words, percent, supporting, tally};
+use super::census::{self, CensusPanel, CensusRun, MotionKind, PANELS, p_in_words, percent, supporting, tally};
 use super::claims::Rules;
 use super::effects::{self, LogRank};
 use twofold_analyse::counts::{homogeneity, wilson};
@@ -25,9 +25,9 @@ pub struct Compared {
     /// The panel.
     pub panel: CensusPanel,
     /// Runs of the method that the other is compared with.
-    pub reference: Vec<Run>,
+    pub reference: Vec<CensusRun>,
     /// Runs of the other.
-    pub runs: Vec<Run>,
+    pub runs: Vec<CensusRun>,
 }
 
 /// Every panel in both readings: `reference` and `runs` are sweeps of fig. 7, and of fig. 8 if there are two.
@@ -85,7 +85,7 @@ impl Belongs {
 }
 
 /// Runs that show the panel's outcome, and all.
-fn shown(panel: &CensusPanel, runs: &[Run], rules: &Rules) -> [u64; 2] {
+fn shown(panel: &CensusPanel, runs: &[CensusRun], rules: &Rules) -> [u64; 2] {
     [supporting(panel.said, runs, rules), runs.len() as u64]
 }
 
@@ -136,7 +136,7 @@ pub fn kinds_text(all: &[Compared], named: [&str; 2], rules: &Rules) -> String {
         .map(|c| census::same_odds(&[c.reference.clone(), c.runs.clone()], rules).p_permutation)
         .map(|p| if p.is_nan() { 1.0 } else { p })
         .collect();
-    let times = |runs: &[Run]| runs.iter().map(|r| time(r, rules.end)).collect::<Vec<_>>();
+    let times = |runs: &[CensusRun]| runs.iter().map(|r| time(r, rules.end)).collect::<Vec<_>>();
     let ranks: Vec<LogRank> = all.iter().map(|c| LogRank::of(&times(&c.runs), &times(&c.reference))).collect();
     let [odds, hazards] = [odds, ranks.iter().map(LogRank::p).collect()].map(|p| effects::holm(&p));
     let mut text = format!(
@@ -144,7 +144,7 @@ pub fn kinds_text(all: &[Compared], named: [&str; 2], rules: &Rules) -> String {
         named[0], named[1], named[0]
     );
     for (i, c) in all.iter().enumerate() {
-        let ends = |runs: &[Run]| {
+        let ends = |runs: &[CensusRun]| {
             let counts = tally(runs, rules.end);
             let said = MotionKind::ALL.iter().zip(counts).filter(|(_, n)| *n > 0);
             said.map(|(kind, n)| format!("{n} {}", kind.words())).collect::<Vec<_>>().join(", ")
@@ -168,8 +168,8 @@ pub fn kinds_text(all: &[Compared], named: [&str; 2], rules: &Rules) -> String {
 }
 
 /// Whether runs at 1e-13 are captured as those at 1e-15 are: by reading, the runs at 1e-13 and at 1e-15.
-pub fn tolerance_text(readings: &[(Reading, Vec<Run>, Vec<Run>)], rules: &Rules) -> String {
-    let times = |runs: &[Run]| runs.iter().map(|r| time(r, rules.end)).collect::<Vec<_>>();
+pub fn tolerance_text(readings: &[(Reading, Vec<CensusRun>, Vec<CensusRun>)], rules: &Rules) -> String {
+    let times = |runs: &[CensusRun]| runs.iter().map(|r| time(r, rules.end)).collect::<Vec<_>>();
     let ranks: Vec<LogRank> =
         readings.iter().map(|(_, loose, tight)| LogRank::of(&times(loose), &times(tight))).collect();
     let adjusted = effects::holm(&ranks.iter().map(LogRank::p).collect::<Vec<_>>());

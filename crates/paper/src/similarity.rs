@@ -46,7 +46,7 @@ chatter_smoothed,chatter_literal,chatter_single,exits_smoothed,exits_literal,exi
 
 /// One run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Run {
+pub struct RuleRun {
     /// "printed" or "reconstructed".
     pub reading: String,
     /// A rule's name.
@@ -58,7 +58,7 @@ pub struct Run {
 }
 
 /// Reads the table that `make delay-data` writes; `None` if it is not such a table.
-pub fn runs(csv: &str) -> Option<Vec<Run>> {
+pub fn runs(csv: &str) -> Option<Vec<RuleRun>> {
     let mut lines = csv.lines();
     if lines.next() != Some(HEADER) {
         return None;
@@ -71,7 +71,7 @@ pub fn runs(csv: &str) -> Option<Vec<Run>> {
                 distances[k / 3][k % 3] = cell.parse().ok()?;
             }
             let word = |i: usize| cells[i].to_owned();
-            Some(Run { reading: word(0), rule: word(1), outcome: word(3), distances })
+            Some(RuleRun { reading: word(0), rule: word(1), outcome: word(3), distances })
         })
         .collect()
 }
@@ -116,7 +116,7 @@ pub struct Score {
 }
 
 /// Scores the `delayed` runs against those of `hysteresis` in a way, an index of [`WAYS`].
-pub fn score(runs: &[Run], reading: Reading, way: usize, delayed: Rule, hysteresis: Rule) -> Score {
+pub fn score(runs: &[RuleRun], reading: Reading, way: usize, delayed: Rule, hysteresis: Rule) -> Score {
     let (rules, confidence) = (claims().similarity, claims().rules.confidence);
     let to = RULES.iter().position(|r| *r == hysteresis).unwrap_or_default();
     let of = |rule: Rule| runs.iter().filter(move |r| r.reading == reading.word() && r.rule == rule.name());
@@ -162,7 +162,7 @@ mod tests {
 
     /// A hundred runs of hysteresis at distances 0.01 .. 1 from each other, and as many delayed ones of which `near` are at 0.5 from
     /// it and 0.6 from smoothing, and the others the other way round.
-    fn table(near: usize) -> Vec<Run> {
+    fn table(near: usize) -> Vec<RuleRun> {
         let hysteresis = (0..100).map(|k| run(Rule::Literal, k, [1.0, (k + 1) as f64 / 100.0, 1.0]));
         let delayed = (0..100).map(|k| run(Rule::Delayed, k, if k < near { [0.6, 0.5, 1.0] } else { [0.5, 0.6, 1.0] }));
         let lines: Vec<String> = hysteresis.chain(delayed).collect();
