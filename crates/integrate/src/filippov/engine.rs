@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::SVector;
 
 use super::automatic::Automatic;
-use super::exit::{Chooser, Plan};
+use super::exit::{Chooser, ExitPlan};
 use super::flow::{FreeFlow, InPhysicalTime, Sided, SlidingFlow, Straight, Truncated, desingularised, project};
 use super::two_fold::{AlongCurve, FusedFolds, SlidingAtTwoFold};
 use super::{
@@ -211,7 +211,7 @@ impl FlightStart {
 struct Sliding {
     repelling: bool,
     /// The exit rule's plan, in repelling sliding.
-    plan: Option<Plan>,
+    plan: Option<ExitPlan>,
     /// Time and arc of this stretch of repelling sliding so far.
     time: f64,
     arc: f64,
@@ -1271,7 +1271,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 plan => plan,
             },
         };
-        if let Some(Plan { side, at_once, .. }) = plan
+        if let Some(ExitPlan { side, at_once, .. }) = plan
             && visible(&side)
             && (at_once || folds.velocity.is_none())
         {

@@ -170,7 +170,7 @@ impl ExitRule {
 
 /// What a rule says about one stretch of repelling sliding.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Plan {
+pub(super) struct ExitPlan {
     pub side: Side,
     pub time: f64,
     pub arc: f64,
@@ -194,17 +194,17 @@ impl Chooser {
     }
 
     /// The plan for the stretch that starts now; `None` for `Undecided` and `All`.
-    pub fn plan(&mut self) -> Option<Plan> {
+    pub fn plan(&mut self) -> Option<ExitPlan> {
         let never = f64::INFINITY;
         match self.rule {
-            ExitRule::AtOnce { side } => Some(Plan { side, time: 0.0, arc: never, at_once: true }),
-            ExitRule::AfterTime { time, side } => Some(Plan { side, time, arc: never, at_once: false }),
-            ExitRule::AfterArc { arc, side } => Some(Plan { side, time: never, arc, at_once: false }),
+            ExitRule::AtOnce { side } => Some(ExitPlan { side, time: 0.0, arc: never, at_once: true }),
+            ExitRule::AfterTime { time, side } => Some(ExitPlan { side, time, arc: never, at_once: false }),
+            ExitRule::AfterArc { arc, side } => Some(ExitPlan { side, time: never, arc, at_once: false }),
             ExitRule::Random { law, plus_probability, .. } => {
                 let stream = self.stream.as_mut()?;
                 let time = law.time(stream.uniform());
                 let side = if stream.uniform() < plus_probability { Side::Plus } else { Side::Minus };
-                Some(Plan { side, time, arc: never, at_once: false })
+                Some(ExitPlan { side, time, arc: never, at_once: false })
             }
             ExitRule::Undecided | ExitRule::All => None,
         }
