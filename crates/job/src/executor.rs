@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::answer::{Answer, Stop};
-use super::plan::Plan;
+use super::plan::QuestionPlan;
 use super::question::{AnyQuestion, JobError, Question, key};
 use super::store::{Kept, Store};
 use crate::record::Hash;
@@ -130,7 +130,7 @@ impl<'a> Executor<'a> {
     /// of these the longest. With a store, answers are kept there and not in memory. Errors are
     /// kept in the executor until they are asked for.
     pub fn gather(&self, questions: &[AnyQuestion]) {
-        Plan::of(questions).carry_out(|question| match &self.store {
+        QuestionPlan::of(questions).carry_out(|question| match &self.store {
             Some(store) if store.has(&key(&**question)) => {}
             _ => drop(self.ask(&**question)),
         });

@@ -12,7 +12,7 @@ use super::question::{AnyQuestion, question_hash};
 use crate::record::Hash;
 
 /// Questions, each once, and those that they are known to rest on.
-pub(super) struct Plan {
+pub(super) struct QuestionPlan {
     /// Those that a question rests on stand before it.
     tasks: Vec<Task>,
     /// Tasks by how much is behind them, the most first.
@@ -30,7 +30,7 @@ struct Task {
     rank: usize,
 }
 
-impl Plan {
+impl QuestionPlan {
     /// The plan for `questions` and all their dependencies.
     pub fn of(questions: &[AnyQuestion]) -> Self {
         let mut plan = Self { tasks: Vec::new(), by_rank: Vec::new(), ready: Mutex::default() };
@@ -132,7 +132,7 @@ mod tests {
 
     fn order(threads: usize, numbers: &[u64]) -> Vec<u64> {
         let questions: Vec<AnyQuestion> = numbers.iter().map(|n| Arc::new(Number(*n)) as _).collect();
-        let plan = Plan::of(&questions);
+        let plan = QuestionPlan::of(&questions);
         let done = Mutex::new(Vec::new());
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| plan.carry_out(|q| done.lock().unwrap().push(q.json().as_u64().unwrap())));
