@@ -22,7 +22,7 @@ pub fn width_px(width: ColumnWidth) -> u32 {
     (millimetres * DPI * 10 + 127) / 254
 }
 
-struct Plan {
+struct SheetLayout {
     canvas_height: i32,
     heading: Vec<(String, f64, bool, i32)>,
     banner: Option<(Vec<String>, Rect)>,
@@ -76,7 +76,7 @@ pub fn draw(sheet: &Sheet) -> Result<Scene, RenderError> {
     Ok(scene)
 }
 
-fn plan(sheet: &Sheet, width: i32) -> Plan {
+fn plan(sheet: &Sheet, width: i32) -> SheetLayout {
     let margin = units(style::MARGIN_PT);
     let inner = width - 2 * margin;
     let mut y = margin;
@@ -119,7 +119,7 @@ fn plan(sheet: &Sheet, width: i32) -> Plan {
             y += units(style::FOOTER_PT * style::LEADING);
         }
     }
-    Plan { canvas_height: y + margin, heading, banner, panels, legend, footer }
+    SheetLayout { canvas_height: y + margin, heading, banner, panels, legend, footer }
 }
 
 /// A line of a panel's heading.
