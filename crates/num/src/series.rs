@@ -20,7 +20,7 @@ use super::Elementary;
 use super::decimal::{Decimal, FromDecimal};
 use super::tape::{Node, Operation, Tape};
 use compiled::Opening;
-use plan::{Equation, Plan, advance, start};
+use plan::{Equation, SeriesPlan, advance, start};
 use table::{Columns, LONGEST, ROW, advance_rows, start_rows};
 
 /// A series: the state's components come first, then one for each recurrence.
@@ -144,7 +144,7 @@ pub struct Solution<S> {
     /// The first coefficients compiled, if that is so.
     opening: Option<Opening>,
     /// The plans that were needed so far.
-    plans: Vec<Plan<S>>,
+    plans: Vec<SeriesPlan<S>>,
 }
 
 impl<S: Elementary + FromDecimal> Solution<S> {
@@ -322,7 +322,7 @@ impl<S: Elementary + FromDecimal> Solution<S> {
     /// The index of the plan for these saturated tanh.
     fn plan(&mut self, saturated: u64) -> usize {
         self.plans.iter().position(|plan| plan.saturated == saturated).unwrap_or_else(|| {
-            let plan = Plan::new(&self.equation(), saturated);
+            let plan = SeriesPlan::new(&self.equation(), saturated);
             self.plans.push(plan);
             self.plans.len() - 1
         })

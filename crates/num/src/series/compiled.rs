@@ -35,7 +35,7 @@ pub(super) struct Opening {
     numbers: Numbers,
 }
 
-/// The further coefficients, compiled: a [`Plan`](super::plan::Plan).
+/// The further coefficients, compiled: a [`SeriesPlan`](super::plan::SeriesPlan).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Compiled {
     shape: Shape,

@@ -2,7 +2,7 @@
 //!
 //! A recurrence gives all coefficients of a series. From degree 1 on parts of it are trivial:
 //! constant summands vanish, sums and products of constants are zero, a product with a constant is
-//! a scaling. A [`Plan`] omits these, and passes numbers from one instruction to the next without
+//! a scaling. A [`SeriesPlan`] omits these, and passes numbers from one instruction to the next without
 //! storing them. The series of a saturated `tanh` is constant too; there is a plan for each set of
 //! saturated `tanh` that occurs.
 //!
@@ -204,7 +204,7 @@ pub(super) fn start_of<S: Elementary>(recurrence: &Recurrence<S>, at: impl Fn(Se
 
 /// Carries the instructions out at one degree.
 #[inline(always)]
-pub(super) fn advance<S: Elementary, T: Table<S>>(plan: &Plan<S>, table: &mut T) {
+pub(super) fn advance<S: Elementary, T: Table<S>>(plan: &SeriesPlan<S>, table: &mut T) {
     let mut this = S::zero();
     for &instruction in &plan.instructions {
         this = carry_out(instruction, this, table);
@@ -325,7 +325,7 @@ enum Tail {
     Zero,
 }
 
-/// An equation as recurrences, for [`Plan::new`].
+/// An equation as recurrences, for [`SeriesPlan::new`].
 pub(super) struct Equation<'a, S> {
     pub dimension: usize,
     pub recurrences: &'a [Recurrence<S>],
@@ -338,7 +338,7 @@ pub(super) struct Equation<'a, S> {
 
 /// See the [module](self).
 #[derive(Clone, Debug)]
-pub(super) struct Plan<S> {
+pub(super) struct SeriesPlan<S> {
     /// Which `tanh` are saturated, one bit each, in the order of their recurrences.
     pub saturated: u64,
     instructions: Vec<Instruction<S>>,
@@ -348,7 +348,7 @@ pub(super) struct Plan<S> {
     pub compiled: Option<Compiled>,
 }
 
-impl<S: Elementary> Plan<S> {
+impl<S: Elementary> SeriesPlan<S> {
     /// The plan for an equation with these `tanh` saturated.
     pub fn new(equation: &Equation<S>, saturated: u64) -> Self {
         let tails = Tails::new(equation, saturated);

@@ -1,7 +1,7 @@
 //! Storage for the coefficients of all series while they are computed.
 
 use super::Series;
-use super::plan::{Plan, advance};
+use super::plan::{SeriesPlan, advance};
 use crate::Elementary;
 
 /// The coefficients below degree k of all series, and those of degree k of the series that have been computed.
@@ -113,7 +113,7 @@ pub(super) fn start_rows(rows: &mut [[f64; ROW]], start: impl FnOnce(&mut Rows<1
 }
 
 /// Carries a plan out at degree `k`, on more rows than k + 1.
-pub(super) fn advance_rows(plan: &Plan<f64>, rows: &mut [[f64; ROW]], k: usize) {
+pub(super) fn advance_rows(plan: &SeriesPlan<f64>, rows: &mut [[f64; ROW]], k: usize) {
     macro_rules! by_length {
         ($($rows:literal)*) => {
             match k + 1 {
@@ -126,7 +126,7 @@ pub(super) fn advance_rows(plan: &Plan<f64>, rows: &mut [[f64; ROW]], k: usize) 
 }
 
 #[inline(never)]
-fn advance_in<const T: usize>(plan: &Plan<f64>, rows: &mut [[f64; ROW]]) {
+fn advance_in<const T: usize>(plan: &SeriesPlan<f64>, rows: &mut [[f64; ROW]]) {
     if let Some((known, [next, ..])) = rows.split_first_chunk_mut::<T>() {
         let mut rows = Rows { known, next };
         match &plan.compiled {
