@@ -6,7 +6,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::inner::inner_law;
-use super::orbit::{Caricature, Crossing, Settings};
+use super::orbit::{Caricature, Crossing, FlowSettings};
 use super::rational::{Range, Rational};
 use super::recompute::{Known, PLANE, Patch, krawczyk};
 use super::strict::without_repeats;
@@ -177,7 +177,7 @@ struct ImageOfPart {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Passage {
+struct PassageClaim {
     crossing: usize,
     x: Bounds,
     z: Bounds,
@@ -190,7 +190,7 @@ struct Covering {
     to: Vec<usize>,
     ends: [ImageOfPart; 2],
     pieces: Vec<ImageOfPart>,
-    passage: Passage,
+    passage: PassageClaim,
 }
 
 #[derive(Deserialize)]
@@ -583,7 +583,7 @@ fn orbit(
             claimed.push((n, b, axis, what));
         }
     }
-    let ours = known.crossings(equation, &Patch::point(x, z), rows.len(), Settings::NARROW)?;
+    let ours = known.crossings(equation, &Patch::point(x, z), rows.len(), FlowSettings::NARROW)?;
     for (n, (row, ours)) in rows.iter().zip(ours.iter()).enumerate() {
         need(row.upward == ours.upward, at(n, "the direction"))?;
     }
@@ -735,7 +735,7 @@ fn covering(known: &Known, equation: &Caricature, sets: &[Parallelogram], c: &Co
     let from = &sets[c.from];
     let to: Vec<&Parallelogram> = c.to.iter().map(|k| &sets[*k]).collect();
     let image = |low: f64, high: f64| -> Check<Rc<Vec<Crossing>>> {
-        let rows = known.crossings(equation, &from.part(low, high)?, RETURN, Settings::NARROW)?;
+        let rows = known.crossings(equation, &from.part(low, high)?, RETURN, FlowSettings::NARROW)?;
         let alternate = rows.iter().enumerate().all(|(n, r)| r.upward == (n % 2 == 0));
         need(alternate, "directions alternate, the first is upward")?;
         Ok(rows)

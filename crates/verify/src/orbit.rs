@@ -127,13 +127,13 @@ impl Field for Inner {
 
 /// Degree of the series and the largest remainders of a step: of the states, and of their derivative.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Settings {
+pub(super) struct FlowSettings {
     pub order: usize,
     pub remainder: f64,
     pub derivative: f64,
 }
 
-impl Settings {
+impl FlowSettings {
     pub const NARROW: Self = Self { order: 40, remainder: 1e-35, derivative: 1e-20 };
     pub const WIDE: Self = Self { order: 24, remainder: 1e-20, derivative: 1e-20 };
 }
@@ -328,7 +328,7 @@ fn inverse(frame: &[[f64; 3]; 3]) -> Option<Matrix> {
 /// The flow of a field, with steps that fit.
 pub(super) struct Flow<'a, F> {
     field: &'a F,
-    settings: Settings,
+    settings: FlowSettings,
     axis: usize,
     h: f64,
     pub steps: usize,
@@ -355,7 +355,7 @@ fn over_step(coefficients: impl Iterator<Item = Ball>) -> Ball {
 }
 
 impl<'a, F: Field> Flow<'a, F> {
-    pub fn new(field: &'a F, settings: Settings, axis: usize) -> Self {
+    pub fn new(field: &'a F, settings: FlowSettings, axis: usize) -> Self {
         Self { field, settings, axis, h: 1e-3, steps: 0 }
     }
 

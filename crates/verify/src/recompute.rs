@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use super::ball::{Ball, Fixed, Number};
 use super::certificate::{Check, need};
-use super::orbit::{Caricature, Crossing, Flow, Inner, Set, Settings};
+use super::orbit::{Caricature, Crossing, Flow, FlowSettings, Inner, Set};
 use super::rational::{Range, Rational};
 
 /// The coordinates on the section y = 0.
@@ -67,11 +67,11 @@ pub(super) struct Known {
     /// No orbits are computed.
     reads_only: bool,
     orbits: RefCell<HashMap<String, Rc<Vec<Crossing>>>>,
-    passages: RefCell<HashMap<String, Passage>>,
+    passages: RefCell<HashMap<String, InnerPassage>>,
 }
 
 /// (p, q)/q(s0) at s = 0, and the derivative from there to -x0.
-pub(super) type Passage = ([Range; 2], [[Range; 2]; 2]);
+pub(super) type InnerPassage = ([Range; 2], [[Range; 2]; 2]);
 
 impl Known {
     /// Nothing, and nothing that takes long will be computed.
@@ -90,7 +90,7 @@ impl Known {
         field: &Caricature,
         patch: &Patch,
         count: usize,
-        settings: Settings,
+        settings: FlowSettings,
     ) -> Check<Rc<Vec<Crossing>>> {
         let key = format!("{field:?} {patch:?} {settings:?} {count}");
         if let Some(found) = self.orbits.borrow().get(&key) {
@@ -115,7 +115,7 @@ impl Known {
 
     /// The state after `count` crossings from a point.
     fn image(&self, field: &Caricature, at: &[Rational; 2], count: usize) -> Check<[Range; 2]> {
-        let rows = self.crossings(field, &Patch::point(&at[0], &at[1]), count, Settings::NARROW)?;
+        let rows = self.crossings(field, &Patch::point(&at[0], &at[1]), count, FlowSettings::NARROW)?;
         let last = rows.last().ok_or("an orbit crosses")?;
         Ok(PLANE.map(|i| last.states[i].clone()))
     }
@@ -157,7 +157,7 @@ impl Known {
         ratio: &Range,
         [s0, x0]: [&Rational; 2],
         largest: &Rational,
-    ) -> Check<Passage> {
+    ) -> Check<InnerPassage> {
         let key = format!("{ratio:?} {s0:?} {x0:?} {largest:?}");
         if let Some(found) = self.passages.borrow().get(&key) {
             return Ok(found.clone());
@@ -181,12 +181,12 @@ impl Known {
             off.approximately() * (1.0 + 1e-14)
         });
         let value = self.image(field, centre, count)?;
-        let derivative = |at: &[Rational; 2], radii: [f64; 2], settings: Settings| -> Check<_> {
+        let derivative = |at: &[Rational; 2], radii: [f64; 2], settings: FlowSettings| -> Check<_> {
             let rows = self.crossings(field, &Patch::boxed(at.clone(), radii), count, settings)?;
             let d = rows.last().ok_or("an orbit crosses")?.set.derivative();
             Ok((in_plane(&d)?, rows))
         };
-        let (wide, _) = derivative(centre, radii, Settings::WIDE)?;
+        let (wide, _) = derivative(centre, radii, FlowSettings::WIDE)?;
         let first = krawczyk(centre, &value, &wide, &approximate_inverse(&wide)?, candidate)?;
         for i in 0..2 {
             need(first[i].inside(&candidate[i]), "an independent Krawczyk operator maps the candidate into itself")?;
@@ -199,7 +199,7 @@ impl Known {
             let exact = at.each_ref().map(Range::point);
             at = krawczyk(&at, &image, &wide, &y, &exact)?.each_ref().map(middle);
         }
-        let (slope, rows) = derivative(&at, [CLOSE; 2], Settings::NARROW)?;
+        let (slope, rows) = derivative(&at, [CLOSE; 2], FlowSettings::NARROW)?;
         let near = at
             .each_ref()
             .map(|x| Range::point(x).widened(&Rational::exactly(0.99 * CLOSE).unwrap_or(Rational::whole(0))));
@@ -271,7 +271,13 @@ fn approximate_inverse(d: &[[Range; 2]; 2]) -> Check<[[Range; 2]; 2]> {
 
 /// The passage in the inner problem: (p, q)/q(s0) at s = 0 for p/q at s0 in `ratio` and |q(s0)| <= largest, and the derivative of (p, q) at s = -x0 by that at s = 0
 /// for all states between the canard and those.
-fn inner_passage(field: &Inner, ratio: &Range, s0: &Rational, x0: &Rational, largest: &Rational) -> Check<Passage> {
+fn inner_passage(
+    field: &Inner,
+    ratio: &Range,
+    s0: &Rational,
+    x0: &Rational,
+    largest: &Rational,
+) -> Check<InnerPassage> {
     /// s.
     const AXIS: usize = 2;
     /// Parts into which the amplitudes are cut: the derivative depends on them in its fifth digit.
@@ -280,7 +286,7 @@ fn inner_passage(field: &Inner, ratio: &Range, s0: &Rational, x0: &Rational, lar
         let field = Inner { offset: to.clone(), ..field.clone() };
         let start = [&states[0], &states[1], &Range::point(&(from - to))].map(Fixed::of);
         let set = Set::boxed(start, [0.0; 3]);
-        let crossing = Flow::new(&field, Settings::NARROW, AXIS).next_crossing(&set, 1e3);
+        let crossing = Flow::new(&field, FlowSettings::NARROW, AXIS).next_crossing(&set, 1e3);
         let d = crossing.ok_or("an independent integration encloses the passage")?.set.derivative();
         let at = |i: usize, j: usize| d[i][j].range().ok_or("a derivative is bounded");
         Ok([[at(0, 0)?, at(0, 1)?], [at(1, 0)?, at(1, 1)?]])
