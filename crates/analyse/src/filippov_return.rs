@@ -61,7 +61,7 @@ pub enum Error {
 type Itinerary = Vec<(std::mem::Discriminant<EventKind>, Option<Mode>, Option<Mode>)>;
 
 /// Watches for crossings and set-valued moments.
-struct Watch<const N: usize> {
+struct ReturnObserver<const N: usize> {
     plane: ReturnPlane,
     returns: usize,
     passages: CrossingFinder,
@@ -73,7 +73,7 @@ struct Watch<const N: usize> {
     extent: Option<Extent<N>>,
 }
 
-impl<const N: usize> FilippovObserver<N> for Watch<N> {
+impl<const N: usize> FilippovObserver<N> for ReturnObserver<N> {
     fn step(&mut self, mode: Mode, step: &Step<'_, N>) -> Flow {
         let extent = self.extent.get_or_insert_with(|| Extent::new(&step.x0));
         extent.add(|i| step.x1[i]);
@@ -220,7 +220,7 @@ where
     let rule = ExitRule::AtOnce { side: Side::Plus };
     let engine =
         filippov::FilippovOptions { tolerance: settings.tolerance, max_step: settings.max_step, ..Default::default() };
-    let watch = || Watch {
+    let watch = || ReturnObserver {
         plane,
         returns,
         passages: CrossingFinder::default(),
