@@ -25,7 +25,7 @@ impl<const N: usize> Observer<N> for Seen<N> {
 }
 
 struct Recording<const N: usize> {
-    course: DriveOptions,
+    options: DriveOptions,
     coordinate: usize,
     x0: SVector<f64, N>,
 }
@@ -39,7 +39,7 @@ impl<const N: usize> WithStepper<N> for Recording<N> {
             crossings: Vec::new(),
             ends: Vec::new(),
         };
-        let end = drive(&Own, self.x0, &self.course, &mut stepper, &mut seen, &()).unwrap();
+        let end = drive(&Own, self.x0, &self.options, &mut stepper, &mut seen, &()).unwrap();
         assert_eq!(end.statistics.steps, seen.ends.len() as u64);
         (seen, end)
     }
@@ -62,7 +62,7 @@ struct How {
     band: Option<(f64, Inside)>,
     method: Method,
     tolerance: f64,
-    course: DriveOptions,
+    options: DriveOptions,
     coordinate: usize,
 }
 
@@ -75,7 +75,7 @@ impl How {
             band: None,
             method: Method::Dopri5,
             tolerance: 1e-10,
-            course: DriveOptions::to(t_end),
+            options: DriveOptions::to(t_end),
             coordinate: 0,
         }
     }
@@ -90,7 +90,7 @@ impl How {
             None => LateSwitch::Delayed { delay: self.delay, smooth: self.smooth, history: self.history },
         };
         let delayed = Delayed { sides, switch, x0 };
-        let run = Recording { course: self.course, coordinate: self.coordinate, x0 };
+        let run = Recording { options: self.options, coordinate: self.coordinate, x0 };
         delayed.with_stepper(self.method, None, tolerance(self.tolerance), run)
     }
 }
@@ -208,9 +208,9 @@ fn a_relay_begins_as_it_is_told_inside_its_band() {
 #[test]
 fn a_kick_beyond_the_band_switches_a_relay() {
     let kick = |size: f64, seed| Kick { every: 1.0, size, law: KickLaw::Sphere, seed, stream: 0 };
-    let course = |schedule| DriveOptions { schedule, kicked_states: 1, ..DriveOptions::to(1.5) };
+    let options = |schedule| DriveOptions { schedule, kicked_states: 1, ..DriveOptions::to(1.5) };
     let run = |schedule| {
-        How { course: course(schedule), ..How::relay(0.5, 1.5) }.run(&relay(1.0, 1.0), [1.2]).unwrap().1.x[0]
+        How { options: options(schedule), ..How::relay(0.5, 1.5) }.run(&relay(1.0, 1.0), [1.2]).unwrap().1.x[0]
     };
     let kicked = |size| (0..10).map(move |seed| run(Schedule { restart_every: None, kick: Some(kick(size, seed)) }));
     assert!((run(Schedule { restart_every: Some(0.4), kick: None }) + 0.3).abs() < 1e-14);
@@ -349,9 +349,9 @@ fn a_start_on_the_surface_counts_as_not_above() {
 #[test]
 fn a_kick_moves_the_switch_one_delay_later_and_a_restart_does_nothing() {
     let kick = |size: f64| Kick { every: 1.0, size, law: KickLaw::Sphere, seed: 3, stream: 0 };
-    let course = |schedule| DriveOptions { schedule, kicked_states: 1, ..DriveOptions::to(1.75) };
+    let options = |schedule| DriveOptions { schedule, kicked_states: 1, ..DriveOptions::to(1.75) };
     let run =
-        |schedule| How { course: course(schedule), ..How::sharp(0.5, 1.75) }.run(&relay(1.0, 1.0), [2.0]).unwrap();
+        |schedule| How { options: options(schedule), ..How::sharp(0.5, 1.75) }.run(&relay(1.0, 1.0), [2.0]).unwrap();
     let (_, plain) = run(Schedule::default());
     assert!((plain.x[0] - 0.25).abs() < 1e-14);
     let (_, restarted) = run(Schedule { restart_every: Some(0.6), kick: None });
@@ -455,7 +455,7 @@ const SMOOTH: How = How {
     band: None,
     method: Method::Dopri5,
     tolerance: 1e-10,
-    course: DriveOptions {
+    options: DriveOptions {
         t_end: 12.0,
         schedule: Schedule { restart_every: None, kick: None },
         step_cap: StepCap::None,
@@ -487,8 +487,8 @@ fn the_smooth_rule_keeps_the_methods_order() {
     let oscillating = system("states = ['x', 'v']\nh = 'x'\nplus = ['v', '-1 - x']\nminus = ['v', '1 - x']");
     let end = |method: Method, steps: u32, tolerance: f64| {
         let cap = 0.7 / f64::from(steps);
-        let course = DriveOptions { step_cap: StepCap::Absolute(cap), kicked_states: 2, ..DriveOptions::to(7.0) };
-        let how = How { delay: 0.7, smooth: Some((Transition::Tanh, 1.0)), method, tolerance, course, ..SMOOTH };
+        let options = DriveOptions { step_cap: StepCap::Absolute(cap), kicked_states: 2, ..DriveOptions::to(7.0) };
+        let how = How { delay: 0.7, smooth: Some((Transition::Tanh, 1.0)), method, tolerance, options, ..SMOOTH };
         how.run(&oscillating, [0.9, 0.2]).unwrap().1.x
     };
     let exact = end(Method::Dopri5, 64, 1e-13);
@@ -612,7 +612,7 @@ fn disturbances_are_those_of_neighbouring_orbits() {
     for switch in switches() {
         let end = |x0: SVector<f64, 3>| {
             let delayed = Delayed { sides: Sides::new(&system, &data), switch, x0 };
-            let run = Recording { course: DriveOptions::to(until), coordinate: 0, x0 };
+            let run = Recording { options: DriveOptions::to(until), coordinate: 0, x0 };
             let (seen, end) = delayed.with_stepper(Method::Dopri5, None, tolerance(1e-13), run).unwrap();
             let in_layer = matches!(switch, LateSwitch::Delayed { smooth: Some((Transition::Algebraic, _)), .. });
             assert!(in_layer || seen.crossings.len() > 3, "{switch:?}: {}", seen.crossings.len());

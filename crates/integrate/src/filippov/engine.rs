@@ -366,9 +366,9 @@ impl<const N: usize> Accumulation<N> {
 const ZENO_FLIGHTS: usize = 8;
 
 /// A motion that does not move.
-struct Standing<const N: usize>(SVector<f64, N>);
+struct ConstantState<const N: usize>(SVector<f64, N>);
 
-impl<const N: usize> Interpolant<N> for Standing<N> {
+impl<const N: usize> Interpolant<N> for ConstantState<N> {
     fn at(&self, _: f64) -> SVector<f64, N> {
         self.0
     }
@@ -1235,7 +1235,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
 
     /// Rest on the surface until the end.
     fn rest(&mut self) -> State<N> {
-        self.take(Mode::SlidingAttracting, self.t_end, self.x, &Standing(self.x));
+        self.take(Mode::SlidingAttracting, self.t_end, self.x, &ConstantState(self.x));
         State::Rest
     }
 
