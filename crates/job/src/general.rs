@@ -395,7 +395,7 @@ pub struct Resting {
     /// The mode's name.
     pub mode: String,
     /// In a field or on surfaces.
-    pub place: Standing,
+    pub place: RestPlace,
     /// The set that it belongs to, if it is not isolated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub family: Option<Family>,
@@ -420,7 +420,7 @@ pub struct Family {
 /// Where a motion rests.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Standing {
+pub enum RestPlace {
     /// On a switching surface: its function, the share of f+, and whether sliding attracts.
     Surface {
         /// The switching function.
@@ -462,13 +462,13 @@ impl Question for GeneralRests {
                 state: rest.x.clone(),
                 mode: modes[rest.mode].name.clone(),
                 place: match &rest.on[..] {
-                    [] => Standing::Field,
-                    [on] => Standing::Surface {
+                    [] => RestPlace::Field,
+                    [on] => RestPlace::Surface {
                         surface: on.surface.clone(),
                         weight: on.weight,
                         attracting: rest.attracting == Some(true),
                     },
-                    several => Standing::Intersection {
+                    several => RestPlace::Intersection {
                         surfaces: several.iter().map(|on| on.surface.clone()).collect(),
                         weights: several.iter().map(|on| on.weight).collect(),
                         attracting: rest.attracting,

@@ -5,7 +5,7 @@ use serde_json::json;
 use crate::cli::general;
 use crate::cli::speak::{Delivery, deliver, try_delivery};
 use crate::cli::{CliError, Exit, ending};
-use crate::job::general::{Family, GeneralRests, Resting, Standing};
+use crate::job::general::{Family, GeneralRests, RestPlace, Resting};
 use crate::job::{Executor, JobError, Question, encode};
 
 /// Find the rests of a system in a box: equilibria of its fields and pseudo-equilibria on its switching surfaces, with eigenvalues and stability.
@@ -91,12 +91,12 @@ fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
     };
     let mode = if with_mode { format!(", mode {}", rest.mode) } else { String::new() };
     let place = match &rest.place {
-        Standing::Field => "equilibrium".to_owned(),
-        Standing::Surface { surface, weight, attracting } => {
+        RestPlace::Field => "equilibrium".to_owned(),
+        RestPlace::Surface { surface, weight, attracting } => {
             let moves = if *attracting { "attracts" } else { "repels" };
             format!("pseudo-equilibrium on {surface} = 0, which {moves} (weight {weight})")
         }
-        Standing::Intersection { surfaces, weights, attracting } => {
+        RestPlace::Intersection { surfaces, weights, attracting } => {
             let moves = match attracting {
                 Some(true) => "which attract",
                 Some(false) => "which repel",
