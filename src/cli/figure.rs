@@ -15,7 +15,7 @@ use crate::integrate::filippov::ExitRule;
 use crate::job::spec::{RunSpec, SwitchSpec};
 use crate::job::{Executor, Store};
 use crate::paper::pipeline::{Computed, PictureRecord, PipelineError, compute_with_tables, questions};
-use crate::paper::standing::{Standing, Stands};
+use crate::paper::reuse::{ReusablePicture, ReusablePictures};
 use crate::paper::{Alterations, Figure, FigurePanel, Picture, View, figures};
 use crate::record::files::{read, still_there, try_folder};
 use crate::record::{FileError, write};
@@ -186,20 +186,20 @@ struct Made {
 fn make_what_is_missing(figures: &[Figure], out: &Path, executor: &Executor<'_>) -> Result<Vec<Made>, CliError> {
     let pictures: Vec<(PathBuf, &Picture)> =
         figures.iter().flat_map(|f| f.pictures.iter().map(|p| (out.join(&*f.id), p))).collect();
-    let standing = executor.store().and_then(Standing::of);
-    let found = |(folder, picture): &(PathBuf, &Picture)| standing.as_ref().and_then(|s| s.find(picture, folder));
-    let standing_there: Vec<Option<Stands>> = pictures.par_iter().with_max_len(1).map(found).collect();
-    let missing = pictures.iter().zip(&standing_there).filter(|(_, stands)| stands.is_none());
+    let reusable = executor.store().and_then(ReusablePictures::of);
+    let found = |(folder, picture): &(PathBuf, &Picture)| reusable.as_ref().and_then(|s| s.find(picture, folder));
+    let found_there: Vec<Option<ReusablePicture>> = pictures.par_iter().with_max_len(1).map(found).collect();
+    let missing = pictures.iter().zip(&found_there).filter(|(_, found)| found.is_none());
     executor.gather(&questions(missing.map(|((_, picture), _)| *picture)));
     // One by one: in larger portions a thread would be left with several while others have none.
     let results: Vec<Result<(Made, Vec<Written>), CliError>> = pictures
         .par_iter()
-        .zip(standing_there)
+        .zip(found_there)
         .with_max_len(1)
-        .map(|((folder, picture), stands)| {
+        .map(|((folder, picture), found)| {
             let png = folder.join(format!("{}.png", picture.name));
-            if let Some(Stands { record, files }) = stands {
-                executor.progress().line(&format!("stands {}", png.display()));
+            if let Some(ReusablePicture { record, files }) = found {
+                executor.progress().line(&format!("unchanged: {}", png.display()));
                 return Ok((Made { record, anew: false }, files));
             }
             let mut written = Vec::new();
@@ -214,7 +214,7 @@ fn make_what_is_missing(figures: &[Figure], out: &Path, executor: &Executor<'_>)
             write_picture(folder, &computed, &mut written)?;
             executor.forget();
             executor.progress().line(&format!("wrote {}", png.display()));
-            if let Some(Err(error)) = standing.as_ref().map(|s| s.remember(picture, &computed.record)) {
+            if let Some(Err(error)) = reusable.as_ref().map(|s| s.remember(picture, &computed.record)) {
                 // The picture is there; only the next run will have to draw it again.
                 executor.progress().line(&format!("not kept for the next run: {error}"));
             }

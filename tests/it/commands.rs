@@ -158,7 +158,7 @@ fn numbers_go_into_files_that_are_named_for_them() {
 
 /// A second call draws nothing, a third what was changed since; with other questions, or without a store, everything is made.
 #[test]
-fn what_this_program_has_made_stands_until_it_is_touched() {
+fn what_this_program_has_made_is_reused_until_it_changes() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let figure = |more: &[&str]| {
@@ -173,13 +173,13 @@ fn what_this_program_has_made_stands_until_it_is_touched() {
     let (records, said) = figure(&kept);
     assert_eq!(said, "wrote made/fig1/fig1.png, wrote made/fig3/fig3.png");
     let how = fs::read(at.join("made/making.json")).unwrap();
-    assert_eq!(figure(&kept), (records.clone(), "stands made/fig1/fig1.png, stands made/fig3/fig3.png".into()));
+    assert_eq!(figure(&kept), (records.clone(), "unchanged: made/fig1/fig1.png, unchanged: made/fig3/fig3.png".into()));
     assert_eq!(fs::read(at.join("made/making.json")).unwrap(), how, "nothing was made");
 
     let svg = at.join("made/fig3/fig3.svg");
     let whole = fs::read(&svg).unwrap();
     fs::write(&svg, [&whole[..], b" "].concat()).unwrap();
-    assert_eq!(figure(&kept), (records.clone(), "stands made/fig1/fig1.png, wrote made/fig3/fig3.png".into()));
+    assert_eq!(figure(&kept), (records.clone(), "unchanged: made/fig1/fig1.png, wrote made/fig3/fig3.png".into()));
     assert_eq!(fs::read(&svg).unwrap(), whole);
     assert_eq!(figure(&["--fresh"]), (records, "wrote made/fig1/fig1.png, wrote made/fig3/fig3.png".into()));
 }

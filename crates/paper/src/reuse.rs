@@ -24,14 +24,14 @@ use twofold_job::{Answer, Executor, JobError, Question, Store};
 
 /// The pictures that can be reused.
 #[derive(Debug)]
-pub struct Standing<'a> {
+pub struct ReusablePictures<'a> {
     store: &'a Store,
     program: Hash,
 }
 
 /// A picture that can be reused.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stands {
+pub struct ReusablePicture {
     /// Its record.
     pub record: PictureRecord,
     /// Its files and their lengths.
@@ -57,7 +57,7 @@ impl Question for Drawn<'_> {
         let view = match view {
             // Which function draws: how far it lies from another one, since a program is loaded now here, now there.
             View::Study(study) => {
-                let here = Standing::of as *const () as usize;
+                let here = ReusablePictures::of as *const () as usize;
                 json!({ "study": (study.draw as *const () as usize).wrapping_sub(here) })
             }
             View::Plots(plots) => json!(plots.looks()),
@@ -85,7 +85,7 @@ const RECORD: &str = "record_sha256";
 /// The digest of the program that made it.
 const PROGRAM: &str = "program_sha256";
 
-impl<'a> Standing<'a> {
+impl<'a> ReusablePictures<'a> {
     /// The reusable pictures that `store` records for this program. None if the program's own file
     /// cannot be read: then nothing is reused.
     pub fn of(store: &'a Store) -> Option<Self> {
@@ -94,7 +94,7 @@ impl<'a> Standing<'a> {
     }
 
     /// The picture, if it can be reused from `folder`.
-    pub fn find(&self, picture: &Picture, folder: &Path) -> Option<Stands> {
+    pub fn find(&self, picture: &Picture, folder: &Path) -> Option<ReusablePicture> {
         let question = Drawn(picture);
         let Kept::Answer(known) = self.store.get(&key(&question), &question) else { return None };
         if known.fact::<Hash>(PROGRAM).ok()? != self.program {
@@ -106,7 +106,7 @@ impl<'a> Standing<'a> {
             return None;
         }
         let record: PictureRecord = serde_json::from_slice(&bytes).ok()?;
-        let mut stands: Vec<(PathBuf, u64)> = record
+        let mut found: Vec<(PathBuf, u64)> = record
             .files()
             .into_par_iter()
             .map(|(file, hash)| {
@@ -115,8 +115,8 @@ impl<'a> Standing<'a> {
                 (found == *hash).then_some((path, length))
             })
             .collect::<Option<_>>()?;
-        stands.push((path, bytes.len() as u64));
-        Some(Stands { record, files: stands })
+        found.push((path, bytes.len() as u64));
+        Some(ReusablePicture { record, files: found })
     }
 
     /// Remembers a picture whose files have been written.
@@ -161,7 +161,7 @@ mod tests {
     }
 
     /// Makes the first figure into `folder` as the command line does, and remembers it.
-    fn made(standing: &Standing<'_>, folder: &Path) -> (Picture, PictureRecord) {
+    fn made(reusable: &ReusablePictures<'_>, folder: &Path) -> (Picture, PictureRecord) {
         let picture = figures::fig1::figure().pictures.remove(0);
         let put = |file: &str, bytes: &[u8]| twofold_job::record::write(&folder.join(file), bytes);
         let computed = compute_with_tables(&picture, &Executor::quiet(), &mut |file, bytes| put(file, bytes)).unwrap();
@@ -170,25 +170,25 @@ mod tests {
         put(&format!("{name}.svg"), &computed.rendered.svg).unwrap();
         put(&format!("{name}.pdf"), &computed.rendered.pdf).unwrap();
         put(&format!("{name}.json"), &computed.record.to_json()).unwrap();
-        standing.remember(&picture, &computed.record).unwrap();
+        reusable.remember(&picture, &computed.record).unwrap();
         (picture, computed.record)
     }
 
     #[test]
-    fn a_picture_stands_until_anything_of_it_changes() {
+    fn a_picture_is_reused_until_anything_of_it_changes() {
         let place = tempfile::tempdir().unwrap();
         let store = Store::new(place.path().join("store"));
-        let standing = Standing::of(&store).unwrap();
+        let reusable = ReusablePictures::of(&store).unwrap();
         let folder = place.path().join("fig1");
-        let (picture, record) = made(&standing, &folder);
-        let stands = standing.find(&picture, &folder).expect("nothing has changed");
-        assert_eq!(stands.record, record);
+        let (picture, record) = made(&reusable, &folder);
+        let found = reusable.find(&picture, &folder).expect("nothing has changed");
+        assert_eq!(found.record, record);
         let mut there: Vec<_> = fs::read_dir(&folder)
             .unwrap()
             .map(|e| e.unwrap())
             .map(|e| (e.path(), e.metadata().unwrap().len()))
             .collect();
-        let mut found = stands.files.clone();
+        let mut found = found.files.clone();
         there.sort();
         found.sort();
         assert_eq!(found, there, "all of its files and no other");
@@ -205,22 +205,22 @@ mod tests {
                     Some(bytes) => fs::write(path, bytes).unwrap(),
                     None => fs::remove_file(path).unwrap(),
                 }
-                assert_eq!(standing.find(&picture, &folder), None, "{}", path.display());
+                assert_eq!(reusable.find(&picture, &folder), None, "{}", path.display());
             }
             fs::write(path, whole).unwrap();
         }
-        assert!(standing.find(&picture, &folder).is_some());
+        assert!(reusable.find(&picture, &folder).is_some());
     }
 
     #[test]
-    fn nothing_stands_that_another_program_made_or_that_asks_something_else() {
+    fn nothing_of_another_program_or_question_is_reused() {
         let place = tempfile::tempdir().unwrap();
         let store = Store::new(place.path().join("store"));
         let folder = place.path().join("fig1");
-        let other = Standing { store: &store, program: Hash::of(b"another program") };
+        let other = ReusablePictures { store: &store, program: Hash::of(b"another program") };
         let (picture, record) = made(&other, &folder);
         assert!(other.find(&picture, &folder).is_some());
-        let ours = Standing::of(&store).unwrap();
+        let ours = ReusablePictures::of(&store).unwrap();
         assert_eq!(ours.find(&picture, &folder), None, "by another program");
         ours.remember(&picture, &record).unwrap();
         assert!(ours.find(&picture, &folder).is_some());
