@@ -11,6 +11,13 @@ use super::{Arithmetic, DoubleDouble, MultiFloat};
 
 /// A finite number given in decimal. Plain arithmetic sees the nearest `f64`; extended precision can read the decimal number
 /// itself (0.1 is one tenth), to all digits that were given.
+///
+/// ```
+/// use twofold_num::Decimal;
+/// let tenth: Decimal = "0.1".parse().unwrap();
+/// assert_eq!(tenth.value(), 0.1);
+/// assert!("one".parse::<Decimal>().is_err());
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Decimal {
     value: f64,

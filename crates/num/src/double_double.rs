@@ -16,6 +16,13 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use super::{Arithmetic, Elementary, Scalar};
 
 /// A number of about 106 bits (32 decimal digits).
+///
+/// ```
+/// use twofold_num::{Arithmetic, DoubleDouble};
+/// let third = DoubleDouble::from_f64(1.0) / DoubleDouble::from_f64(3.0);
+/// let error = DoubleDouble::from_f64(1.0) - third * DoubleDouble::from_f64(3.0);
+/// assert!(error.abs().high() < 1e-31);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DoubleDouble {
     high: f64,

@@ -10,6 +10,14 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use super::{Arithmetic, Elementary, Scalar};
 
 /// A value and its partial derivatives with respect to `N` variables.
+///
+/// ```
+/// use twofold_num::{Dual, Elementary};
+/// let (x, y) = (Dual::<f64, 2>::variable(2.0, 0), Dual::variable(3.0, 1));
+/// let product = x * y.exp();
+/// assert_eq!(product.partials[0], product.value / 2.0);
+/// assert_eq!(product.partials[1], product.value);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Dual<S, const N: usize> {
     /// The value.

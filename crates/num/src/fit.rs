@@ -15,6 +15,12 @@ pub struct Line {
 
 /// The line through the points (x, y); `None` with fewer than two different x. The error of the slope comes from the scatter
 /// about the line (zero for two points).
+///
+/// ```
+/// use twofold_num::fit::line;
+/// let fit = line(&[(0.0, 1.0), (1.0, 3.0), (2.0, 5.0)]).unwrap();
+/// assert_eq!((fit.slope, fit.intercept, fit.slope_error), (2.0, 1.0, 0.0));
+/// ```
 pub fn line(points: &[(f64, f64)]) -> Option<Line> {
     let n = points.len() as f64;
     let (mut mx, mut my) = (0.0, 0.0);

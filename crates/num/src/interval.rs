@@ -21,6 +21,14 @@ use super::{Arithmetic, Decimal, Dual, Elementary, FromDecimal, elementary};
 /// All real numbers from `lower` to `upper`.
 ///
 /// Neither bound is NaN, `lower <= upper`, `lower < inf`, `upper > -inf`. Equality is that of sets.
+///
+/// ```
+/// use twofold_num::Interval;
+/// let x = Interval::new(1.0, 2.0).unwrap();
+/// let y = x * x - x; // x is taken twice: an enclosure, not the range
+/// assert!(y.contains(0.0) && y.contains(2.0) && y.lower() >= -1.0 && y.upper() <= 3.0);
+/// assert!((Interval::UNIT / Interval::UNIT).is_entire()); // division by an interval that holds 0
+/// ```
 #[derive(Clone, Copy, PartialEq)]
 pub struct Interval {
     lower: f64,

@@ -10,6 +10,14 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use super::{Arithmetic, Elementary, Scalar};
 
 /// The series c_0 + c_1 sigma + ... + c_(K-1) sigma^(K-1), with everything from sigma^K on dropped. `K` is at least 1.
+///
+/// ```
+/// use twofold_num::Elementary;
+/// use twofold_num::jet::Jet;
+/// let sigma = Jet::<4> { c: [0.0, 1.0, 0.0, 0.0] };
+/// let e = sigma.exp(); // 1 + s + s^2/2 + s^3/6
+/// assert!((e.c[2] - 0.5).abs() < 1e-15 && (e.c[3] - 1.0 / 6.0).abs() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Jet<const K: usize> {
     /// The coefficients.

@@ -70,6 +70,12 @@ const MOST_ITERATIONS: usize = 60;
 /// The eigenvalues (real part, imaginary part) of a real matrix of `n` rows, given row by row: elimination to Hessenberg form and
 /// the shifted QR algorithm (Martin, Peters & Wilkinson 1970; EISPACK's `elmhes` and `hqr`). `None` if an entry is not finite, or an
 /// eigenvalue does not settle.
+///
+/// ```
+/// use twofold_num::linear::eigenvalues;
+/// let of = eigenvalues(&[0.0, 1.0, -1.0, 0.0], 2).unwrap(); // a rotation by 90 degrees
+/// assert!(of.iter().all(|[re, im]| re.abs() < 1e-15 && (im.abs() - 1.0).abs() < 1e-15));
+/// ```
 pub fn eigenvalues(matrix: &[f64], n: usize) -> Option<Vec<[f64; 2]>> {
     if matrix.len() != n * n || !matrix.iter().all(|v| v.is_finite()) {
         return None;

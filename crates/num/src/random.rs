@@ -13,6 +13,16 @@ use super::elementary::{cos, ln, sin, sqrt};
 /// A stream of random numbers: ChaCha8 with a 64-bit seed and a 64-bit stream number.
 ///
 /// One stream per run: runs computed side by side never share or reorder numbers.
+///
+/// ```
+/// use twofold_num::random::RandomStream;
+/// let mut one = RandomStream::new(2013, 0);
+/// let mut same = RandomStream::new(2013, 0);
+/// let mut other = RandomStream::new(2013, 1);
+/// let u = one.uniform();
+/// assert_eq!(u, same.uniform());
+/// assert_ne!(u, other.uniform());
+/// ```
 #[derive(Clone, Debug)]
 pub struct RandomStream {
     generator: ChaCha8Rng,
