@@ -16,6 +16,13 @@ use twofold_num::Elementary;
 /// Eq. (5) prints f- with first component -z, eq. (4) with +z. Only +z makes the origin the two-fold that the paper
 /// describes, invisible from both sides; [`Caricature::first_component_of_minus`] keeps the misprint available so
 /// that the difference can be shown.
+///
+/// ```
+/// use nalgebra::vector;
+/// use twofold_system::{Caricature, PiecewiseSmooth};
+/// let caricature = Caricature::with_reinjection(1e-3, 1e-5);
+/// assert_eq!(caricature.plus(&vector![0.0, 0.0, 0.0]), vector![0.0, 1.0, -1.2]);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Caricature {

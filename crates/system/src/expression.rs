@@ -250,6 +250,14 @@ pub fn is_name(name: &str) -> bool {
 }
 
 /// An expression.
+///
+/// ```
+/// use twofold_num::Decimal;
+/// use twofold_system::Expression;
+/// let e = Expression::parse("a*x^2 - 1", &["a", "x"]).unwrap();
+/// let value = e.evaluate(&mut |name| if name == "a" { 2.0 } else { 3.0 }, &|n: &Decimal| n.value());
+/// assert_eq!(value, 17.0);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum Expression {
     /// A number without a sign.

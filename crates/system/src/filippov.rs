@@ -65,6 +65,16 @@ pub fn sliding_weight<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(syst
 }
 
 /// The sliding vector field lambda f+ + (1 - lambda) f-. Undefined (0/0) at a two-fold.
+///
+/// ```
+/// use nalgebra::vector;
+/// use twofold_system::{System, filippov::sliding_field};
+/// let block = System::builtin("stick-slip").expect("built in").bind::<2>()?;
+/// // On the belt (v = 0.3) the spring stretches and the block does not accelerate.
+/// let sliding = sliding_field(&block, &vector![0.1, 0.3]);
+/// assert!((sliding[0] - 0.3).abs() < 1e-12 && sliding[1].abs() < 1e-12);
+/// # Ok::<(), twofold_system::BindError>(())
+/// ```
 pub fn sliding_field<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(
     system: &P,
     x: &SVector<S, N>,
@@ -119,6 +129,16 @@ pub enum TwoFoldError {
 
 /// The two-fold near `guess`: a solution of h = L+h = L-h = 0 by Newton's method, each step the shortest that solves the linearised
 /// equations. In three dimensions that is the solution; in more the two-folds form a set, of which one near the guess is found.
+///
+/// ```
+/// use nalgebra::vector;
+/// use twofold_system::{System, filippov::{Visibility, two_fold}};
+/// let normal_form = System::builtin("two-fold").expect("built in").bind::<3>()?;
+/// let found = two_fold(&normal_form, &vector![0.1, 0.2, -0.1])?;
+/// assert!(found.point.norm() < 1e-12); // the origin
+/// assert_eq!(found.visibility(), (Visibility::Invisible, Visibility::Invisible));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 ///

@@ -56,6 +56,23 @@ pub use transition::Transition;
 pub use wheel::Wheel;
 
 /// An autonomous ordinary differential equation x' = f(x) in `N` dimensions.
+///
+/// ```
+/// use nalgebra::{SVector, vector};
+/// use twofold_num::Elementary;
+/// use twofold_system::{VectorField, jacobian};
+///
+/// /// A damped oscillator, x'' = -x - x'/2.
+/// struct Oscillator;
+/// impl VectorField<2> for Oscillator {
+///     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+///         vector![x[1], -x[0] - x[1] * S::from_f64(0.5)]
+///     }
+/// }
+/// assert_eq!(Oscillator.eval(&vector![1.0, 2.0]), vector![2.0, -2.0]);
+/// assert_eq!(jacobian(&Oscillator, &vector![1.0, 2.0])[(1, 1)], -0.5);
+/// # use twofold_num::Arithmetic;
+/// ```
 pub trait VectorField<const N: usize>: Sync {
     /// Whether [`VectorField::eval`] interprets a program. A method then calls it through a pointer,
     /// which costs nothing beside the interpreter, and is compiled once for all such equations.
@@ -98,6 +115,29 @@ pub trait VectorField<const N: usize>: Sync {
 }
 
 /// A system that switches between two smooth vector fields on the surface h = 0 (the paper's eq. 3).
+///
+/// ```
+/// use nalgebra::{SVector, vector};
+/// use twofold_num::Elementary;
+/// use twofold_system::PiecewiseSmooth;
+/// use twofold_system::filippov::{Region, region};
+///
+/// /// x' = -1 where x > 0, x' = 1 where x < 0; y' = 1 on both sides.
+/// struct Relay;
+/// impl PiecewiseSmooth<2> for Relay {
+///     fn switching<S: Elementary>(&self, x: &SVector<S, 2>) -> S {
+///         x[0]
+///     }
+///     fn plus<S: Elementary>(&self, _: &SVector<S, 2>) -> SVector<S, 2> {
+///         vector![-S::one(), S::one()]
+///     }
+///     fn minus<S: Elementary>(&self, _: &SVector<S, 2>) -> SVector<S, 2> {
+///         vector![S::one(), S::one()]
+///     }
+/// }
+/// assert_eq!(region(&Relay, &vector![0.0, 3.0]), Region::Attracting);
+/// # use twofold_num::Arithmetic;
+/// ```
 pub trait PiecewiseSmooth<const N: usize>: Sync {
     /// As [`VectorField::INTERPRETED`].
     #[doc(hidden)]

@@ -6,6 +6,12 @@ use twofold_num::tape::Recorded;
 use twofold_num::{Arithmetic, Elementary};
 
 /// A transition function phi(h, eps), tending to 1 for h > eps and to 0 for h < -eps.
+///
+/// ```
+/// use twofold_system::Transition;
+/// assert_eq!(Transition::Tanh.eval(0.0, 1e-3), 0.5);
+/// assert_eq!(Transition::Tanh.eval(1.0, 1e-3), 1.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Transition {
