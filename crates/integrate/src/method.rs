@@ -15,6 +15,11 @@ pub const PRECISIONS: [u16; 2] = [106, 192];
 pub const MOST_STATES: usize = 5;
 
 /// An integration method.
+///
+/// ```
+/// use twofold_integrate::Method;
+/// assert!(Method::ALL.iter().any(|method| method.name() == "lsoda"));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {

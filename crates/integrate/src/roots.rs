@@ -9,6 +9,12 @@ use twofold_num::{Dual, Interval};
 /// The zero of `f` in [a, b], f(a) and f(b) of opposite sign or one of them zero, to the last bits of the bracket.
 ///
 /// Brent (1973), ch. 4: inverse quadratic interpolation and secant steps, kept inside the bracket by bisection.
+///
+/// ```
+/// use twofold_integrate::roots::brent;
+/// let root = brent(|x| x * x - 2.0, 0.0, 2.0, -2.0, 2.0);
+/// assert!((root - std::f64::consts::SQRT_2).abs() < 1e-15);
+/// ```
 pub fn brent(mut f: impl FnMut(f64) -> f64, a: f64, b: f64, fa: f64, fb: f64) -> f64 {
     brent_of(&mut f, a, b, fa, fb)
 }

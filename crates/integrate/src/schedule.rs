@@ -63,6 +63,14 @@ pub struct Kick {
 }
 
 /// Restarts and kicks around a run.
+///
+/// ```
+/// use twofold_integrate::{DriveOptions, Schedule};
+/// // As DriveOptions::to, with the method restarted every 20 units of time.
+/// let schedule = Schedule { restart_every: Some(20.0), kick: None };
+/// let options = DriveOptions { schedule, ..DriveOptions::to(100.0) };
+/// assert_eq!(options.t_end, 100.0);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Schedule {

@@ -103,6 +103,25 @@ impl<const L: usize> Precision for MultiFloat<L> {
 ///
 /// As a [`Stepper`] it takes and gives `f64` states; between restarts it keeps time and state in `S`, which
 /// [`Taylor::state`] and [`Taylor::at`] give in full.
+///
+/// ```
+/// # use nalgebra::{SVector, vector};
+/// # use twofold_num::Elementary;
+/// # use twofold_system::VectorField;
+/// # struct Oscillator;
+/// # impl VectorField<2> for Oscillator {
+/// #     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+/// #         vector![x[1], -x[0]]
+/// #     }
+/// # }
+/// use twofold_integrate::{DriveOptions, Ignore, Taylor, Tolerance, drive};
+/// // x'' = -x from (1, 0), in f64; `Taylor::extended` works with 32 digits.
+/// let mut taylor = Taylor::new(Tolerance { rtol: 1e-15, atol: 1e-15 });
+/// let to = DriveOptions::to(1.0);
+/// let end = drive(&Oscillator, vector![1.0, 0.0], &to, &mut taylor, &mut Ignore, &())?;
+/// assert!((end.x[0] - 0.540_302_305_868_139_7).abs() < 1e-14);
+/// # Ok::<(), twofold_integrate::Failure>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Taylor<const N: usize, S = f64> {
     tolerance: Tolerance,

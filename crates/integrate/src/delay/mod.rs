@@ -313,6 +313,34 @@ pub enum LateSwitch {
 }
 
 /// A system whose switch depends on the past, and where it starts.
+///
+/// ```
+/// use nalgebra::{SVector, vector};
+/// use twofold_integrate::delay::{Delayed, History, LateSwitch, Own, Sides};
+/// use twofold_integrate::{DriveOptions, Ignore, Method, Stepper, Tolerance, WithStepper, drive};
+/// use twofold_system::{Definition, System};
+///
+/// /// Runs to t = 4 with whatever stepper it is given.
+/// struct ToFour;
+/// impl WithStepper<1> for ToFour {
+///     type Answer = SVector<f64, 1>;
+///     fn with<M: Stepper<1>>(self, mut stepper: M) -> Self::Answer {
+///         let to = DriveOptions::to(4.0);
+///         drive(&Own, vector![0.3], &to, &mut stepper, &mut Ignore, &()).expect("it runs").x
+///     }
+/// }
+///
+/// // x' = -1 while x(t - 1) > 0 and +1 otherwise: a period of four delays.
+/// let text = "states = ['x']\nh = 'x'\nplus = ['-1']\nminus = ['1']";
+/// let relay = System::new(Definition::from_toml(text, "relay.toml")?);
+/// let bound = relay.bind::<1>()?;
+/// let switch = LateSwitch::Delayed { delay: 1.0, smooth: None, history: History::Constant };
+/// let delayed = Delayed { sides: Sides::new(&bound, &relay), switch, x0: vector![0.3] };
+/// let tolerance = Tolerance { rtol: 1e-9, atol: 1e-9 };
+/// let end = delayed.with_stepper(Method::Dopri5, None, tolerance, ToFour)?;
+/// assert!((end[0] - 0.3).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Delayed<'a, P, const N: usize> {
     /// The system.

@@ -67,6 +67,12 @@ impl SlidingLaw {
 /// continuation of the way in (see [`two_fold`](super::two_fold)); every point of the repelling region lies on some other
 /// sliding orbit out of the same two-fold, which [`history`](super::history) finds. Whatever the rule says, an orbit that comes to the edge of the repelling region (an
 /// invisible fold) leaves there, to the one side on which the field points away.
+///
+/// ```
+/// use twofold_integrate::filippov::{ExitRule, Side};
+/// let rule = ExitRule::AfterTime { time: 0.3, side: Side::Minus };
+/// assert_eq!(rule.to_string(), "after-time:0.3:minus");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum ExitRule {

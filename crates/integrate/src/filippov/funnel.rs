@@ -67,6 +67,26 @@ const MOST_POINTS: usize = 20_000_000;
 
 /// Follows the orbit of `x0` to the first point where its future is a set, then that set: [`ExitRule::All`].
 ///
+/// ```
+/// use nalgebra::vector;
+/// use twofold_integrate::filippov::{FilippovOptions, FunnelGrid, funnel};
+/// use twofold_system::System;
+/// let caricature = System::builtin("caricature").expect("built in").bind::<3>()?;
+/// let grid = FunnelGrid {
+///     shortest: 0.1,
+///     longest: 1.0,
+///     times: 2,
+///     horizon: 1.0,
+///     until_two_fold: true,
+///     per_step: 1,
+/// };
+/// let start = vector![0.2, 0.0, -1.0];
+/// let futures = funnel(&caricature, start, 100.0, &FilippovOptions::default(), &grid)?;
+/// assert!(futures.at_two_fold);
+/// assert_eq!(futures.members.len(), 4); // two exit times, two sides
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`FilippovError::NoSuchExit`] if no set-valued point is reached by `t_end`; those of [`run`](super::run).
 pub fn funnel<P, const N: usize, const M: usize>(

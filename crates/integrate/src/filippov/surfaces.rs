@@ -64,6 +64,21 @@ enum First {
 /// Runs the Filippov motion of a system with two switching surfaces from (0, x0) to `t_end`. `M` is `N + 1` and is inferred. The modes that the
 /// observer is told are those of the surface that was met last (at the start: the first one, unless the run starts on the second).
 ///
+/// ```
+/// use nalgebra::vector;
+/// use twofold_integrate::filippov::{ExitRule, FilippovOptions, Trajectory, run_two_surfaces};
+/// use twofold_system::System;
+/// let blocks = System::builtin("two-blocks").expect("built in");
+/// let [[a, b], [c, d]] = blocks.faces().expect("two surfaces");
+/// let faces = [[a.bind::<4>()?, b.bind::<4>()?], [c.bind::<4>()?, d.bind::<4>()?]];
+/// let mut path = Trajectory::new(1);
+/// let options = FilippovOptions::default();
+/// let start = vector![0.0, 0.0, 0.0, 0.0];
+/// let end = run_two_surfaces(&faces, start, 5.0, &options, ExitRule::Undecided, &mut path, &())?;
+/// assert_eq!(end.t, 5.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`FilippovError::Undecided`] where both surfaces meet and several motions are possible; else see [`FilippovError`]. Each names the time and
 /// the state.

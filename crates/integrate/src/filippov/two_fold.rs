@@ -52,6 +52,17 @@ impl<const N: usize> Eigendirection<N> {
 }
 
 /// The sliding flow near a two-fold.
+///
+/// ```
+/// use nalgebra::vector;
+/// use twofold_integrate::filippov::two_fold::SlidingAtTwoFold;
+/// use twofold_system::System;
+/// let normal_form = System::builtin("two-fold").expect("built in").bind::<3>()?;
+/// let there = SlidingAtTwoFold::near(&normal_form, &vector![0.0, 0.1, 0.1]).expect("a two-fold");
+/// let [weak, strong] = there.directions.expect("a node of the sliding flow");
+/// assert!(weak.rate.abs() < strong.rate.abs());
+/// # Ok::<(), twofold_system::BindError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct SlidingAtTwoFold<const N: usize> {
     /// The two-fold.
