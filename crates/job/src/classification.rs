@@ -19,6 +19,23 @@ use twofold_integrate::{Schedule, Watch};
 /// The attractor of a run, classified from its section; with the largest exponent where no cycle
 /// captures the motion, and compared with noise-free runs where there is noise. Fact: `evidence`
 /// ([`Evidence`]).
+///
+/// ```
+/// use twofold_job::{Classification, Executor, spec::*};
+/// use twofold_system::System;
+/// let run = RunSpec {
+///     system: System::builtin("relay-third-order").expect("built in"),
+///     switch: SwitchSpec::tanh(1e-3),
+///     start: vec![1.0, 0.0, 0.0],
+///     t_end: 300.0,
+///     method: MethodSpec::ndsolve_defaults(Method::Lsoda),
+///     schedule: Default::default(),
+///     observe: Observation::Section { coordinate: 1, value: 0.0 },
+/// };
+/// let evidence = Classification::of(run).ask(&Executor::quiet())?;
+/// assert_eq!(evidence.verdict.cycle().map(|cycle| cycle.period), Some(1));
+/// # Ok::<(), twofold_job::JobError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Classification {
     /// The run; it records a section.

@@ -191,6 +191,17 @@ const COMMENT: &str = "# ";
 /// CSV: a line of column names, a row per line with shortest round-trip numbers (blanks are empty), and a comment line of metadata as JSON
 /// (`about` is whatever its maker wants to say). The names come first because common readers take the first line for them, even a comment
 /// (`numpy.genfromtxt(names=True)`). A file that was cut short can say so in one more comment line ([`cut_short`]).
+///
+/// ```
+/// use twofold_job::encode::{csv, from_csv};
+/// use twofold_job::table::{Column, Entry, Table};
+/// let mut table = Table::new("path", vec![Column::numbers("t")]);
+/// table.push([Entry::Number(0.1)]);
+/// let bytes = csv(&table, &serde_json::json!({}));
+/// let (_, again) = from_csv(&bytes)?;
+/// assert_eq!(again, table);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn csv(table: &Table, about: &Value) -> Vec<u8> {
     csv_of_parts(&[table], about)
 }

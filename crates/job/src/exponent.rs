@@ -19,6 +19,21 @@ use twofold_system::{Bound, BoundField, Compiled, Field, Hysteretic, ParameterBa
 /// The largest Lyapunov exponent of the orbit from `start`. Facts: `exponent` ([`Exponent`]), `half_width` of its 95 % interval and `sign`
 /// ([`Sign`](lyapunov::Sign)) by that interval; or `failure` with the reason if the orbit could not be followed (it leaves, or its
 /// future is a set).
+///
+/// ```
+/// use twofold_analyse::lyapunov::{Exponent, LyapunovOptions};
+/// use twofold_job::{Executor, LargestExponent, spec::SwitchSpec};
+/// use twofold_system::System;
+/// let question = LargestExponent {
+///     system: System::builtin("fused-focus").expect("built in").with("mu", -0.02).expect("a parameter"),
+///     switch: SwitchSpec::tanh(1e-2),
+///     start: vec![0.0, 0.3],
+///     settings: LyapunovOptions { transient: 10.0, duration: 50.0, ..Default::default() },
+/// };
+/// let exponent: Exponent = Executor::quiet().ask(&question)?.fact("exponent")?;
+/// assert!(exponent.value < 1.0 && exponent.duration == 50.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LargestExponent {
     /// The system.

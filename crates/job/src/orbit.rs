@@ -30,6 +30,27 @@ use twofold_system::{Bound, BoundField, Field, System};
 /// Tables: `orbit` (its crossings of the plane), `branch` (a row per orbit) and `bifurcations` if a parameter is followed. Facts: `period`,
 /// `multipliers` (real, imaginary), `multiplier_error`, `stability`, `largest_modulus`, `rate`, `residual`, `iterations`, `returns`, `point`; `end` of the branch.
 /// Where the motion comes to a rest: the table `rest` and the fact `rest` alone.
+///
+/// ```
+/// use twofold_analyse::floquet::ReturnPlane;
+/// use twofold_integrate::{Tolerance, filippov::ExitRule};
+/// use twofold_job::{ClosedOrbit, Executor, spec::SwitchSpec};
+/// use twofold_system::System;
+/// let question = ClosedOrbit {
+///     system: System::builtin("stick-slip").expect("built in"),
+///     switch: SwitchSpec::Filippov { exit: ExitRule::Undecided, funnel: None },
+///     start: vec![0.0, 0.0],
+///     settle: 50.0,
+///     plane: ReturnPlane { axis: 1, value: 0.0, upward: true },
+///     returns: None,
+///     tolerance: Tolerance { rtol: 1e-11, atol: 1e-11 },
+///     longest_return: 100.0,
+///     along: None,
+/// };
+/// let period: f64 = Executor::quiet().ask(&question)?.fact("period")?;
+/// assert!((period - 6.736_837).abs() < 1e-5);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ClosedOrbit {
     /// The system.

@@ -12,6 +12,25 @@ use twofold_integrate::Watch;
 /// A run, and what is recorded of it: see [`Recording`](super::Recording) for the answer's tables. Facts: `t` and `state` at the end,
 /// `most_steps_in_segment`; of a delayed switch its `history`; of a relay what it takes
 /// `inside` its band, and whether it `begins` with f+ or f-.
+///
+/// ```
+/// use twofold_job::{Executor, Run, spec::*};
+/// use twofold_system::System;
+/// let run = RunSpec {
+///     system: System::builtin("stick-slip").expect("built in"),
+///     switch: SwitchSpec::Filippov { exit: ExitRule::Undecided, funnel: None },
+///     start: vec![0.0, 0.0],
+///     t_end: 20.0,
+///     method: MethodSpec::ndsolve_defaults(Method::Dopri5),
+///     schedule: Default::default(),
+///     observe: Observation::Path { chord: 1e-3 },
+/// };
+/// let answer = Executor::quiet().ask(&Run(run))?;
+/// let motion = answer.table("motion").expect("a Filippov motion");
+/// assert!(motion.words("mode").any(|mode| mode == "sliding-attracting"));
+/// # use twofold_integrate::filippov::ExitRule;
+/// # Ok::<(), twofold_job::JobError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run(pub RunSpec);
 

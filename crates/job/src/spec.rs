@@ -15,6 +15,24 @@ use twofold_num::elementary::exp10;
 use twofold_system::{Field, Relaxation, System, Transition};
 
 /// One run: system, switch, start, method, schedule, and what is recorded.
+///
+/// ```
+/// use twofold_job::spec::*;
+/// use twofold_system::System;
+/// let run = RunSpec {
+///     system: System::builtin("chua").expect("built in"),
+///     switch: SwitchSpec::tanh(1e-2),
+///     start: vec![0.1, 0.0, 0.0],
+///     t_end: 20.0,
+///     method: MethodSpec::ndsolve_defaults(Method::Dopri5),
+///     schedule: Default::default(),
+///     observe: Observation::Section { coordinate: 1, value: 0.0 },
+/// };
+/// run.validate()?;
+/// let json = serde_json::to_string(&run)?; // what `twofold run --spec` reads
+/// assert_eq!(serde_json::from_str::<RunSpec>(&json)?, run);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunSpec {

@@ -19,6 +19,26 @@ use crate::record::{FileError, Hash, files};
 use twofold_integrate::Statistics;
 
 /// A folder of answers.
+///
+/// ```
+/// use twofold_job::{Executor, Run, Store, spec::*};
+/// use twofold_system::System;
+/// let run = RunSpec {
+///     system: System::builtin("chua").expect("built in"),
+///     switch: SwitchSpec::tanh(1e-2),
+///     start: vec![0.1, 0.0, 0.0],
+///     t_end: 20.0,
+///     method: MethodSpec::ndsolve_defaults(Method::Dopri5),
+///     schedule: Default::default(),
+///     observe: Observation::Section { coordinate: 1, value: 0.0 },
+/// };
+/// # let folder = tempfile::tempdir()?;
+/// # let folder = folder.path();
+/// let executor = Executor::new(Some(Store::new(folder)), &());
+/// executor.ask(&Run(run))?; // computed, and kept for the next time
+/// assert_eq!(Store::new(folder).entries()?.len(), 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Store {
     folder: PathBuf,

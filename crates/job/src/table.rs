@@ -8,6 +8,13 @@ use std::collections::HashMap;
 use serde::{Deserialize, Serialize};
 
 /// A named table; the name becomes part of file names.
+///
+/// ```
+/// use twofold_job::table::{Column, Entry, Table};
+/// let mut table = Table::new("path", vec![Column::numbers("t"), Column::words("mode")]);
+/// table.push([Entry::Number(0.5), Entry::Word("plus".to_owned())]);
+/// assert_eq!(table.numbers("t"), [0.5]);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     /// A short name for a file: "section".
