@@ -418,6 +418,45 @@ struct Scales {
 
 /// Follows the branch from the orbit `first` to the ends of `options`; `go_on` receives each orbit
 /// and returns whether to continue.
+///
+/// ```
+/// use twofold_analyse::branch::{BranchOptions, Newton, ReturnMap, Trouble, closed_orbit, follow};
+/// use twofold_analyse::floquet::Returned;
+///
+/// /// The return map of r' = r (p - r^2), phi' = 1 in the plane: an orbit of radius sqrt(p).
+/// struct Circle;
+/// impl ReturnMap for Circle {
+///     fn states(&self) -> usize {
+///         2
+///     }
+///     fn axis(&self) -> usize {
+///         1
+///     }
+///     fn returned(&self, u: &[f64], p: f64, _: bool) -> Result<Returned, Trouble> {
+///         let turn = 2.0 * std::f64::consts::PI;
+///         let decay = (-2.0 * p * turn).exp();
+///         let r2 = p * u[0] * u[0] / (u[0] * u[0] + (p - u[0] * u[0]) * decay);
+///         let slope = decay * (r2.sqrt() / u[0]).powi(3);
+///         Ok(Returned {
+///             point: vec![r2.sqrt(), 0.0],
+///             time: turn,
+///             derivative: vec![slope, 0.0, 0.0, 0.0],
+///             same: vec![vec![r2.sqrt(), 0.0]],
+///             opposite: Vec::new(),
+///             extent: 2.0 * u[0],
+///             passes: true,
+///             derivative_error: 0.0,
+///             events: 0,
+///         })
+///     }
+/// }
+/// let newton = Newton { closed: 1e-10, atol: 1e-12, rtol: 1e-12, iterations: 20 };
+/// let first = closed_orbit(&Circle, &[1.1, 0.0], 1.0, newton).expect("an orbit");
+/// let options = BranchOptions { from: 1.0, to: 4.0, longest: 0.1, most: 100, newton };
+/// let branch = follow(&Circle, first, &options, &mut |_| true);
+/// let last = branch.orbits.last().expect("at least one");
+/// assert!((last.point[0] - last.parameter.sqrt()).abs() < 1e-8);
+/// ```
 pub fn follow(
     map: &dyn ReturnMap,
     first: Orbit,

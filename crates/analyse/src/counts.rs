@@ -28,6 +28,12 @@ pub fn normal_quantile(p: f64) -> f64 {
 
 /// Wilson's (1927, J. Am. Stat. Assoc. 22, 209) score interval for a share, `hits` of `of`, at the given confidence. Without
 /// any count it is [0, 1].
+///
+/// ```
+/// use twofold_analyse::counts::wilson;
+/// let [low, high] = wilson(156, 300, 0.95); // 52 %
+/// assert!((low - 0.464).abs() < 1e-3 && (high - 0.576).abs() < 1e-3);
+/// ```
 pub fn wilson(hits: u64, of: u64, confidence: f64) -> [f64; 2] {
     score(hits, of, normal_quantile(0.5 * (1.0 + confidence)))
 }

@@ -113,6 +113,21 @@ const RANGE: f64 = 100.0;
 
 /// The largest Lyapunov exponent of the orbit of `field` from `x0`, `M` being 2 `N`: `largest::<3, 6, _>(...)`.
 ///
+/// ```
+/// use nalgebra::vector;
+/// use twofold_analyse::lyapunov::{LyapunovOptions, largest};
+/// use twofold_system::{Definition, Field, System, Transition};
+/// // The Lorenz system; its largest exponent is 0.9056. Both fields are the same, so h has no effect.
+/// let f = "['10*(y - x)', 'x*(28 - z) - y', 'x*y - 8/3*z']";
+/// let text = format!("states = ['x', 'y', 'z']\nh = 'x'\nplus = {f}\nminus = {f}");
+/// let lorenz = System::new(Definition::from_toml(&text, "lorenz.toml")?);
+/// let field = Field::smoothed(&lorenz, Transition::Tanh, 1.0).bind::<3>()?;
+/// let options = LyapunovOptions { transient: 10.0, duration: 100.0, ..Default::default() };
+/// let exponent = largest::<3, 6, _>(&field, vector![1.0, 1.0, 20.0], &options)?;
+/// assert!((exponent.value - 0.9).abs() < 5.0 * exponent.standard_error.max(0.02));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// If the orbit cannot be followed.
 pub fn largest<const N: usize, const M: usize, F>(

@@ -46,6 +46,14 @@ const LEAVES: f64 = 3.0;
 const MOST_STEPS: u64 = 50_000_000;
 
 /// The law's predictions for the normal form with constants v+, v-: formulas only.
+///
+/// ```
+/// use twofold_analyse::passage::Predicted;
+/// let law = Predicted::of(-1.2, -1.4);
+/// assert!((1.0 / law.mu - 7.8).abs() < 0.1);
+/// // A disturbance across the layer grows like eps^(-3.9).
+/// assert!((law.across() + 3.9).abs() < 0.05);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Predicted {

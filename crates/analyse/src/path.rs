@@ -15,6 +15,29 @@ pub struct Sample<const D: usize = 3> {
 
 /// Records a path: every accepted step's ends, and between them as many points of the interpolant as it takes for the
 /// polyline to stay within `chord` of it. Of a state with more components, the first `D` are kept and looked at.
+///
+/// ```
+/// # use nalgebra::{SVector, vector};
+/// # use twofold_integrate::{DriveOptions, Dopri5, Tolerance, drive};
+/// # use twofold_num::Elementary;
+/// # use twofold_system::VectorField;
+/// # struct Oscillator;
+/// # impl VectorField<2> for Oscillator {
+/// #     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+/// #         vector![x[1], -x[0]]
+/// #     }
+/// # }
+/// # let mut method = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
+/// # let x0 = vector![1.0, 0.0];
+/// use twofold_analyse::PathRecorder;
+/// // x'' = -x from (1, 0); both states are kept.
+/// let mut path = PathRecorder::<2>::new(&x0, 1e-3);
+/// let to = DriveOptions::to(6.0);
+/// let _ = drive(&Oscillator, x0, &to, &mut method, &mut path, &())?;
+/// let samples = path.into_samples();
+/// assert!(samples.iter().all(|s| (s.x[0].hypot(s.x[1]) - 1.0).abs() < 1e-6));
+/// # Ok::<(), twofold_integrate::Failure>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct PathRecorder<const D: usize = 3> {
     chord: f64,
@@ -109,6 +132,28 @@ impl<const N: usize, const D: usize> Observer<N> for PathRecorder<D> {
 
 /// Records the state at the multiples of an interval, on the dense output. Times are multiples, not running sums. After a kick at such a
 /// moment the state is the one before it.
+///
+/// ```
+/// # use nalgebra::{SVector, vector};
+/// # use twofold_integrate::{DriveOptions, Dopri5, Tolerance, drive};
+/// # use twofold_num::Elementary;
+/// # use twofold_system::VectorField;
+/// # struct Oscillator;
+/// # impl VectorField<2> for Oscillator {
+/// #     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+/// #         vector![x[1], -x[0]]
+/// #     }
+/// # }
+/// # let mut method = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
+/// # let x0 = vector![1.0, 0.0];
+/// use twofold_analyse::TimesRecorder;
+/// // x'' = -x from (1, 0), at t = 0, 0.5, ..., 6.
+/// let mut times = TimesRecorder::<2>::new(&x0, 0.5);
+/// let to = DriveOptions::to(6.0);
+/// let _ = drive(&Oscillator, x0, &to, &mut method, &mut times, &())?;
+/// assert_eq!(times.into_samples().len(), 13);
+/// # Ok::<(), twofold_integrate::Failure>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct TimesRecorder<const D: usize = 3> {
     every: f64,

@@ -11,6 +11,17 @@ const FREQUENCIES: usize = 60;
 /// K of the 0-1 test for the sequence `phi`, by the correlation method on the mean-square displacement with its oscillating
 /// term removed (their eqs 2.3 and 3.1). About 0 for regular, about 1 for chaotic sequences; `None` below 100
 /// terms.
+///
+/// ```
+/// use twofold_analyse::attractor::zero_one;
+/// // Iterates of the logistic map: period two at 3.2, chaos at 4.
+/// let orbit = |r: f64| {
+///     let step = move |x: &f64| Some(r * x * (1.0 - x));
+///     std::iter::successors(Some(0.3), step).skip(100).take(1000).collect::<Vec<f64>>()
+/// };
+/// assert!(zero_one(&orbit(3.2)).is_some_and(|k| k < 0.1));
+/// assert!(zero_one(&orbit(4.0)).is_some_and(|k| k > 0.9));
+/// ```
 pub fn zero_one(phi: &[f64]) -> Option<f64> {
     let n = phi.len();
     if n < 100 {
