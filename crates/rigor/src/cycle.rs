@@ -148,6 +148,27 @@ pub fn krawczyk(
 
 /// Proves a closed orbit of x' = f(x), three-dimensional, as precisely as the arithmetic allows.
 ///
+/// ```
+/// use twofold_num::{Arithmetic, Elementary, Tape, tape::Recorded};
+/// use twofold_rigor::cycle::{Search, prove_cycle};
+/// use twofold_rigor::{AxisPlane, FlowOptions};
+/// // r' = r (1 - r^2), one radian per unit time, z' = -z: the unit circle attracts.
+/// let circle = Tape::record(3, |x| {
+///     let inward = Recorded::one() - x[0].squared() - x[1].squared();
+///     vec![x[0] * inward - x[1], x[1] * inward + x[0], -x[2]]
+/// });
+/// let search = Search {
+///     plane: AxisPlane { axis: 1, value: 0.0 },
+///     near: [1.0, 0.0],
+///     radius: 1e-6,
+///     crossings: 2,
+///     longest: 10.0,
+/// };
+/// let cycle = prove_cycle(&circle, FlowOptions::PLAIN, &search)?;
+/// assert!(cycle.attracts() && cycle.period.contains(2.0 * std::f64::consts::PI));
+/// # Ok::<(), twofold_rigor::Error>(())
+/// ```
+///
 /// # Errors
 /// See [`Error`]; [`Error::NotIncluded`] if the inclusion does not hold.
 pub fn prove_cycle(tape: &Tape, settings: FlowOptions, search: &Search) -> Result<Cycle, Error> {
