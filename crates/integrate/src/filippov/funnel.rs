@@ -71,7 +71,7 @@ const MOST_POINTS: usize = 20_000_000;
 /// use nalgebra::vector;
 /// use twofold_integrate::filippov::{FilippovOptions, FunnelGrid, funnel};
 /// use twofold_system::System;
-/// let caricature = System::builtin("caricature").expect("built in").bind::<3>()?;
+/// let normal_form = System::builtin("two-fold").expect("built in").bind::<3>()?;
 /// let grid = FunnelGrid {
 ///     shortest: 0.1,
 ///     longest: 1.0,
@@ -80,8 +80,8 @@ const MOST_POINTS: usize = 20_000_000;
 ///     until_two_fold: true,
 ///     per_step: 1,
 /// };
-/// let start = vector![0.2, 0.0, -1.0];
-/// let futures = funnel(&caricature, start, 100.0, &FilippovOptions::default(), &grid)?;
+/// let start = vector![0.0, 0.5, 0.5]; // attracting sliding
+/// let futures = funnel(&normal_form, start, 100.0, &FilippovOptions::default(), &grid)?;
 /// assert!(futures.at_two_fold);
 /// assert_eq!(futures.members.len(), 4); // two exit times, two sides
 /// # Ok::<(), Box<dyn std::error::Error>>(())

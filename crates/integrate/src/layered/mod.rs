@@ -60,11 +60,11 @@ pub fn applicable(tape: &Tape) -> Result<(), NotPolynomial> {
 /// use nalgebra::vector;
 /// use twofold_integrate::{DriveOptions, Ignore, Layered, Tolerance, drive};
 /// use twofold_system::{Field, System, Transition};
-/// let caricature = System::builtin("caricature").expect("built in");
-/// let smoothed = Field::smoothed(&caricature, Transition::Tanh, 1e-3).bind::<3>()?;
+/// let block = System::builtin("stick-slip").expect("built in");
+/// let smoothed = Field::smoothed(&block, Transition::Tanh, 1e-3).bind::<2>()?;
 /// let mut layered = Layered::new(Tolerance { rtol: 1e-10, atol: 1e-10 });
 /// let to = DriveOptions::to(5.0);
-/// let end = drive(&smoothed, vector![0.2, 0.0, -1.0], &to, &mut layered, &mut Ignore, &())?;
+/// let end = drive(&smoothed, vector![0.0, 0.0], &to, &mut layered, &mut Ignore, &())?;
 /// assert_eq!(end.t, 5.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
