@@ -121,7 +121,7 @@ impl Folder {
                     // The data were known: was it by this rule that they were first judged?
                     found.rule_after_data =
                         known.is_some_and(|v| v.data == found.data && (v.rule != found.rule || v.rule_after_data));
-                    executor.progress().line(&format!("{}: {}: {}", claim.id, outcome(found.agrees), found.found));
+                    executor.progress().line(&format!("scored {}", claim.id));
                     found
                 });
                 if let Err(why) = &verdict {

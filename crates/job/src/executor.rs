@@ -42,6 +42,25 @@ type Cell = Arc<OnceLock<Result<Arc<Answer>, JobError>>>;
 /// Several threads may ask at a time; a thread that asks for an answer that another is computing
 /// waits for it. There is no deadlock: dependencies between jobs have no cycles, and a job does no
 /// other work while it computes (see [`Question`]).
+///
+/// ```
+/// use twofold_job::{Executor, Run, spec::*};
+/// use twofold_system::System;
+/// let run = RunSpec {
+///     system: System::builtin("chua").expect("built in"),
+///     switch: SwitchSpec::tanh(1e-2),
+///     start: vec![0.1, 0.0, 0.0],
+///     t_end: 20.0,
+///     method: MethodSpec::ndsolve_defaults(Method::Dopri5),
+///     schedule: Default::default(),
+///     observe: Observation::Section { coordinate: 1, value: 0.0 },
+/// };
+/// let executor = Executor::quiet();
+/// let answer = executor.ask(&Run(run.clone()))?;
+/// let again = executor.ask(&Run(run))?; // not computed again
+/// assert!(std::sync::Arc::ptr_eq(&answer, &again));
+/// # Ok::<(), twofold_job::JobError>(())
+/// ```
 pub struct Executor<'a> {
     store: Option<Store>,
     progress: &'a dyn Progress,
@@ -150,12 +169,14 @@ impl<'a> Executor<'a> {
     }
 }
 
-/// What a finished job's line says.
+/// The line about a finished job.
 fn said(answer: &Answer) -> String {
-    let rows = format!("{} rows", answer.rows());
+    // Facts have no rows to count.
+    let rows = if answer.tables.is_empty() { "done".to_owned() } else { format!("{} rows", answer.rows()) };
     let work = answer.statistics.as_ref().map(|s| format!("{} steps, {rows}", s.steps)).unwrap_or(rows);
     match answer.stop {
-        Stop::Finished => work,
+        // What was looked for, such as an event that ends the run, is said by the command.
+        Stop::Finished | Stop::Found => work,
         other => format!("{work}, {}", other.word()),
     }
 }

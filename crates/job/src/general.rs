@@ -18,6 +18,26 @@ use super::question::{JobError, Question};
 use super::table::{Column, Entry, Table};
 
 /// A run of a general system.
+///
+/// ```
+/// use twofold_hybrid::{Definition, Model, Options};
+/// use twofold_job::{Executor, general::GeneralRun};
+/// let text = "
+///     states = ['x', 'v']
+///     start = [1, 0]
+///     f = ['v', '-9.81']
+///     [[event]]
+///     name = 'impact'
+///     when = 'x'
+///     direction = 'down'
+///     set = { v = '-0.8*v' }
+/// ";
+/// let model = Model::new(Definition::from_toml(text, "ball.toml")?);
+/// let options = Options { t_end: 2.0, ..Options::default() };
+/// let answer = Executor::quiet().ask(&GeneralRun { model, options })?;
+/// assert!(answer.tables[0].words("event").any(|event| event == "impact"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct GeneralRun {
     /// The system.
@@ -237,6 +257,10 @@ impl Question for GeneralOrbit {
         "general-orbit"
     }
 
+    fn label(&self) -> String {
+        "closed orbit".into()
+    }
+
     fn json(&self) -> Value {
         let mut json = self.run.json();
         json["settle"] = self.settle.into();
@@ -309,6 +333,10 @@ impl Question for GeneralExponents {
         "general-exponents"
     }
 
+    fn label(&self) -> String {
+        "Lyapunov exponents".into()
+    }
+
     fn json(&self) -> Value {
         let mut json = self.run.json();
         json["transient"] = self.transient.into();
@@ -350,6 +378,10 @@ impl Question for GeneralSensitivities {
         "general-sensitivities"
     }
 
+    fn label(&self) -> String {
+        "sensitivities".into()
+    }
+
     fn json(&self) -> Value {
         let mut json = self.run.json();
         json["by"] = json!(self.by);
@@ -379,6 +411,18 @@ impl Question for GeneralSensitivities {
 }
 
 /// Equilibria and pseudo-equilibria of a general system in a box.
+///
+/// ```
+/// use twofold_hybrid::{Definition, Model};
+/// use twofold_job::{Executor, general::{GeneralRests, Resting}};
+/// let text = "states = ['x']\nf = ['x - x^3']";
+/// let model = Model::new(Definition::from_toml(text, "well.toml")?);
+/// let within = vec![(-2.0, 2.0)];
+/// let answer = Executor::quiet().ask(&GeneralRests { model, within })?;
+/// let rests: Vec<Resting> = answer.fact("rests")?;
+/// assert_eq!(rests.len(), 3); // -1, 0 and 1
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct GeneralRests {
     /// The system.
@@ -446,6 +490,10 @@ pub enum RestPlace {
 impl Question for GeneralRests {
     fn kind(&self) -> &'static str {
         "general-rests"
+    }
+
+    fn label(&self) -> String {
+        "rests".into()
     }
 
     fn json(&self) -> Value {
