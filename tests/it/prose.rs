@@ -258,12 +258,13 @@ fn terms_are_linked_to_the_glossary_where_they_are_first_used() {
     assert!(!first_unlinked("[Canards](two-fold.md) and canardly", "canard"));
 }
 
-/// Rust files below a folder.
-fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
+/// Files below a folder that end in one of these extensions; no folder that programs fill.
+fn files_of(folder: &Path, extensions: &[&str], found: &mut Vec<PathBuf>) {
     for path in fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()) {
-        if path.is_dir() && path.file_name().is_some_and(|n| n != "target") {
-            rust_files(&path, found);
-        } else if path.extension().is_some_and(|e| e == "rs") {
+        let made = path.file_name().is_none_or(|n| ["target", "node_modules", "__pycache__"].iter().any(|m| n == *m));
+        if path.is_dir() && !made {
+            files_of(&path, extensions, found);
+        } else if path.extension().is_some_and(|e| extensions.iter().any(|x| e == *x)) {
             found.push(path);
         }
     }
@@ -273,7 +274,7 @@ fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
 fn comments_do_not_begin_in_the_middle_of_a_sentence() {
     let mut files = Vec::new();
     for folder in ["crates", "src", "figures", "tests", "proofs", "examples", "benches", "python/src"] {
-        rust_files(&root().join(folder), &mut files);
+        files_of(&root().join(folder), &["rs"], &mut files);
     }
     assert!(files.len() > 200);
     let mut wrong = Vec::new();
@@ -285,4 +286,121 @@ fn comments_do_not_begin_in_the_middle_of_a_sentence() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// Words of the first versions with a meaning that only their authors knew, and pronouns that stand for a program, a
+/// caller or a user. STYLE: the field's word, and the thing itself.
+const PRIVATE: [&str; 19] = [
+    "desk",
+    "bear out",
+    "bears out",
+    "borne out",
+    "bears_out",
+    "house",
+    "houses",
+    "whoever",
+    "somebody",
+    "anybody",
+    "nobody",
+    "asked of",
+    "at hand",
+    "hangs on",
+    "that waits for",
+    "the one who asked",
+    "what becomes of",
+    "what comes of",
+    "by which method",
+];
+
+/// Words that are somebody's field elsewhere, but no name of a part of this program.
+const PARTS: [&str; 4] = ["room", "rooms", "wall", "walls"];
+
+/// Drawn into blessed pictures, or the text of a paper: these change with their hashes.
+const BLESSED: [&str; 2] = ["figures/census/figure.rs", "figures/basin/figure.rs"];
+
+/// Whether `text`, in lower case, holds these words, not as a part of longer ones.
+fn says(text: &str, words: &str) -> bool {
+    let inside = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
+    text.match_indices(words)
+        .any(|(at, _)| !inside(text[..at].chars().next_back()) && !inside(text[at + words.len()..].chars().next()))
+}
+
+/// Every source and page that people write, by its path from the root: Rust, Python, scripts and Markdown. Not the
+/// texts that name the private words: this file, and the note about them.
+fn texts() -> Vec<(String, String)> {
+    let mut files = Vec::new();
+    for folder in ["crates", "src", "figures", "tests", "proofs", "examples", "benches", "fuzz", "python/src"] {
+        files_of(&root().join(folder), &["rs"], &mut files);
+    }
+    for folder in ["python", "scripts", "benches", "cluster"] {
+        files_of(&root().join(folder), &["py", "sh"], &mut files);
+    }
+    let named = files.into_iter().map(|path| {
+        let name = path.strip_prefix(root()).unwrap().display().to_string().replace('\\', "/");
+        let text = fs::read_to_string(&path).unwrap();
+        (name, text)
+    });
+    let mut all: Vec<_> = named.chain(pages()).filter(|(name, _)| !name.starts_with("target/")).collect();
+    all.retain(|(name, _)| !["tests/it/prose.rs", "notes/words.md", "CHANGELOG.md"].contains(&name.as_str()));
+    all
+}
+
+#[test]
+fn no_text_uses_a_private_word() {
+    let mut found = Vec::new();
+    for (name, text) in texts() {
+        if BLESSED.contains(&name.as_str()) {
+            continue;
+        }
+        let parts =
+            name.ends_with("src/lib.rs") || ["docs/architecture.md", "CONTRIBUTING.md"].contains(&name.as_str());
+        // Comments and paragraphs are wrapped: two neighbouring lines are read together, without their marks.
+        let lines: Vec<String> = text
+            .lines()
+            .map(|l| l.trim().trim_start_matches(['/', '!', '#', '>', '*', '-']).trim().to_lowercase())
+            .collect();
+        for (i, line) in lines.iter().enumerate() {
+            let next = lines.get(i + 1).map_or("", String::as_str);
+            let both = format!("{line} {next}");
+            for words in PRIVATE {
+                // A user of the operating system is called so.
+                let user = line.contains("nogroup");
+                if says(&both, words) && !says(next, words) && !user {
+                    found.push(format!("{name}:{}: {words:?}", i + 1));
+                }
+            }
+            found.extend(PARTS.iter().filter(|w| parts && says(line, w)).map(|w| format!("{name}:{}: {w:?}", i + 1)));
+        }
+    }
+    assert!(found.is_empty(), "say it in the field's words: {found:#?}");
+    assert!(says("is what becomes of it", "what becomes of") && !says("a deskside", "desk"));
+}
+
+/// Names of types that once stood for several things.
+const ONE_MEANING: [&str; 14] = [
+    "Alike", "Course", "Desk", "Fate", "Kind", "Panel", "Passage", "Plan", "Plane", "Run", "Settings", "Standing",
+    "Stands", "Watch",
+];
+
+#[test]
+fn a_type_name_that_stood_for_several_things_stands_for_one() {
+    let mut defined = std::collections::BTreeMap::<&str, Vec<String>>::new();
+    for (name, text) in texts().iter().filter(|(name, _)| name.ends_with(".rs")) {
+        for line in text.lines() {
+            let mut words = line.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|w| !w.is_empty());
+            // `pub(super) struct Name`: the keyword, then the name.
+            let Some(_) = words.by_ref().take(3).find(|w| ["struct", "enum", "trait", "type"].contains(w)) else {
+                continue;
+            };
+            let code = !line.trim_start().starts_with("//") && !line.contains('"');
+            if let Some(of) = words.next().and_then(|w| ONE_MEANING.iter().find(|m| **m == w)).filter(|_| code) {
+                defined.entry(of).or_default().push(name.clone());
+            }
+        }
+    }
+    // `job::Run` is the question of a run.
+    for (name, places) in &defined {
+        assert!(*name == "Run" && places == &["crates/job/src/run.rs"], "{name} is defined in {places:?}");
+    }
+    assert_eq!(defined.len(), 1, "the test sees definitions: {defined:?}");
 }
