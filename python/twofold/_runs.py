@@ -188,7 +188,7 @@ def _spec(
         _refuse({"eps": eps}, "the discontinuous system has no eps")
         _refuse(of_smoothing, 'it belongs to switch="smoothed"')
         _refuse(of_hysteresis, 'it belongs to switch="hysteretic"')
-        _refuse({"restart": restart, "kick_every": kick_every, **kicks}, "restarts and kicks belong to the other switches' runs")
+        _refuse({"restart": restart, "kick_every": kick_every, **kicks}, "only the other switches' runs have restarts and kicks")
         if funnel is not None:
             _refuse({"plus_probability": plus_probability, "seed": seed, "stream": stream}, "nothing in a funnel is random")
             model = {"filippov": {"exit": "all", "funnel": funnel}}

@@ -72,7 +72,10 @@ pub fn asked(command: &str, flags: Vec<String>) -> Result<Asked, CliError> {
         "sensitivities" => Arc::new(read::<sensitivities::Arguments>(flags)?.question()?),
         "scan" => return Ok(Asked::Scan(Box::new(read::<scan::Arguments>(flags)?.scan()?))),
         other => {
-            return Err(CliError::Usage(format!("{other}: no question; there are {}", COMMANDS.join(", "))));
+            return Err(CliError::Usage(format!(
+                "{other}: there is no such command; choose among {}",
+                COMMANDS.join(", ")
+            )));
         }
     }))
 }

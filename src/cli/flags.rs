@@ -262,7 +262,7 @@ const OF_THE_CARICATURE: &str = "it belongs to the caricature, and --set NAME=VA
 const OF_FUNNELS: &str =
     "it describes the futures that --switch filippov --exit all follows; leave it out, or follow them";
 const OF_RANDOM: &str = "nothing in this run is random; leave it out, or give --kick-every or a random --exit";
-const NOT_FILIPPOV: &str = "restarts and kicks belong to the other switches' runs (kicks to exponents, too); leave it out, or choose another --switch";
+const NOT_FILIPPOV: &str = "only runs with another --switch than filippov have restarts and kicks, and exponents have kicks; leave it out, or choose another --switch";
 const OF_DELAYS: &str = "it belongs to the delayed switch; leave it out, or use --switch delayed";
 const OF_RELAYS: &str = "it belongs to the relay; leave it out, or use --switch relay";
 const OF_ORBITS: &str = "a closed orbit's steps are chosen by its tolerance alone; leave it out";

@@ -191,7 +191,7 @@ fn published_pictures_are_checked_criterion_by_criterion() {
         ("f-dot", "DIFFERS: no criterion is met; 25 pixels changed"),
         ("g-size", "DIFFERS: ours and theirs cannot be compared"),
         ("h-none", "DIFFERS: cannot be read"),
-        ("holiday.png", "passed over"),
+        ("holiday.png", "skipped"),
         ("fig6-reconstructed", "not in the folder"),
     ] {
         assert!(line(file).contains(words), "{}", line(file));

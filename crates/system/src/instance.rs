@@ -98,7 +98,7 @@ pub enum BindError {
     },
     /// As a system with one switching surface.
     #[error(
-        "this system has two switching surfaces, and what is asked for is computed for one; smooth the switches, or leave the table [second] out"
+        "this system has two switching surfaces, and this is computed for one; smooth the switches, or leave the table [second] out"
     )]
     TwoSurfaces,
 }

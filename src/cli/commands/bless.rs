@@ -64,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         )));
     }
     if !tests_pass()? {
-        let why = "refused: a test that is not golden fails; a reference must not be made from a program that is wrong";
+        let why = "refused: a test fails that compares with no reference; a reference must not be made by a program that is wrong";
         say("refused", &[], why)?;
         return Ok(Exit::CheckFailed);
     }

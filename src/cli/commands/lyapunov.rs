@@ -126,7 +126,10 @@ pub fn run(arguments: &Arguments) -> Result<cli::Exit, CliError> {
     let progress = Progress::with_grace(arguments.delivery.quiet);
     let answer = match (Executor::new(None, &progress).ask(&question), progress.asked_to_stop()) {
         (Err(JobError::Interrupted), Some(exit)) => {
-            return Err(CliError::Stopped { said: "interrupted before there was a mean with an error".into(), exit });
+            return Err(CliError::Stopped {
+                said: "interrupted before a mean and its error could be computed".into(),
+                exit,
+            });
         }
         (answer, _) => answer?,
     };

@@ -136,7 +136,7 @@ impl Arguments {
                     "branches are followed of systems with h, plus and minus; an attractor of this one is followed by `twofold scan --follow`"
                 }
                 "--downward" => {
-                    "a section's other side is that of its negative, such as --section \"-v=0\"; leave it out"
+                    "a general system's orbit closes at rising crossings; for falling ones negate the section, such as --section \"-v=0\", and leave it out"
                 }
                 "--t-end" => "--settle and --longest-return say how long motion is followed; leave it out",
                 _ => "an orbit is its point, period and multipliers; leave it out",

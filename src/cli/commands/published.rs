@@ -41,7 +41,7 @@ pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool, jso
     let known: Vec<&str> = figures.iter().flat_map(|f| &f.pictures).map(|p| p.name.as_str()).collect();
     if !known.iter().any(|name| !named(name).is_empty()) {
         return Err(CliError::Usage(format!(
-            "{}: no picture named like ours is in this folder; ours are called {}",
+            "{}: no picture in this folder has a name of one of ours; ours are called {}",
             folder.display(),
             known.iter().map(|n| format!("{n}.png")).collect::<Vec<_>>().join(", ")
         )));
@@ -76,10 +76,10 @@ pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool, jso
         }
     }
     for other in published.iter().filter(|f| !known.iter().any(|n| f.name() == format!("{n}.png"))) {
-        say(passed_over(&other.path, "not named like one of the pictures to check, passed over"))?;
+        say(passed_over(&other.path, "not named like one of the pictures to check, skipped"))?;
     }
     for link in &tree.dangling {
-        say(passed_over(link, "a link to nothing, passed over"))?;
+        say(passed_over(link, "a broken link, skipped"))?;
     }
     let checked = findings.iter().filter(|f| f.checked).count();
     let failures = findings.iter().filter(|f| f.checked && f.criterion.is_none()).count();

@@ -114,7 +114,7 @@ impl Arguments {
         if !two && self.alike.is_some() {
             return Err(CliError::no_effect(
                 "--alike",
-                "an orbit diagram compares nothing; leave it out, or give --over twice",
+                "it says which attractors of a map count as one, and an orbit diagram compares none; leave it out, or give --over twice",
             ));
         }
         if !(alike > 0.0 && alike.is_finite()) {
