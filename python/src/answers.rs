@@ -1,5 +1,6 @@
 //! Jobs asked from Python, and their answers as NumPy arrays.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -10,7 +11,7 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 use twofold::cli::CliError;
 use twofold::cli::asked::{Asked, asked};
-use twofold::integrate::Watch;
+use twofold::integrate::Monitor;
 use twofold::integrate::filippov::ExitRule;
 use twofold::job::question::question_hash;
 use twofold::job::spec::{RunSpec, SwitchSpec};
@@ -134,10 +135,10 @@ struct Counted<'a> {
     runs: u64,
 }
 
-impl Watch for Counted<'_> {
-    fn reached(&self, finished: f64) -> bool {
+impl Monitor for Counted<'_> {
+    fn reached(&self, finished: f64) -> ControlFlow<()> {
         self.work.finished(finished as usize, self.runs as usize);
-        !self.work.stopped()
+        if self.work.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Work beside Python: on a thread of its own, with the GIL released, while this thread listens for Ctrl-C and shows progress.
 
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,8 +9,8 @@ use std::time::Duration;
 
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
-use twofold::integrate::Watch;
-use twofold::job::{JobError, JobWatch, Progress};
+use twofold::integrate::Monitor;
+use twofold::job::{JobError, JobMonitor, Progress};
 
 use crate::errors;
 
@@ -56,21 +57,21 @@ struct Following<'a> {
     extent: f64,
 }
 
-impl Watch for Following<'_> {
-    fn reached(&self, t: f64) -> bool {
+impl Monitor for Following<'_> {
+    fn reached(&self, t: f64) -> ControlFlow<()> {
         if !self.work.counted.load(Ordering::Relaxed) {
             self.work.share.store((t / self.extent).to_bits(), Ordering::Relaxed);
         }
-        !self.work.stopped()
+        if self.work.stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
 
-impl JobWatch for Following<'_> {
+impl JobMonitor for Following<'_> {
     fn done(self: Box<Self>, _: &str) {}
 }
 
 impl Progress for Work {
-    fn begin<'a>(&'a self, label: &str, extent: f64) -> Box<dyn JobWatch + 'a> {
+    fn begin<'a>(&'a self, label: &str, extent: f64) -> Box<dyn JobMonitor + 'a> {
         if !self.counted.load(Ordering::Relaxed) {
             self.says(label);
         }

@@ -1,6 +1,7 @@
 //! Progress on standard error: bars on a terminal, plain lines elsewhere, nothing with `--quiet`.
 
 use std::io::{self, IsTerminal};
+use std::ops::ControlFlow;
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -9,7 +10,7 @@ use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::Exit;
 use super::interrupt::Grace;
 use super::speak::{complain, harmless};
-use crate::integrate::Watch;
+use crate::integrate::Monitor;
 use crate::job;
 
 /// The bars on the screen, if there are any: a signal clears them away.
@@ -117,7 +118,7 @@ pub struct RunProgress<'a> {
 }
 
 impl job::Progress for Progress {
-    fn begin<'a>(&'a self, label: &str, extent: f64) -> Box<dyn job::JobWatch + 'a> {
+    fn begin<'a>(&'a self, label: &str, extent: f64) -> Box<dyn job::JobMonitor + 'a> {
         Box::new(self.run(label, extent))
     }
 
@@ -126,7 +127,7 @@ impl job::Progress for Progress {
     }
 }
 
-impl job::JobWatch for RunProgress<'_> {
+impl job::JobMonitor for RunProgress<'_> {
     fn done(self: Box<Self>, what: &str) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
@@ -139,12 +140,12 @@ impl job::JobWatch for RunProgress<'_> {
     }
 }
 
-impl Watch for RunProgress<'_> {
-    fn reached(&self, t: f64) -> bool {
+impl Monitor for RunProgress<'_> {
+    fn reached(&self, t: f64) -> ControlFlow<()> {
         if let Some(bar) = &self.bar {
             bar.set_position((t / self.t_end * RESOLUTION as f64) as u64);
         }
-        self.progress.asked_to_stop().is_none()
+        if self.progress.asked_to_stop().is_none() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     }
 }
 
@@ -226,7 +227,7 @@ impl<'a> Tally<'a> {
 }
 
 impl job::Progress for Tally<'_> {
-    fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn job::JobWatch + 'a> {
+    fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn job::JobMonitor + 'a> {
         Box::new(Silent(self.progress))
     }
 }
@@ -234,13 +235,13 @@ impl job::Progress for Tally<'_> {
 /// Shows nothing, and stops when the user asks for it.
 struct Silent<'a>(&'a Progress);
 
-impl Watch for Silent<'_> {
-    fn reached(&self, _: f64) -> bool {
-        self.0.asked_to_stop().is_none()
+impl Monitor for Silent<'_> {
+    fn reached(&self, _: f64) -> ControlFlow<()> {
+        if self.0.asked_to_stop().is_none() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     }
 }
 
-impl job::JobWatch for Silent<'_> {
+impl job::JobMonitor for Silent<'_> {
     fn done(self: Box<Self>, _: &str) {}
 }
 

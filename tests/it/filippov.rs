@@ -2,6 +2,7 @@
 #![allow(clippy::disallowed_methods)] // exact solutions are compared to tolerances, not hashed
 
 use nalgebra::{SVector, vector};
+use std::ops::ControlFlow;
 
 use crate::claims::Reads;
 use twofold::integrate::filippov::two_fold::SlidingAtTwoFold;
@@ -9,7 +10,7 @@ use twofold::integrate::filippov::{
     EventKind, ExitRule, FilippovError, FilippovOptions, FunnelGrid, Mode, Side, SlidingLaw, Trajectory, connect,
     funnel, history, run, run_watched,
 };
-use twofold::integrate::{StopReason, Tolerance, Watch};
+use twofold::integrate::{Monitor, StopReason, Tolerance};
 use twofold::system::{Bound, Caricature, PiecewiseSmooth, System, Wheel};
 
 /// A built-in system with these parameters.
@@ -763,9 +764,9 @@ fn the_discontinuous_wheel_fills_a_box_like_the_smoothed_wheels() {
 #[test]
 fn a_run_that_is_cut_short_says_why() {
     struct Refuses;
-    impl Watch for Refuses {
-        fn reached(&self, _: f64) -> bool {
-            false
+    impl Monitor for Refuses {
+        fn reached(&self, _: f64) -> ControlFlow<()> {
+            ControlFlow::Break(())
         }
     }
     let n = invisible(-1.2, -1.4);
@@ -779,7 +780,7 @@ fn a_run_that_is_cut_short_says_why() {
 
     let mut out = Trajectory::new(1);
     let cut = run_watched(&n, start, 100.0, &FilippovOptions::default(), ExitRule::All, &mut out, &Refuses).unwrap();
-    assert_eq!(cut.stop, StopReason::Watch);
+    assert_eq!(cut.stop, StopReason::Cancelled);
 
     let mut out = Trajectory::new(1).until_events(1);
     let seen = run(&n, start, 100.0, &FilippovOptions::default(), ExitRule::All, &mut out).unwrap();

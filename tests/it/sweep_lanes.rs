@@ -1,12 +1,13 @@
 //! Rows of a sweep that share lanes against the same rows alone.
 
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use twofold::integrate::ensemble::InstructionSet;
-use twofold::integrate::{Kick, KickLaw, Schedule, Watch};
+use twofold::integrate::{Kick, KickLaw, Monitor, Schedule};
 use twofold::job::spec::*;
 use twofold::job::sweep::{Axis, Draws, Row, Sweep};
-use twofold::job::{JobError, JobWatch, Progress};
+use twofold::job::{JobError, JobMonitor, Progress};
 use twofold::system::{Caricature, Definition, System, Transition};
 
 fn run(system: System, t_end: f64) -> RunSpec {
@@ -191,7 +192,7 @@ fn rows_wait_for_exponents_together() {
 #[derive(Default)]
 struct Exponents(AtomicU64);
 impl Progress for Exponents {
-    fn begin<'a>(&'a self, label: &str, _: f64) -> Box<dyn JobWatch + 'a> {
+    fn begin<'a>(&'a self, label: &str, _: f64) -> Box<dyn JobMonitor + 'a> {
         self.0.fetch_add(u64::from(label == "exponents side by side"), Ordering::Relaxed);
         Box::new(())
     }
@@ -200,32 +201,37 @@ impl Progress for Exponents {
 /// Stops exponents.
 struct NoExponents;
 impl Progress for NoExponents {
-    fn begin<'a>(&'a self, label: &str, _: f64) -> Box<dyn JobWatch + 'a> {
+    fn begin<'a>(&'a self, label: &str, _: f64) -> Box<dyn JobMonitor + 'a> {
         if label.contains("exponent") { Box::new(Never) } else { Box::new(()) }
     }
 }
 struct Never;
-impl Watch for Never {
-    fn reached(&self, _: f64) -> bool {
-        false
+impl Monitor for Never {
+    fn reached(&self, _: f64) -> ControlFlow<()> {
+        ControlFlow::Break(())
     }
 }
-impl JobWatch for Never {
+impl JobMonitor for Never {
     fn done(self: Box<Self>, _: &str) {}
 }
 
 /// Stops after so many questions.
 struct Refuses(AtomicU64);
-impl Watch for &Refuses {
-    fn reached(&self, _: f64) -> bool {
-        self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| Some(n.saturating_sub(1))).is_ok_and(|n| n > 1)
+impl Monitor for &Refuses {
+    fn reached(&self, _: f64) -> ControlFlow<()> {
+        if self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| Some(n.saturating_sub(1))).is_ok_and(|n| n > 1)
+        {
+            ControlFlow::Continue(())
+        } else {
+            ControlFlow::Break(())
+        }
     }
 }
-impl JobWatch for &Refuses {
+impl JobMonitor for &Refuses {
     fn done(self: Box<Self>, _: &str) {}
 }
 impl Progress for Refuses {
-    fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn JobWatch + 'a> {
+    fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn JobMonitor + 'a> {
         Box::new(self)
     }
 }

@@ -10,7 +10,7 @@ use super::lyapunov::{Disturbed, Estimate, LyapunovOptions, averaged, begin};
 use twofold_integrate::delay::{
     Carry, DelayError, Delayed, LateSwitch, Own, Sides, TangentStepper, Varied, WithTangent,
 };
-use twofold_integrate::{Failure, Method, Watch};
+use twofold_integrate::{Failure, Method, Monitor};
 use twofold_system::{PiecewiseSmooth, System};
 
 /// The largest exponent of the orbit of `x0` under `switch`, `M` being 2 `N`; `data` describes the system. Without kicks, or with those of the
@@ -24,7 +24,7 @@ pub fn late_estimate<P, const N: usize, const M: usize>(
     switch: LateSwitch,
     x0: SVector<f64, N>,
     settings: &LyapunovOptions,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
 ) -> Result<Estimate, Failure>
 where
     for<'a> Varied<'a, P>: PiecewiseSmooth<M> + Carry<M> + Clone,
@@ -33,20 +33,20 @@ where
     let varied = Varied(system);
     let delayed = Delayed { sides: Sides::varied(&varied, data), switch, x0: begin(&x0) };
     let refused = |error: DelayError| Failure::NotApplicable { method: Method::Dopri5.name(), why: error.to_string() };
-    delayed.with_tangent(settings.tolerance, Waiting { settings, watch }).map_err(refused)?
+    delayed.with_tangent(settings.tolerance, Waiting { settings, monitor }).map_err(refused)?
 }
 
 /// An estimate as a computation over any stepper.
 struct Waiting<'a> {
     settings: &'a LyapunovOptions,
-    watch: &'a dyn Watch,
+    monitor: &'a dyn Monitor,
 }
 
 impl<const M: usize> WithTangent<M> for Waiting<'_> {
     type Answer = Result<Estimate, Failure>;
     fn with<S: TangentStepper<M>>(self, stepper: S) -> Self::Answer {
         let mut orbit = Late { stepper, displaced: None };
-        averaged(&mut orbit, M / 2, self.settings, self.watch)
+        averaged(&mut orbit, M / 2, self.settings, self.monitor)
     }
 }
 

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use super::tangent::Tangent;
 use twofold_integrate::ensemble::{Carried, Common, EnsembleRun, InstructionSet, Tolerances, ensemble_watched};
 use twofold_integrate::{
-    Dopri5, DriveOptions, Failure, Flow, Kick, Kicker, Observer, Step, StepCap, Stepper, Tolerance, Watch,
+    Dopri5, DriveOptions, Failure, Flow, Kick, Kicker, Monitor, Observer, Step, StepCap, Stepper, Tolerance,
 };
 use twofold_num::elementary::{ln, sqrt};
 use twofold_num::fit::{line, mean};
@@ -165,12 +165,12 @@ pub fn largest_watched<const N: usize, const M: usize, T: VectorField<M>>(
     x0: SVector<f64, N>,
     kicked_states: usize,
     settings: &LyapunovOptions,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
 ) -> Result<Exponent, Failure> {
-    Ok(estimate_along(tangent, x0, kicked_states, settings, watch)?.exponent)
+    Ok(estimate_along(tangent, x0, kicked_states, settings, monitor)?.exponent)
 }
 
-/// [`largest_along`] with its interval, reporting to `watch` how far it has come. Where `watch` refuses, the mean is over the blocks that are finished: its
+/// [`largest_along`] with its interval, reporting to `monitor` how far it has come. Where `monitor` refuses, the mean is over the blocks that are finished: its
 /// duration says how long that was. There is no number if they are fewer than eight of the 64.
 ///
 /// # Errors
@@ -180,11 +180,11 @@ pub fn estimate_along<const N: usize, const M: usize, T: VectorField<M>>(
     x0: SVector<f64, N>,
     kicked_states: usize,
     settings: &LyapunovOptions,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
 ) -> Result<Estimate, Failure> {
     const { assert!(M == 2 * N) };
     let stepper = Dopri5::<M>::new(settings.tolerance);
-    averaged(&mut Alone { tangent, stepper, t: 0.0, state: begin(&x0) }, kicked_states, settings, watch)
+    averaged(&mut Alone { tangent, stepper, t: 0.0, state: begin(&x0) }, kicked_states, settings, monitor)
 }
 
 /// An orbit with a disturbance, `M` numbers.
@@ -246,7 +246,7 @@ pub(super) fn averaged<const M: usize>(
     orbit: &mut dyn Disturbed<M>,
     kicked_states: usize,
     settings: &LyapunovOptions,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
 ) -> Result<Estimate, Failure> {
     let mut kicker = settings.kick.map(|kick| Kicker::new(kick, kicked_states));
     let mut kicks = 1_u64;
@@ -273,7 +273,7 @@ pub(super) fn averaged<const M: usize>(
                         orbit.begin(stop, settings.max_step)?;
                     }
                 }
-                if orbit.steps().is_multiple_of(4096) && !watch.reached(t) {
+                if orbit.steps().is_multiple_of(4096) && monitor.reached(t).is_break() {
                     return Ok(estimate_of(&rates, settings, t, orbit.steps()));
                 }
                 if orbit.steps() >= settings.max_steps {
@@ -297,7 +297,7 @@ pub(super) fn averaged<const M: usize>(
 }
 
 /// [`largest_watched`] for many orbits side by side in the lanes of vector registers: of each the number that it has alone, bit for bit, in the
-/// order of `starts`; `tangents` has a run for each. There are no kicks. Nothing if `watch` refuses.
+/// order of `starts`; `tangents` has a run for each. There are no kicks. Nothing if `monitor` refuses.
 ///
 /// # Panics
 /// If `settings` have kicks, or `tangents` are of fewer runs.
@@ -306,7 +306,7 @@ pub fn largest_side_by_side<const N: usize, const M: usize, E: BatchedField<M>>(
     tangents: &E,
     starts: &[SVector<f64, N>],
     settings: &LyapunovOptions,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
 ) -> Option<Vec<Result<Exponent, Failure>>> {
     const { assert!(M == 2 * N) };
     assert!(settings.kick.is_none(), "orbits without kicks");
@@ -317,7 +317,7 @@ pub fn largest_side_by_side<const N: usize, const M: usize, E: BatchedField<M>>(
     let runs: Vec<EnsembleRun<M>> = starts.iter().map(|x0| EnsembleRun { start: begin(x0), options }).collect();
     let carried = Carried { first: N, range: [1.0 / RANGE, RANGE], stops: &stops };
     let tolerances = Tolerances::All(tolerance);
-    let common = Common { tolerances, plane: None, corners: None, carried: Some(carried), watch };
+    let common = Common { tolerances, plane: None, corners: None, carried: Some(carried), monitor };
     let growth = |run: usize| Growth {
         carried,
         growth: -ln(carried.length(&runs[run].start)),

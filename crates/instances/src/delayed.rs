@@ -4,7 +4,7 @@ use nalgebra::SVector;
 use twofold_analyse::late_lyapunov::late_estimate;
 use twofold_analyse::lyapunov::{Estimate, LyapunovOptions};
 use twofold_integrate::delay::{DelayError, Delayed, LateSwitch, Own, Sides};
-use twofold_integrate::{Failure, Observer, Summary, Watch};
+use twofold_integrate::{Failure, Monitor, Observer, Summary};
 use twofold_system::{BindError, Bound, Caricature, Compiled, PiecewiseSmooth, System};
 
 use crate::orbit::{How, Waiting};
@@ -22,7 +22,7 @@ pub trait Late<const N: usize> {
         x0: SVector<f64, N>,
         how: &How,
         observer: &mut dyn Observer<N>,
-        watch: &dyn Watch,
+        monitor: &dyn Monitor,
     ) -> Result<Result<Summary<N>, Failure>, DelayError>;
 
     /// As [`late_estimate`].
@@ -35,7 +35,7 @@ pub trait Late<const N: usize> {
         switch: LateSwitch,
         x0: SVector<f64, N>,
         settings: &LyapunovOptions,
-        watch: &dyn Watch,
+        monitor: &dyn Monitor,
     ) -> Result<Estimate, Failure>;
 }
 
@@ -46,11 +46,11 @@ fn late_orbit<P: PiecewiseSmooth<N> + Clone, const N: usize>(
     x0: SVector<f64, N>,
     how: &How,
     observer: &mut dyn Observer<N>,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
 ) -> Result<Result<Summary<N>, Failure>, DelayError> {
     let How { method, tolerance, order, options, .. } = *how;
     let delayed = Delayed { sides: Sides::new(system, data), switch, x0 };
-    delayed.with_stepper(method, order, tolerance, Waiting { field: &Own, x0, options, observer, watch })
+    delayed.with_stepper(method, order, tolerance, Waiting { field: &Own, x0, options, observer, monitor })
 }
 
 macro_rules! late {
@@ -63,9 +63,9 @@ macro_rules! late {
                 x0: SVector<f64, $n>,
                 how: &How,
                 observer: &mut dyn Observer<$n>,
-                watch: &dyn Watch,
+                monitor: &dyn Monitor,
             ) -> Result<Result<Summary<$n>, Failure>, DelayError> {
-                late_orbit(self, data, switch, x0, how, observer, watch)
+                late_orbit(self, data, switch, x0, how, observer, monitor)
             }
             fn late_growth(
                 &self,
@@ -73,9 +73,9 @@ macro_rules! late {
                 switch: LateSwitch,
                 x0: SVector<f64, $n>,
                 settings: &LyapunovOptions,
-                watch: &dyn Watch,
+                monitor: &dyn Monitor,
             ) -> Result<Estimate, Failure> {
-                late_estimate::<_, $n, { 2 * $n }>(self, data, switch, x0, settings, watch)
+                late_estimate::<_, $n, { 2 * $n }>(self, data, switch, x0, settings, monitor)
             }
         })*
     };

@@ -4,7 +4,7 @@ use nalgebra::SVector;
 use twofold_analyse::SectionRecorder;
 use twofold_analyse::lyapunov::{self, Exponent};
 use twofold_integrate::ensemble::{Common, End, EnsembleRun, InstructionSet, ensemble_in_vectors};
-use twofold_integrate::{Failure, Watch};
+use twofold_integrate::{Failure, Monitor};
 use twofold_system::{Caricature, Compiled, ParameterBatch, Smoothed, System, Transition};
 
 /// The end of a run among others, and its section.
@@ -55,7 +55,7 @@ pub trait Exponents<const N: usize> {
         set: InstructionSet,
         starts: &[SVector<f64, N>],
         settings: &lyapunov::LyapunovOptions,
-        watch: &dyn Watch,
+        monitor: &dyn Monitor,
     ) -> Option<Vec<Result<Exponent, Failure>>>;
 }
 
@@ -67,9 +67,9 @@ macro_rules! exponents {
                 set: InstructionSet,
                 starts: &[SVector<f64, $n>],
                 settings: &lyapunov::LyapunovOptions,
-                watch: &dyn Watch,
+                monitor: &dyn Monitor,
             ) -> Option<Vec<Result<Exponent, Failure>>> {
-                lyapunov::largest_side_by_side::<$n, $m, _>(set, self, starts, settings, watch)
+                lyapunov::largest_side_by_side::<$n, $m, _>(set, self, starts, settings, monitor)
             }
         })*
     };

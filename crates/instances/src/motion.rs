@@ -6,7 +6,7 @@ use twofold_analyse::floquet::{self, ReturnPlane, Returned};
 use twofold_analyse::limit::{
     AfterVisit, AfterVisitQuestion, Convergence, ConvergenceQuestion, after_visit, convergence,
 };
-use twofold_integrate::Watch;
+use twofold_integrate::Monitor;
 use twofold_integrate::filippov::{
     ExitRule, Faces, FilippovError, FilippovObserver, FilippovOptions, FilippovSummary, Funnel, FunnelGrid, funnel,
     run_two_surfaces, run_watched,
@@ -29,7 +29,7 @@ pub trait Motions<const N: usize> {
         settings: &FilippovOptions,
         exit: ExitRule,
         observer: &mut dyn FilippovObserver<N>,
-        watch: &dyn Watch,
+        monitor: &dyn Monitor,
     ) -> Result<FilippovSummary<N>, FilippovError>;
     /// As [`funnel()`].
     ///
@@ -66,9 +66,9 @@ macro_rules! motions {
                 settings: &FilippovOptions,
                 exit: ExitRule,
                 observer: &mut dyn FilippovObserver<$n>,
-                watch: &dyn Watch,
+                monitor: &dyn Monitor,
             ) -> Result<FilippovSummary<$n>, FilippovError> {
-                run_watched(self, x0, t_end, settings, exit, observer, watch)
+                run_watched(self, x0, t_end, settings, exit, observer, monitor)
             }
             fn funnel(
                 &self,
@@ -151,7 +151,7 @@ pub trait TwoSurfaces<const N: usize> {
         settings: &FilippovOptions,
         exit: ExitRule,
         observer: &mut dyn FilippovObserver<N>,
-        watch: &dyn Watch,
+        monitor: &dyn Monitor,
     ) -> Result<FilippovSummary<N>, FilippovError>;
 }
 
@@ -165,9 +165,9 @@ macro_rules! two_surfaces {
                 settings: &FilippovOptions,
                 exit: ExitRule,
                 observer: &mut dyn FilippovObserver<$n>,
-                watch: &dyn Watch,
+                monitor: &dyn Monitor,
             ) -> Result<FilippovSummary<$n>, FilippovError> {
-                run_two_surfaces(self, x0, t_end, settings, exit, observer, watch)
+                run_two_surfaces(self, x0, t_end, settings, exit, observer, monitor)
             }
         })*
     };

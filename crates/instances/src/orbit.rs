@@ -4,8 +4,8 @@ use nalgebra::SVector;
 use twofold_analyse::digits::{Digits, DigitsQuestion, digits};
 use twofold_analyse::passage::{PassageAnswer, PassageQuestion, passage};
 use twofold_integrate::{
-    DriveOptions, Failure, MOST_STATES, Method, Observer, PRECISIONS, Stepper, Summary, Tolerance, Watch, WithStepper,
-    drive, with_extended,
+    DriveOptions, Failure, MOST_STATES, Method, Monitor, Observer, PRECISIONS, Stepper, Summary, Tolerance,
+    WithStepper, drive, with_extended,
 };
 use twofold_system::{
     BindError, BoundField, Caricature, Compiled, Field, Hysteretic, Relaxation, Smoothed, System, Transition,
@@ -38,7 +38,7 @@ pub trait Orbits<const N: usize>: Sync {
         x0: SVector<f64, N>,
         how: &How,
         observer: &mut dyn Observer<N>,
-        watch: &dyn Watch,
+        monitor: &dyn Monitor,
     ) -> Result<Summary<N>, Failure>;
 }
 
@@ -48,14 +48,14 @@ pub(crate) struct Waiting<'a, F, const N: usize> {
     pub(crate) x0: SVector<f64, N>,
     pub(crate) options: DriveOptions,
     pub(crate) observer: &'a mut dyn Observer<N>,
-    pub(crate) watch: &'a dyn Watch,
+    pub(crate) monitor: &'a dyn Monitor,
 }
 
 impl<F: VectorField<N>, const N: usize> WithStepper<N> for Waiting<'_, F, N> {
     type Answer = Result<Summary<N>, Failure>;
     fn with<M: Stepper<N>>(self, mut stepper: M) -> Self::Answer {
-        let Self { field, x0, options, observer, watch } = self;
-        drive(field, x0, &options, &mut stepper, observer, watch)
+        let Self { field, x0, options, observer, monitor } = self;
+        drive(field, x0, &options, &mut stepper, observer, monitor)
     }
 }
 
@@ -64,10 +64,10 @@ fn orbit<F: VectorField<N>, const N: usize>(
     x0: SVector<f64, N>,
     how: &How,
     observer: &mut dyn Observer<N>,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
 ) -> Result<Summary<N>, Failure> {
     let How { method, tolerance, precision, order, options } = *how;
-    let waiting = Waiting { field, x0, options, observer, watch };
+    let waiting = Waiting { field, x0, options, observer, monitor };
     match (precision, order) {
         (None, None) => method.with_stepper(tolerance, waiting),
         _ => with_extended(precision.unwrap_or(PRECISIONS[0]), order, tolerance, waiting),
@@ -80,10 +80,10 @@ fn orbit_of_many<F: VectorField<N>, const N: usize>(
     x0: SVector<f64, N>,
     how: &How,
     observer: &mut dyn Observer<N>,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
 ) -> Result<Summary<N>, Failure> {
     let How { method, tolerance, options, .. } = *how;
-    let found = method.with_common_stepper(tolerance, Waiting { field, x0, options, observer, watch });
+    let found = method.with_common_stepper(tolerance, Waiting { field, x0, options, observer, monitor });
     found.unwrap_or_else(|| {
         let why = format!("it has {N} states, and the method is there for up to {MOST_STATES}");
         Err(Failure::NotApplicable { method: method.name(), why })
@@ -98,9 +98,9 @@ macro_rules! orbits {
                 x0: SVector<f64, $n>,
                 how: &How,
                 observer: &mut dyn Observer<$n>,
-                watch: &dyn Watch,
+                monitor: &dyn Monitor,
             ) -> Result<Summary<$n>, Failure> {
-                $by(self, x0, how, observer, watch)
+                $by(self, x0, how, observer, monitor)
             }
         })*
     };

@@ -4,7 +4,7 @@ use nalgebra::SVector;
 use twofold_analyse::floquet::{self, ReturnPlane, Returned};
 use twofold_analyse::lyapunov::{self, Estimate};
 use twofold_analyse::tangent::Tangent;
-use twofold_integrate::{Failure, Watch};
+use twofold_integrate::{Failure, Monitor};
 use twofold_system::{BoundField, Caricature, Hysteretic, Smoothed};
 
 /// An equation of `N` states with one tangent vector.
@@ -18,7 +18,7 @@ pub trait Growth<const N: usize> {
         x0: SVector<f64, N>,
         kicked_states: usize,
         settings: &lyapunov::LyapunovOptions,
-        watch: &dyn Watch,
+        monitor: &dyn Monitor,
     ) -> Result<Estimate, Failure>;
 }
 
@@ -30,9 +30,9 @@ macro_rules! growth {
                 x0: SVector<f64, $n>,
                 kicked_states: usize,
                 settings: &lyapunov::LyapunovOptions,
-                watch: &dyn Watch,
+                monitor: &dyn Monitor,
             ) -> Result<Estimate, Failure> {
-                lyapunov::estimate_along::<$n, $m, _>(self, x0, kicked_states, settings, watch)
+                lyapunov::estimate_along::<$n, $m, _>(self, x0, kicked_states, settings, monitor)
             }
         })*
     };

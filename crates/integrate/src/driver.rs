@@ -2,6 +2,7 @@
 
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
 
 use super::schedule::{Kicker, Schedule, StepCap};
 use super::step::{Failure, Flow, Statistics, Step, Stepper, StopReason};
@@ -29,15 +30,15 @@ impl<const N: usize> Observer<N> for Ignore {
     }
 }
 
-/// Receives how far a run has come, for progress displays. Called often; must be cheap.
-pub trait Watch: Sync {
-    /// The run has reached time `t`. `false` asks it to stop.
-    fn reached(&self, t: f64) -> bool;
+/// Receives a run's progress and may stop it. Called often; must be cheap.
+pub trait Monitor: Sync {
+    /// The run has reached time `t`. [`ControlFlow::Break`] asks it to stop.
+    fn reached(&self, t: f64) -> ControlFlow<()>;
 }
 
-impl Watch for () {
-    fn reached(&self, _: f64) -> bool {
-        true
+impl Monitor for () {
+    fn reached(&self, _: f64) -> ControlFlow<()> {
+        ControlFlow::Continue(())
     }
 }
 
@@ -105,13 +106,13 @@ pub fn drive<const N: usize, F, M>(
     options: &DriveOptions,
     stepper: &mut M,
     observer: &mut dyn Observer<N>,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
 ) -> Result<Summary<N>, Failure>
 where
     F: VectorField<N>,
     M: Stepper<N>,
 {
-    drive_any(&mut Pair { field, stepper }, x0, options, observer, watch)
+    drive_any(&mut Pair { field, stepper }, x0, options, observer, monitor)
 }
 
 /// A method with its equation: what the loop asks of both, whichever they are, so that it is compiled once a dimension.
@@ -155,7 +156,7 @@ fn drive_any<const N: usize>(
     x0: SVector<f64, N>,
     options: &DriveOptions,
     observer: &mut dyn Observer<N>,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
 ) -> Result<Summary<N>, Failure> {
     let DriveOptions { t_end, ref schedule, step_cap, max_steps, kicked_states } = *options;
     let mut kicker = schedule.kick.map(|kick| Kicker::new(kick, kicked_states));
@@ -183,8 +184,8 @@ fn drive_any<const N: usize>(
             let steps = pair.statistics().steps;
             if flow == Flow::Stop {
                 stop = StopReason::Observer;
-            } else if steps.is_multiple_of(4096) && !watch.reached(t) && t < t_end {
-                stop = StopReason::Watch;
+            } else if steps.is_multiple_of(4096) && monitor.reached(t).is_break() && t < t_end {
+                stop = StopReason::Cancelled;
             } else if steps >= max_steps && t < t_end {
                 stop = StopReason::StepBudget;
             }
@@ -200,7 +201,7 @@ fn drive_any<const N: usize>(
             x = kicked;
         }
     }
-    watch.reached(t);
+    let _ = monitor.reached(t);
     Ok(Summary { t, x, statistics: pair.statistics().clone(), most_steps_in_segment, stop })
 }
 
@@ -232,16 +233,16 @@ mod tests {
     }
 
     struct Refuses(AtomicBool);
-    impl Watch for Refuses {
-        fn reached(&self, _: f64) -> bool {
+    impl Monitor for Refuses {
+        fn reached(&self, _: f64) -> ControlFlow<()> {
             self.0.store(true, Ordering::Relaxed);
-            false
+            ControlFlow::Break(())
         }
     }
 
-    fn run(options: DriveOptions, observer: &mut dyn Observer<2>, watch: &dyn Watch) -> Summary<2> {
+    fn run(options: DriveOptions, observer: &mut dyn Observer<2>, monitor: &dyn Monitor) -> Summary<2> {
         let mut stepper = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
-        drive(&Turning, vector![1.0, 0.0], &options, &mut stepper, observer, watch).unwrap()
+        drive(&Turning, vector![1.0, 0.0], &options, &mut stepper, observer, monitor).unwrap()
     }
 
     #[test]
@@ -268,10 +269,10 @@ mod tests {
         let refuses = Refuses(AtomicBool::new(false));
         let cut =
             run(DriveOptions { step_cap: StepCap::Absolute(1e-3), ..DriveOptions::to(10.0) }, &mut Ignore, &refuses);
-        assert_eq!((cut.stop, cut.statistics.steps), (StopReason::Watch, 4096));
+        assert_eq!((cut.stop, cut.statistics.steps), (StopReason::Cancelled, 4096));
         assert!(cut.clone().within_budget().is_ok(), "only the budget is an error");
 
-        // A budget that is just enough is enough, and a watch that refuses at the very end has cut nothing short.
+        // A budget that is just enough is enough, and a monitor that refuses at the very end has cut nothing short.
         let just =
             run(DriveOptions { max_steps: whole.statistics.steps, ..DriveOptions::to(10.0) }, &mut Ignore, &refuses);
         assert_eq!(just.stop, StopReason::EndTime);

@@ -19,7 +19,7 @@ use pulp::{Scalar, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
 use super::dopri5::{Dense, Dopri5, control, tableau::*};
-use super::driver::{DriveOptions, Observer, Summary, Watch};
+use super::driver::{DriveOptions, Monitor, Observer, Summary};
 use super::guard::{Gates, SMALL_BEND, Stage, Stages};
 use super::schedule::{Kicker, Segment};
 use super::step::{Failure, Flow, Statistics, Step, Stepper, StopReason, Tolerance};
@@ -79,7 +79,7 @@ impl Tolerances<'_> {
 pub struct Common<'a, const N: usize> {
     /// Tolerances of the local error.
     pub tolerances: Tolerances<'a>,
-    /// The plane that observers watch; without one they receive kicks only.
+    /// The plane that observers monitor; without one they receive kicks only.
     pub plane: Option<SectionPlane>,
     /// A corner for each run, which ends as if its observer had stopped it ([`StopReason::Observer`]) at the first step's end where each component of
     /// the state is above the corner's.
@@ -87,7 +87,7 @@ pub struct Common<'a, const N: usize> {
     /// A vector that each run carries along, as part of its state.
     pub carried: Option<Carried<'a>>,
     /// Asked at intervals whether to go on; if not, unfinished runs are abandoned.
-    pub watch: &'a dyn Watch,
+    pub monitor: &'a dyn Monitor,
 }
 
 /// A tangent vector that each run carries: the components of the state from `first` on. When its
@@ -181,7 +181,7 @@ where
     O: Observer<N>,
 {
     let mut ends: Vec<Option<End<O, N>>> = runs.iter().map(|_| None).collect();
-    let common = Common { tolerances: Tolerances::All(tolerance), plane, corners: None, carried: None, watch: &() };
+    let common = Common { tolerances: Tolerances::All(tolerance), plane, corners: None, carried: None, monitor: &() };
     ensemble_watched(set, equations, runs, common, observer, &mut |run, end| ends[run] = Some(end));
     ends.into_iter().flatten().collect()
 }
@@ -271,7 +271,7 @@ impl<'a, E: BatchedField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> 
     }
 }
 
-/// The watch is asked after so many steps, as [`drive`](super::drive) asks it.
+/// The monitor is asked after so many steps, as [`drive`](super::drive) asks it.
 const STEPS_UNWATCHED: u32 = 4096;
 
 impl<E: BatchedField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, const K: usize> WithSimd
@@ -312,7 +312,7 @@ impl<E: BatchedField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, cons
                 unwatched += 1;
                 if unwatched == STEPS_UNWATCHED {
                     unwatched = 0;
-                    if !common.watch.reached(get(&state.t, 0)) {
+                    if common.monitor.reached(get(&state.t, 0)).is_break() {
                         return;
                     }
                 }

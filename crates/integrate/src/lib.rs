@@ -47,7 +47,7 @@ pub mod taylor;
 mod tests;
 
 pub use dopri5::Dopri5;
-pub use driver::{DriveOptions, Ignore, Observer, Summary, Watch, drive};
+pub use driver::{DriveOptions, Ignore, Monitor, Observer, Summary, drive};
 pub use guard::Guarded;
 pub use layered::Layered;
 pub use lsoda::Lsoda;

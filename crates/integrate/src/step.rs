@@ -265,8 +265,9 @@ pub enum StopReason {
     EndTime,
     /// The observer asked to stop: it has what it wanted.
     Observer,
-    /// The watch asked to stop: somebody interrupted.
-    Watch,
+    /// The monitor asked to stop: the user interrupted the run.
+    #[serde(rename = "watch")]
+    Cancelled,
     /// The budget of steps is used up.
     StepBudget,
     /// The future is a set and nothing says which member to follow (Filippov motion only).

@@ -4,6 +4,7 @@
 //! Beside the frozen numbers each step is held against what an [`Interpolant`] promises, so that what is frozen makes sense.
 
 use std::fmt::Write;
+use std::ops::ControlFlow;
 
 use nalgebra::{SVector, vector};
 
@@ -640,9 +641,9 @@ fn lanes_tell_of_the_steps_that_may_meet_the_plane() {
 
 /// Asks to stop at the first question.
 struct Refuses;
-impl Watch for Refuses {
-    fn reached(&self, _: f64) -> bool {
-        false
+impl Monitor for Refuses {
+    fn reached(&self, _: f64) -> ControlFlow<()> {
+        ControlFlow::Break(())
     }
 }
 
@@ -737,7 +738,7 @@ fn lanes_are_runs_alone() {
                 plane,
                 corners: corners.as_deref(),
                 carried: None,
-                watch: &(),
+                monitor: &(),
             };
             let mut ends = vec![None; count];
             ensemble_watched(
@@ -757,7 +758,7 @@ fn lanes_are_runs_alone() {
                     assert_eq!(met, met_alone[often(i)], "run {i} of {count}, {set:?}");
                 }
             }
-            // A watch that refuses ends the unfinished runs; it is first asked after a number of
+            // A monitor that refuses ends the unfinished runs; it is first asked after a number of
             // steps.
             let mut finished = 0;
             let long = [EnsembleRun {
@@ -765,7 +766,7 @@ fn lanes_are_runs_alone() {
                 options: DriveOptions { step_cap: StepCap::Absolute(1e-3), ..DriveOptions::to(50.0) },
             }];
             let tolerances = Tolerances::All(size);
-            let common = Common { tolerances, plane: None, corners: None, carried: None, watch: &Refuses };
+            let common = Common { tolerances, plane: None, corners: None, carried: None, monitor: &Refuses };
             ensemble_watched(set, &field, &long, common, |_| Ignore, &mut |_, _| finished += 1);
             assert_eq!(finished, 0, "{set:?}");
             ensemble_watched(set, &field, &runs[..3], common, |_| Ignore, &mut |_, _| finished += 1);

@@ -59,7 +59,7 @@ impl From<StopReason> for Stop {
         match reason {
             StopReason::EndTime => Stop::Finished,
             StopReason::Observer => Stop::Found,
-            StopReason::Watch => Stop::Interrupted,
+            StopReason::Cancelled => Stop::Interrupted,
             StopReason::StepBudget => Stop::StepBudget,
             StopReason::SetValued => Stop::SetValued,
         }

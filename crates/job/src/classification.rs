@@ -14,7 +14,7 @@ use twofold_analyse::Direction;
 use twofold_analyse::attractor::{self, Evidence, SectionPoint, Thresholds, Verdict, classify};
 use twofold_analyse::lyapunov::{self, Exponent};
 use twofold_integrate::filippov::ExitRule;
-use twofold_integrate::{Schedule, Watch};
+use twofold_integrate::{Monitor, Schedule};
 
 /// The attractor of a run, classified from its section; with the largest exponent where no cycle
 /// captures the motion, and compared with noise-free runs where there is noise. Fact: `evidence`
@@ -86,7 +86,7 @@ impl Question for Classification {
         std::iter::once(self.run.clone()).chain(twins).map(|run| Arc::new(Run(run)) as _).collect()
     }
 
-    fn compute(&self, executor: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, executor: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let evidence = self.evidence(executor)?;
         Ok(Answer::of_tables(Vec::new()).with_fact("evidence", &evidence))
     }

@@ -10,7 +10,7 @@ use super::run::Run;
 use super::spec::RunSpec;
 use twofold_analyse::Sample;
 use twofold_analyse::divider::{DividerWalk, STRIDES, common_box};
-use twofold_integrate::Watch;
+use twofold_integrate::Monitor;
 
 /// Organisation of two runs' paths, and their overlap. Facts: `freshness` (share of each path's
 /// strides into new places) and `shared` ([`Shared`](twofold_analyse::divider::Shared)).
@@ -34,7 +34,7 @@ impl Question for PathComparison {
         Run(self.0.clone()).cost() + Run(self.1.clone()).cost()
     }
 
-    fn compute(&self, executor: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, executor: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let (a, b) = (path(executor, &self.0)?, path(executor, &self.1)?);
         let range = common_box([&a[..], &b[..]]);
         let (a, b) = (DividerWalk::new(&a, &range), DividerWalk::new(&b, &range));

@@ -9,7 +9,7 @@ use super::question::{JobError, Question};
 use super::table::{Column, Entry, Table};
 use twofold_analyse::digits::DigitsQuestion;
 use twofold_instances as instances;
-use twofold_integrate::Watch;
+use twofold_integrate::Monitor;
 use twofold_system::{System, Transition};
 
 /// Number of correct digits at each crossing of a plane, for several methods, compared with an
@@ -42,7 +42,7 @@ impl Question for MethodDigits {
         500.0 * self.compared.t_end * (1e-3 / self.eps).max(1.0)
     }
 
-    fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let found = instances::smoothed(&self.system, Transition::Tanh, self.eps)?.digits(&self.compared)?;
         let columns = [Column::words("method"), Column::numbers("tolerance"), Column::integers("crossing")];
         let mut rows =

@@ -8,29 +8,29 @@ use super::plan::QuestionPlan;
 use super::question::{AnyQuestion, JobError, Question, key};
 use super::store::{Kept, Store};
 use crate::record::Hash;
-use twofold_integrate::Watch;
+use twofold_integrate::Monitor;
 
 /// Displays the progress of jobs.
 pub trait Progress: Sync {
-    /// A job begins; its watch will be told values up to `extent`.
-    fn begin<'a>(&'a self, label: &str, extent: f64) -> Box<dyn JobWatch + 'a>;
+    /// A job begins; its monitor will be told values up to `extent`.
+    fn begin<'a>(&'a self, label: &str, extent: f64) -> Box<dyn JobMonitor + 'a>;
     /// One line for the user.
     fn line(&self, _text: &str) {}
 }
 
 /// Follows one job.
-pub trait JobWatch: Watch {
+pub trait JobMonitor: Monitor {
     /// The job is over; `what` is said of it.
     fn done(self: Box<Self>, what: &str);
 }
 
 impl Progress for () {
-    fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn JobWatch + 'a> {
+    fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn JobMonitor + 'a> {
         Box::new(())
     }
 }
 
-impl JobWatch for () {
+impl JobMonitor for () {
     fn done(self: Box<Self>, _: &str) {}
 }
 
@@ -128,11 +128,11 @@ impl<'a> Executor<'a> {
                 Kept::Damaged(why) => self.progress.line(&format!("{why}; computing it again")),
             }
         }
-        let watch = self.progress.begin(&question.label(), question.extent());
-        let answer = question.compute(self, &*watch);
+        let monitor = self.progress.begin(&question.label(), question.extent());
+        let answer = question.compute(self, &*monitor);
         match &answer {
-            Ok(answer) => watch.done(&said(answer)),
-            Err(_) => watch.done("failed"),
+            Ok(answer) => monitor.done(&said(answer)),
+            Err(_) => monitor.done("failed"),
         }
         let answer = answer?;
         if let Some(store) = &self.store
@@ -201,7 +201,7 @@ mod tests {
         fn cost(&self) -> f64 {
             self.0 as f64
         }
-        fn compute(&self, executor: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        fn compute(&self, executor: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
             self.1.fetch_add(1, Ordering::Relaxed);
             let value: u64 = match self.0 {
                 13 => return Err(JobError::Other("unlucky".into())),

@@ -12,7 +12,7 @@ use super::spec::SwitchSpec;
 use twofold_analyse::lyapunov::{self, Estimate, Exponent};
 use twofold_analyse::tangent::Tangent;
 use twofold_instances::{self as instances, Exponents, Growth, Late};
-use twofold_integrate::Watch;
+use twofold_integrate::Monitor;
 use twofold_integrate::ensemble::InstructionSet;
 use twofold_system::{Bound, BoundField, Compiled, Field, Hysteretic, ParameterBatch, Smoothed, System};
 
@@ -56,11 +56,11 @@ impl LargestExponent {
     /// what its answer has ([`LargestExponent::found`]), bit for bit. Nothing if they differ in more, or lanes have no room for their equation.
     ///
     /// # Errors
-    /// [`JobError::Interrupted`] if `watch` asks to stop.
+    /// [`JobError::Interrupted`] if `monitor` asks to stop.
     pub(super) fn side_by_side(
         questions: &[&Self],
         set: InstructionSet,
-        watch: &dyn Watch,
+        monitor: &dyn Monitor,
     ) -> Result<Option<Vec<Option<Exponent>>>, JobError> {
         let Some(first) = questions.first() else { return Ok(Some(Vec::new())) };
         let alike = |q: &&Self| q.settings == first.settings && q.start.len() == first.start.len();
@@ -69,9 +69,9 @@ impl LargestExponent {
             return Ok(None);
         }
         match first.start.len() {
-            2 => Self::in_lanes::<2, 4>(questions, set, watch),
-            3 => Self::in_lanes::<3, 6>(questions, set, watch),
-            4 => Self::in_lanes::<4, 8>(questions, set, watch),
+            2 => Self::in_lanes::<2, 4>(questions, set, monitor),
+            3 => Self::in_lanes::<3, 6>(questions, set, monitor),
+            4 => Self::in_lanes::<4, 8>(questions, set, monitor),
             _ => Ok(None),
         }
     }
@@ -79,7 +79,7 @@ impl LargestExponent {
     fn in_lanes<const N: usize, const M: usize>(
         questions: &[&Self],
         set: InstructionSet,
-        watch: &dyn Watch,
+        monitor: &dyn Monitor,
     ) -> Result<Option<Vec<Option<Exponent>>>, JobError>
     where
         ParameterBatch<M>: Exponents<N>,
@@ -88,7 +88,7 @@ impl LargestExponent {
         let Some(tangents) = fields.and_then(ParameterBatch::new) else { return Ok(None) };
         let starts: Vec<_> = questions.iter().map(|q| SVector::<f64, N>::from_column_slice(&q.start)).collect();
         let settings = &questions[0].settings;
-        match tangents.exponents(set, &starts, settings, watch) {
+        match tangents.exponents(set, &starts, settings, monitor) {
             Some(found) => Ok(Some(found.into_iter().map(Result::ok).collect())),
             None => Err(JobError::Interrupted),
         }
@@ -107,7 +107,7 @@ impl LargestExponent {
         })
     }
 
-    fn exponent(&self, watch: &dyn Watch) -> Result<Estimate, String> {
+    fn exponent(&self, monitor: &dyn Monitor) -> Result<Estimate, String> {
         let start = |i: usize| self.start.get(i).copied().unwrap_or(f64::NAN);
         let dimension = self.system.dimension();
         if self.start.len() != dimension {
@@ -118,19 +118,19 @@ impl LargestExponent {
                 let field = Smoothed { system, transition, eps };
                 let x = SVector::from_fn(|i, _| start(i));
                 let tangent = Tangent::<_, 1>(&field);
-                return tangent.growth(x, 3, &self.settings, watch).map_err(|e| e.to_string());
+                return tangent.growth(x, 3, &self.settings, monitor).map_err(|e| e.to_string());
             }
             (SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. }, Some(Compiled::Caricature(system))) => {
                 let field = Hysteretic { system, eps, eps_prime, relaxation };
                 let x = SVector::from_fn(|i, _| if i < 3 { start(i) } else { self.phi() });
                 let tangent = Tangent::<_, 1>(&field);
-                return tangent.growth(x, 3, &self.settings, watch).map_err(|e| e.to_string());
+                return tangent.growth(x, 3, &self.settings, monitor).map_err(|e| e.to_string());
             }
             (SwitchSpec::Smoothed { eps, transition }, _) => Field::smoothed(&self.system, transition, eps),
             (SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. }, _) => {
                 Field::hysteretic(&self.system, eps, eps_prime, relaxation)
             }
-            (SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. }, _) => return self.of_late_switch(watch),
+            (SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. }, _) => return self.of_late_switch(monitor),
             (SwitchSpec::Filippov { .. }, _) => {
                 return Err(
                     "the largest exponent alone has no tangent flow across a jump; ask for all (twofold lyapunov)"
@@ -140,30 +140,30 @@ impl LargestExponent {
         };
         let tangent = field.variational(1);
         match field.dimension() {
-            1 => self.along::<1, 2>(&tangent, watch),
-            2 => self.along::<2, 4>(&tangent, watch),
-            3 => self.along::<3, 6>(&tangent, watch),
-            4 => self.along::<4, 8>(&tangent, watch),
-            5 => self.along::<5, 10>(&tangent, watch),
-            6 => self.along::<6, 12>(&tangent, watch),
-            7 => self.along::<7, 14>(&tangent, watch),
-            8 => self.along::<8, 16>(&tangent, watch),
-            9 => self.along::<9, 18>(&tangent, watch),
+            1 => self.along::<1, 2>(&tangent, monitor),
+            2 => self.along::<2, 4>(&tangent, monitor),
+            3 => self.along::<3, 6>(&tangent, monitor),
+            4 => self.along::<4, 8>(&tangent, monitor),
+            5 => self.along::<5, 10>(&tangent, monitor),
+            6 => self.along::<6, 12>(&tangent, monitor),
+            7 => self.along::<7, 14>(&tangent, monitor),
+            8 => self.along::<8, 16>(&tangent, monitor),
+            9 => self.along::<9, 18>(&tangent, monitor),
             n => Err(format!("exponents are computed for up to nine states, not for {n}")),
         }
     }
 
     /// Of a switch that depends on the past.
-    fn of_late_switch(&self, watch: &dyn Watch) -> Result<Estimate, String> {
+    fn of_late_switch(&self, monitor: &dyn Monitor) -> Result<Estimate, String> {
         match self.start.len() {
-            1 => self.late::<1>(&self.bound()?, watch),
-            2 => self.late::<2>(&self.bound()?, watch),
-            3 => self.late::<3>(&*instances::late(&self.system).map_err(|e| e.to_string())?, watch),
-            4 => self.late::<4>(&self.bound()?, watch),
-            5 => self.late::<5>(&self.bound()?, watch),
-            6 => self.late::<6>(&self.bound()?, watch),
-            7 => self.late::<7>(&self.bound()?, watch),
-            8 => self.late::<8>(&self.bound()?, watch),
+            1 => self.late::<1>(&self.bound()?, monitor),
+            2 => self.late::<2>(&self.bound()?, monitor),
+            3 => self.late::<3>(&*instances::late(&self.system).map_err(|e| e.to_string())?, monitor),
+            4 => self.late::<4>(&self.bound()?, monitor),
+            5 => self.late::<5>(&self.bound()?, monitor),
+            6 => self.late::<6>(&self.bound()?, monitor),
+            7 => self.late::<7>(&self.bound()?, monitor),
+            8 => self.late::<8>(&self.bound()?, monitor),
             n => Err(format!("exponents of switches with a past are computed for up to eight states, not for {n}")),
         }
     }
@@ -172,20 +172,20 @@ impl LargestExponent {
         self.system.bind().map_err(|e| e.to_string())
     }
 
-    fn late<const N: usize>(&self, system: &dyn Late<N>, watch: &dyn Watch) -> Result<Estimate, String> {
+    fn late<const N: usize>(&self, system: &dyn Late<N>, monitor: &dyn Monitor) -> Result<Estimate, String> {
         let Some(switch) = self.switch.late() else { return Err("this switch has no past".into()) };
         let x0 = SVector::from_column_slice(&self.start);
-        system.late_growth(&self.system, switch, x0, &self.settings, watch).map_err(|e| e.to_string())
+        system.late_growth(&self.system, switch, x0, &self.settings, monitor).map_err(|e| e.to_string())
     }
 
     /// By the recorded equation and its variational equation.
-    fn along<const N: usize, const M: usize>(&self, tangent: &Field, watch: &dyn Watch) -> Result<Estimate, String>
+    fn along<const N: usize, const M: usize>(&self, tangent: &Field, monitor: &dyn Monitor) -> Result<Estimate, String>
     where
         BoundField<M>: Growth<N>,
     {
         let tangent = tangent.bind::<M>().map_err(|e| e.to_string())?;
         let x = SVector::<f64, N>::from_fn(|i, _| self.start.get(i).copied().unwrap_or_else(|| self.phi()));
-        tangent.growth(x, self.start.len(), &self.settings, watch).map_err(|e| e.to_string())
+        tangent.growth(x, self.start.len(), &self.settings, monitor).map_err(|e| e.to_string())
     }
 
     /// phi at the start: within its relaxation time of the side that h says.
@@ -216,8 +216,8 @@ impl Question for LargestExponent {
         self.settings.transient + self.settings.duration
     }
 
-    fn compute(&self, _: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
-        let found = self.exponent(watch);
+    fn compute(&self, _: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
+        let found = self.exponent(monitor);
         let mut answer = Answer::of_tables(Vec::new());
         if let Ok(Estimate { exponent, .. }) = &found
             && exponent.duration < self.settings.duration
@@ -239,6 +239,8 @@ impl Question for LargestExponent {
 
 #[cfg(test)]
 mod tests {
+    use std::ops::ControlFlow;
+
     use super::*;
     use crate::cases;
     use twofold_integrate::Tolerance;
@@ -414,9 +416,9 @@ mod tests {
     #[test]
     fn an_interrupted_mean_says_so() {
         struct Until(f64);
-        impl Watch for Until {
-            fn reached(&self, t: f64) -> bool {
-                t < self.0
+        impl Monitor for Until {
+            fn reached(&self, t: f64) -> ControlFlow<()> {
+                if t < self.0 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
             }
         }
         let turning =

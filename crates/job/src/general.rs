@@ -9,7 +9,7 @@ use twofold_hybrid::motion::{Exit, Record};
 use twofold_hybrid::rests::rests;
 use twofold_hybrid::selection::Intersection;
 use twofold_hybrid::{Definition, Ending, Equation, HybridError, Model, Options, Point, follow, follow_watched};
-use twofold_integrate::Watch;
+use twofold_integrate::Monitor;
 use twofold_system::System;
 
 use super::answer::{Answer, Stop};
@@ -222,7 +222,7 @@ impl Question for GeneralRun {
         self.options.t_end - self.options.t_start
     }
 
-    fn compute(&self, _: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         let mut whole = self.table();
         let mut full = None;
         let mut keep = |part: &Table| {
@@ -232,7 +232,7 @@ impl Question for GeneralRun {
             }
             full.is_none()
         };
-        let mut answer = self.stream(&mut keep, &|t| watch.reached(t))?;
+        let mut answer = self.stream(&mut keep, &|t| monitor.reached(t).is_continue())?;
         if let Some(t) = full {
             return Err(JobError::TooManyPoints { t, limit: MOST_POINTS });
         }
@@ -281,7 +281,7 @@ impl Question for GeneralOrbit {
 
     /// Facts: `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts, the largest first) and `gap` (how far the orbit is from closed,
     /// relative to its largest state).
-    fn compute(&self, _: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         let GeneralRun { model, options } = &self.run;
         let mut options = options.clone();
         // The phase of a drive is kept: whole periods.
@@ -292,7 +292,7 @@ impl Question for GeneralOrbit {
         if settle > 0.0 {
             let t_end = options.t_start + settle;
             let settling = Options { t_end, record: Record::Times { every: f64::INFINITY }, ..options.clone() };
-            let end = follow(model, &settling, &mut |point| watch.reached(point.t))?;
+            let end = follow(model, &settling, &mut |point| monitor.reached(point.t).is_continue())?;
             if end.ending == Ending::Interrupted {
                 return Err(JobError::Interrupted);
             }
@@ -349,7 +349,7 @@ impl Question for GeneralExponents {
     }
 
     /// Facts: `from` and `to` (the times of the mean) and `exponents`, a list of [`MeanRate`]s.
-    fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let found = exponents(&self.run.model, &self.run.options, self.transient, self.count)?;
         let list: Vec<MeanRate> = found
             .values
@@ -394,7 +394,7 @@ impl Question for GeneralSensitivities {
 
     /// The table `sensitivities` has a row a state: its name, its `value` at the end and its derivatives by each component of the start (`start.x`) and by each
     /// parameter (`params.p`). Fact: `t`, when the run ended.
-    fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let by: Vec<&str> = self.by.iter().map(String::as_str).collect();
         let found = sensitivities(&self.run.model, &self.run.options, &by)?;
         let states = self.run.model.coordinates();
@@ -501,7 +501,7 @@ impl Question for GeneralRests {
     }
 
     /// Facts: `states` (their names) and `rests`, a list of [`Resting`]s.
-    fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let found = rests(&self.model, &self.within)?;
         let modes = self.model.definition().modes();
         let list: Vec<Resting> = found

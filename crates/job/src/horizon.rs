@@ -10,7 +10,7 @@ use super::question::{AnyQuestion, JobError, Question};
 use super::run::Run;
 use super::spec::{MethodSpec, Observation, RunSpec, SpecError, finest_extended};
 use super::table::{Column, Entry, Table};
-use twofold_integrate::{Method, PRECISIONS, Tolerance, Watch, taylor};
+use twofold_integrate::{Method, Monitor, PRECISIONS, Tolerance, taylor};
 
 /// The time up to which an orbit computed with [`Method::TaylorExtended`] agrees with two others: one of the next precision, at
 /// its finest tolerance, and one of the same precision and another order. Rounding shows in the first comparison, the series' truncation in both.
@@ -58,7 +58,7 @@ impl Question for Horizon {
         10.0 * Run(self.run.clone()).cost()
     }
 
-    fn compute(&self, executor: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, executor: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let method = &self.run.method;
         if method.name != Method::TaylorExtended {
             let rule =
@@ -117,6 +117,8 @@ impl Question for Horizon {
 
 #[cfg(test)]
 mod tests {
+    use std::ops::ControlFlow;
+
     use super::*;
     use crate::spec::{DEFAULT_MAX_STEPS, SwitchSpec};
     use twofold_integrate::{Schedule, StepCap};
@@ -213,16 +215,16 @@ mod tests {
     fn an_interrupted_horizon_says_so() {
         struct Impatient;
         impl crate::Progress for Impatient {
-            fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn crate::JobWatch + 'a> {
+            fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn crate::JobMonitor + 'a> {
                 Box::new(Impatient)
             }
         }
-        impl crate::JobWatch for Impatient {
+        impl crate::JobMonitor for Impatient {
             fn done(self: Box<Self>, _: &str) {}
         }
-        impl Watch for Impatient {
-            fn reached(&self, t: f64) -> bool {
-                t < 0.1
+        impl Monitor for Impatient {
+            fn reached(&self, t: f64) -> ControlFlow<()> {
+                if t < 0.1 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
             }
         }
         // Some ten thousand steps of the order 4; the others have few and are not asked.

@@ -70,7 +70,7 @@ pub use answer::{Answer, Stop};
 pub use classification::Classification;
 pub use comparison::PathComparison;
 pub use digits::MethodDigits;
-pub use executor::{Executor, JobWatch, Progress};
+pub use executor::{Executor, JobMonitor, Progress};
 pub use exponent::LargestExponent;
 pub use horizon::Horizon;
 pub use limit::{AfterVisit, SmoothingLimit};

@@ -14,7 +14,7 @@ use super::table::{Column, Entry, Table};
 use twofold_analyse::limit::{AfterVisitQuestion, ConvergenceQuestion};
 use twofold_analyse::passage::PassageQuestion;
 use twofold_instances as instances;
-use twofold_integrate::Watch;
+use twofold_integrate::Monitor;
 use twofold_integrate::filippov::Mode;
 use twofold_system::{System, Transition};
 
@@ -44,7 +44,7 @@ impl Question for SmoothingLimit {
         5e4
     }
 
-    fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let found = instances::sliding(&self.system)?.convergence(&self.compared)?;
         let columns =
             [Column::numbers("eps"), Column::numbers("t"), Column::words("mode"), Column::numbers("distance")];
@@ -121,7 +121,7 @@ impl Question for AfterVisit {
         self.passages().unwrap_or_default().into_iter().map(|passage| Arc::new(passage) as _).collect()
     }
 
-    fn compute(&self, executor: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, executor: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let crossings = self.smoothed(executor)?;
         let mut crossing = |eps: f64| Ok(crossings.iter().find(|c| c.0 == eps).and_then(|c| c.1.clone()));
         let found = instances::sliding(&self.system)?.after_visit(&self.compared, &mut crossing)?;

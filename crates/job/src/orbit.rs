@@ -17,7 +17,7 @@ use twofold_analyse::branch::{self, BranchOptions, End, Newton, Obstacle, Orbit,
 use twofold_analyse::filippov_return;
 use twofold_analyse::floquet::{self, ReturnPlane, Returned};
 use twofold_instances::{Motions, Returns};
-use twofold_integrate::{Failure, Schedule, Tolerance, Watch};
+use twofold_integrate::{Failure, Monitor, Schedule, Tolerance};
 use twofold_num::elementary::sqrt;
 use twofold_num::tape::Program;
 use twofold_system::{Bound, BoundField, Field, System};
@@ -143,7 +143,7 @@ impl Question for ClosedOrbit {
         10.0 * (self.settle + members * 50.0)
     }
 
-    fn compute(&self, executor: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, executor: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         self.validate()?;
         let (guess, returns) = match self.guess(executor)? {
             Guess::Loop { point, returns } => (point, returns),
@@ -177,7 +177,8 @@ impl Question for ClosedOrbit {
             newton,
         };
         let width = (along.to - along.from).abs();
-        let mut go_on = |orbit: &Orbit| watch.reached(((orbit.parameter - along.from) / width).abs().min(1.0));
+        let mut go_on =
+            |orbit: &Orbit| monitor.reached(((orbit.parameter - along.from) / width).abs().min(1.0)).is_continue();
         let found = branch::follow(&map, first, &options, &mut go_on);
         if found.end == End::Interrupted {
             answer.stop = Stop::Interrupted;
@@ -592,6 +593,8 @@ mod tests {
     use std::f64::consts::PI;
     use std::sync::Mutex;
 
+    use std::ops::ControlFlow;
+
     use super::*;
     use crate::cases;
     use twofold_integrate::filippov::{ExitRule, Side};
@@ -672,11 +675,11 @@ mod tests {
     /// Hears how far a branch has come; refuses after so many.
     struct Heard(Mutex<Vec<f64>>, usize);
 
-    impl Watch for Heard {
-        fn reached(&self, t: f64) -> bool {
+    impl Monitor for Heard {
+        fn reached(&self, t: f64) -> ControlFlow<()> {
             let mut heard = self.0.lock().unwrap();
             heard.push(t);
-            heard.len() < self.1
+            if heard.len() < self.1 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         }
     }
 
@@ -754,16 +757,16 @@ mod tests {
         }
         struct Never;
         impl crate::Progress for Never {
-            fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn crate::JobWatch + 'a> {
+            fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn crate::JobMonitor + 'a> {
                 Box::new(Never)
             }
         }
-        impl crate::JobWatch for Never {
+        impl crate::JobMonitor for Never {
             fn done(self: Box<Self>, _: &str) {}
         }
-        impl Watch for Never {
-            fn reached(&self, _: f64) -> bool {
-                false
+        impl Monitor for Never {
+            fn reached(&self, _: f64) -> ControlFlow<()> {
+                ControlFlow::Break(())
             }
         }
         let long = ClosedOrbit { settle: 4000.0, ..question };

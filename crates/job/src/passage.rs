@@ -11,7 +11,7 @@ use super::spec::{SpecError, SwitchSpec};
 use super::table::{Column, Entry, Table};
 use twofold_analyse::passage::{self, PassageAnswer, PassageQuestion};
 use twofold_instances::{self as instances, How, Orbits};
-use twofold_integrate::{DriveOptions, Method, Schedule, Statistics, StepCap, Tolerance, Watch};
+use twofold_integrate::{DriveOptions, Method, Monitor, Schedule, Statistics, StepCap, Tolerance};
 use twofold_system::{System, Transition};
 
 /// How the smoothed orbit passes the two-fold at the origin. Table `passage`: one row with the visit's time and the places of leaving (`left_`), of the first
@@ -49,7 +49,7 @@ impl Question for TwoFoldPassage {
         (if self.followed.carried == 0.0 { sliding } else { 4.0 * sliding }) + 2e3 * self.followed.offsets.len() as f64
     }
 
-    fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let field = instances::smoothed(&self.system, self.transition, self.eps)?;
         let found = field.passage(self.eps, &self.followed)?;
         Ok(Answer {
@@ -175,7 +175,7 @@ impl Question for Leaving {
         self.runs.len() as f64 * 10.0 / self.eps().unwrap_or(1.0).max(1e-9)
     }
 
-    fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let eps = self.eps()?;
         match self.switch {
             SwitchSpec::Smoothed { transition, .. } => {

@@ -106,7 +106,7 @@ mod tests {
     use crate::{Answer, Executor, JobError, Question};
     use serde_json::{Value, json};
     use std::sync::Arc;
-    use twofold_integrate::Watch;
+    use twofold_integrate::Monitor;
 
     /// Rests on the questions with its divisors' numbers; the larger, the more work.
     #[derive(Debug)]
@@ -125,7 +125,7 @@ mod tests {
         fn rests_on(&self) -> Vec<AnyQuestion> {
             (1..self.0).filter(|n| self.0.is_multiple_of(*n)).map(|n| Arc::new(Number(n)) as _).collect()
         }
-        fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
             Ok(Answer::of_tables(Vec::new()))
         }
     }

@@ -12,7 +12,7 @@ use crate::record::Hash;
 use twofold_hybrid::HybridError;
 use twofold_hybrid::rests::RestError;
 use twofold_integrate::filippov::FilippovError;
-use twofold_integrate::{Failure, Watch};
+use twofold_integrate::{Failure, Monitor};
 use twofold_system::BindError;
 
 /// Version of the numerics: a digest of the sources that numbers depend on, made when the program is built. Answers of another version
@@ -40,7 +40,7 @@ pub trait Question: fmt::Debug + Send + Sync {
         self.kind().to_owned()
     }
 
-    /// The last value that [`Watch::reached`] will be given.
+    /// The last value that [`Monitor::reached`] will be given.
     fn extent(&self) -> f64 {
         1.0
     }
@@ -62,7 +62,7 @@ pub trait Question: fmt::Debug + Send + Sync {
     /// # Errors
     ///
     /// If the question makes no sense, or the computation cannot be carried out.
-    fn compute(&self, executor: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError>;
+    fn compute(&self, executor: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError>;
 }
 
 /// A question that can be handed around.
@@ -301,7 +301,7 @@ mod tests {
             fn json(&self) -> Value {
                 json!(self.1)
             }
-            fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+            fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
                 Err(JobError::Interrupted)
             }
         }

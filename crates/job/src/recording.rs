@@ -96,7 +96,7 @@ impl<const D: usize> Recording<D> {
     ///
     /// [`JobError::Interrupted`].
     pub fn whole(self) -> Result<Self, JobError> {
-        if self.stop == StopReason::Watch { Err(JobError::Interrupted) } else { Ok(self) }
+        if self.stop == StopReason::Cancelled { Err(JobError::Interrupted) } else { Ok(self) }
     }
 
     /// The recording as an answer.
@@ -192,7 +192,7 @@ impl<const D: usize> Recording<D> {
                 Stop::Found => StopReason::Observer,
                 Stop::SetValued => StopReason::SetValued,
                 Stop::StepBudget => StopReason::StepBudget,
-                Stop::Interrupted => StopReason::Watch,
+                Stop::Interrupted => StopReason::Cancelled,
                 Stop::Failed => {
                     let why = "the computation failed".into();
                     return Err(NoSuchFact { name: "stop".into(), why });

@@ -7,7 +7,7 @@ use super::executor::Executor;
 use super::question::{JobError, Question};
 use super::simulate;
 use super::spec::{Method, RunSpec, SwitchSpec};
-use twofold_integrate::Watch;
+use twofold_integrate::Monitor;
 
 /// A run, and what is recorded of it: see [`Recording`](super::Recording) for the answer's tables. Facts: `t` and `state` at the end,
 /// `most_steps_in_segment`; of a delayed switch its `history`; of a relay what it takes
@@ -71,7 +71,7 @@ impl Question for Run {
         self.0.t_end * switch * method
     }
 
-    fn compute(&self, _: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
-        simulate::answer(&self.0, watch)
+    fn compute(&self, _: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
+        simulate::answer(&self.0, monitor)
     }
 }

@@ -1,6 +1,7 @@
 //! Scans: the late crossings of a run for each value of one setting, or the attractor over a grid
 //! of two settings.
 
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
@@ -9,10 +10,10 @@ use serde_json::{Value, json};
 use twofold_analyse::attractor::{self, SectionPoint, Thresholds};
 use twofold_hybrid::motion::Record;
 use twofold_hybrid::{Ending as Outcome, HybridError, Options, follow_watched};
-use twofold_integrate::Watch;
+use twofold_integrate::Monitor;
 use twofold_system::Expression;
 
-use super::executor::{Executor, JobWatch, Progress};
+use super::executor::{Executor, JobMonitor, Progress};
 use super::general::GeneralRun;
 use super::question::JobError;
 use super::run::Run;
@@ -101,22 +102,22 @@ type Cell = Option<(Vec<Entry>, Result<Found, JobError>)>;
 
 /// Stops single runs when the scan is to stop.
 struct Asked<'a> {
-    watch: &'a dyn Watch,
+    monitor: &'a dyn Monitor,
     finished: &'a AtomicU64,
 }
 
-impl Watch for Asked<'_> {
-    fn reached(&self, _: f64) -> bool {
-        self.watch.reached(self.finished.load(Ordering::Relaxed) as f64)
+impl Monitor for Asked<'_> {
+    fn reached(&self, _: f64) -> ControlFlow<()> {
+        self.monitor.reached(self.finished.load(Ordering::Relaxed) as f64)
     }
 }
 
-impl JobWatch for Asked<'_> {
+impl JobMonitor for Asked<'_> {
     fn done(self: Box<Self>, _: &str) {}
 }
 
 impl Progress for Asked<'_> {
-    fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn JobWatch + 'a> {
+    fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn JobMonitor + 'a> {
         Box::new(Asked { ..*self })
     }
 }
@@ -235,15 +236,15 @@ impl Scan {
         about
     }
 
-    /// Makes the runs, side by side on the current pool as far as none begins where another ends. `watch` is told how many are finished and says
+    /// Makes the runs, side by side on the current pool as far as none begins where another ends. `monitor` is told how many are finished and says
     /// whether to go on.
-    pub fn compute(&self, watch: &dyn Watch) -> Scanned {
+    pub fn compute(&self, monitor: &dyn Monitor) -> Scanned {
         let finished = AtomicU64::new(0);
-        let asked = Asked { watch, finished: &finished };
+        let asked = Asked { monitor, finished: &finished };
         let count = |found: &Cell| {
             if found.is_some() {
                 finished.fetch_add(1, Ordering::Relaxed);
-                asked.reached(0.0);
+                let _ = asked.reached(0.0);
             }
         };
         let cells: Vec<(Option<&str>, Cell)> = match self.follow {
@@ -374,7 +375,7 @@ impl Scan {
             }
             true
         };
-        let outcome = follow_watched(&run.model, options, &mut observe, &|t| asked.reached(t))?;
+        let outcome = follow_watched(&run.model, options, &mut observe, &|t| asked.reached(t).is_continue())?;
         if outcome.ending == Outcome::Interrupted {
             return Err(JobError::Interrupted);
         }
@@ -561,7 +562,7 @@ fn rests_at(run: &GeneralRun, x: &[f64], mode: usize, asked: &Asked<'_>) -> Resu
         moved = point.x.iter().zip(x).fold(moved, |a, (p, q)| a.max((p - q).abs()));
         true
     };
-    match follow_watched(&run.model, &more, &mut observe, &|t| asked.reached(t)) {
+    match follow_watched(&run.model, &more, &mut observe, &|t| asked.reached(t).is_continue()) {
         Ok(outcome) if outcome.ending == Outcome::Interrupted => Err(JobError::Interrupted),
         Ok(outcome) => {
             let moved = outcome.x.iter().zip(x).fold(moved, |a, (p, q)| a.max((p - q).abs()));

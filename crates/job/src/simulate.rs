@@ -16,7 +16,7 @@ use twofold_integrate::delay::{DelayError, History};
 use twofold_integrate::filippov::{
     self, AllModes, ExitRule, Faces, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent,
 };
-use twofold_integrate::{DriveOptions, Flow, Observer, Statistics, Step, StopReason, Summary, Watch};
+use twofold_integrate::{DriveOptions, Flow, Monitor, Observer, Statistics, Step, StopReason, Summary};
 use twofold_system::{Bound, BoundField, Field};
 
 /// Computes a run of a system with three states.
@@ -24,12 +24,12 @@ use twofold_system::{Bound, BoundField, Field};
 /// # Errors
 ///
 /// If the spec is wrong, the system has not three states, or the orbit cannot be followed.
-pub fn simulate(spec: &RunSpec, watch: &dyn Watch) -> Result<Recording, JobError> {
+pub fn simulate(spec: &RunSpec, monitor: &dyn Monitor) -> Result<Recording, JobError> {
     spec.validate()?;
     if spec.system.dimension() != 3 {
         return Err(too_many_states(spec, "three states are looked at here"));
     }
-    let recording = three_states(spec, &mut Aside::default(), watch)?;
+    let recording = three_states(spec, &mut Aside::default(), monitor)?;
     if recording.stop == StopReason::Observer {
         return Err(full(recording.t));
     }
@@ -45,12 +45,12 @@ pub type Until<'a> = &'a dyn Fn(&[f64]) -> bool;
 /// # Errors
 ///
 /// As [`simulate`].
-pub fn simulate_until(spec: &RunSpec, until: Until<'_>, watch: &dyn Watch) -> Result<Recording, JobError> {
+pub fn simulate_until(spec: &RunSpec, until: Until<'_>, monitor: &dyn Monitor) -> Result<Recording, JobError> {
     spec.validate()?;
     if spec.system.dimension() != 3 {
         return Err(too_many_states(spec, "three states are looked at here"));
     }
-    let recording = three_states(spec, &mut Aside { until: Some(until), ..Aside::default() }, watch)?;
+    let recording = three_states(spec, &mut Aside { until: Some(until), ..Aside::default() }, monitor)?;
     if recording.stop == StopReason::Observer && recording.data.len() >= MOST_POINTS {
         return Err(full(recording.t));
     }
@@ -62,17 +62,17 @@ pub fn simulate_until(spec: &RunSpec, until: Until<'_>, watch: &dyn Watch) -> Re
 /// # Errors
 ///
 /// If the spec is wrong, or the orbit cannot be followed.
-pub fn answer(spec: &RunSpec, watch: &dyn Watch) -> Result<Answer, JobError> {
+pub fn answer(spec: &RunSpec, monitor: &dyn Monitor) -> Result<Answer, JobError> {
     spec.validate()?;
     let answer = match spec.system.dimension() {
-        1 => record::<1, 2>(spec, &mut Aside::default(), watch)?.to_answer(spec),
-        2 => record::<2, 3>(spec, &mut Aside::default(), watch)?.to_answer(spec),
-        3 => three_states(spec, &mut Aside::default(), watch)?.to_answer(spec),
-        4 => record::<4, 5>(spec, &mut Aside::default(), watch)?.to_answer(spec),
-        5 => record::<5, 6>(spec, &mut Aside::default(), watch)?.to_answer(spec),
-        6 => record::<6, 7>(spec, &mut Aside::default(), watch)?.to_answer(spec),
-        7 => record::<7, 8>(spec, &mut Aside::default(), watch)?.to_answer(spec),
-        8 => record::<8, 9>(spec, &mut Aside::default(), watch)?.to_answer(spec),
+        1 => record::<1, 2>(spec, &mut Aside::default(), monitor)?.to_answer(spec),
+        2 => record::<2, 3>(spec, &mut Aside::default(), monitor)?.to_answer(spec),
+        3 => three_states(spec, &mut Aside::default(), monitor)?.to_answer(spec),
+        4 => record::<4, 5>(spec, &mut Aside::default(), monitor)?.to_answer(spec),
+        5 => record::<5, 6>(spec, &mut Aside::default(), monitor)?.to_answer(spec),
+        6 => record::<6, 7>(spec, &mut Aside::default(), monitor)?.to_answer(spec),
+        7 => record::<7, 8>(spec, &mut Aside::default(), monitor)?.to_answer(spec),
+        8 => record::<8, 9>(spec, &mut Aside::default(), monitor)?.to_answer(spec),
         _ => return Err(too_many_states(spec, UP_TO_EIGHT)),
     };
     if answer.stop == Stop::Found { Err(full(answer.fact("t")?)) } else { Ok(answer) }
@@ -100,20 +100,24 @@ pub struct Streamed {
 /// # Errors
 ///
 /// If the spec is wrong or a funnel (whose members are computed one after the other), or the orbit cannot be followed.
-pub fn stream(spec: &RunSpec, rows: &mut dyn FnMut(&Table) -> bool, watch: &dyn Watch) -> Result<Streamed, JobError> {
+pub fn stream(
+    spec: &RunSpec,
+    rows: &mut dyn FnMut(&Table) -> bool,
+    monitor: &dyn Monitor,
+) -> Result<Streamed, JobError> {
     spec.validate()?;
     if let SwitchSpec::Filippov { funnel: Some(_), .. } = spec.switch {
         return Err(JobError::Other("a funnel is not given away in parts".into()));
     }
     match spec.system.dimension() {
-        1 => streamed(spec, rows, watch, |aside| record::<1, 2>(spec, aside, watch)),
-        2 => streamed(spec, rows, watch, |aside| record::<2, 3>(spec, aside, watch)),
-        3 => streamed(spec, rows, watch, |aside| three_states(spec, aside, watch)),
-        4 => streamed(spec, rows, watch, |aside| record::<4, 5>(spec, aside, watch)),
-        5 => streamed(spec, rows, watch, |aside| record::<5, 6>(spec, aside, watch)),
-        6 => streamed(spec, rows, watch, |aside| record::<6, 7>(spec, aside, watch)),
-        7 => streamed(spec, rows, watch, |aside| record::<7, 8>(spec, aside, watch)),
-        8 => streamed(spec, rows, watch, |aside| record::<8, 9>(spec, aside, watch)),
+        1 => streamed(spec, rows, monitor, |aside| record::<1, 2>(spec, aside, monitor)),
+        2 => streamed(spec, rows, monitor, |aside| record::<2, 3>(spec, aside, monitor)),
+        3 => streamed(spec, rows, monitor, |aside| three_states(spec, aside, monitor)),
+        4 => streamed(spec, rows, monitor, |aside| record::<4, 5>(spec, aside, monitor)),
+        5 => streamed(spec, rows, monitor, |aside| record::<5, 6>(spec, aside, monitor)),
+        6 => streamed(spec, rows, monitor, |aside| record::<6, 7>(spec, aside, monitor)),
+        7 => streamed(spec, rows, monitor, |aside| record::<7, 8>(spec, aside, monitor)),
+        8 => streamed(spec, rows, monitor, |aside| record::<8, 9>(spec, aside, monitor)),
         _ => Err(too_many_states(spec, UP_TO_EIGHT)),
     }
 }
@@ -145,16 +149,16 @@ impl<const D: usize> Default for Aside<'_, D> {
 fn streamed<const D: usize>(
     spec: &RunSpec,
     rows: &mut dyn FnMut(&Table) -> bool,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
     run: impl FnOnce(&mut Aside<'_, D>) -> Result<Recording<D>, JobError>,
 ) -> Result<Streamed, JobError> {
     let (mut first_piece, mut count, stopped) = (0, 0, Cell::new(None));
     let mut give = |data: Data<D>| {
         let more = Recording::part(spec, &data, first_piece).is_none_or(|table| {
             count += table.len() as u64;
-            // One step may hold very many samples, so the watch is asked between them.
+            // One step may hold very many samples, so the monitor is asked between them.
             let t = table.numbers("t").last().copied();
-            stopped.set(t.filter(|t| !watch.reached(*t)));
+            stopped.set(t.filter(|t| monitor.reached(*t).is_break()));
             rows(&table) && stopped.get().is_none()
         });
         if let Data::Motion(motion) = &data {
@@ -311,23 +315,23 @@ fn too_many_states(spec: &RunSpec, rule: &'static str) -> JobError {
 }
 
 /// Three states: by the paper's own equations where they are the system's, which give the same bits sooner.
-fn three_states(spec: &RunSpec, aside: &mut Aside<'_, 3>, watch: &dyn Watch) -> Result<Recording, JobError> {
+fn three_states(spec: &RunSpec, aside: &mut Aside<'_, 3>, monitor: &dyn Monitor) -> Result<Recording, JobError> {
     let x0 = start::<3>(spec);
     match spec.switch {
         SwitchSpec::Smoothed { eps, transition } => {
-            observe(spec, &*instances::smoothed(&spec.system, transition, eps)?, x0, aside, watch)
+            observe(spec, &*instances::smoothed(&spec.system, transition, eps)?, x0, aside, monitor)
         }
         SwitchSpec::Hysteretic { eps, eps_prime, relaxation, phi0 } => {
             let field = instances::hysteretic(&spec.system, eps, eps_prime, relaxation)?;
-            observe(spec, &*field, vector![x0[0], x0[1], x0[2], phi0], aside, watch)
+            observe(spec, &*field, vector![x0[0], x0[1], x0[2], phi0], aside, monitor)
         }
         SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } => {
-            late(spec, &*instances::late(&spec.system)?, x0, aside, watch)
+            late(spec, &*instances::late(&spec.system)?, x0, aside, monitor)
         }
         SwitchSpec::Filippov { exit, funnel } if spec.system.faces().is_none() => {
-            discontinuous(spec, &*instances::sliding(&spec.system)?, x0, exit, funnel, aside, watch)
+            discontinuous(spec, &*instances::sliding(&spec.system)?, x0, exit, funnel, aside, monitor)
         }
-        SwitchSpec::Filippov { .. } => record::<3, 4>(spec, aside, watch),
+        SwitchSpec::Filippov { .. } => record::<3, 4>(spec, aside, monitor),
     }
 }
 
@@ -335,7 +339,7 @@ fn three_states(spec: &RunSpec, aside: &mut Aside<'_, 3>, watch: &dyn Watch) -> 
 fn record<const D: usize, const M: usize>(
     spec: &RunSpec,
     aside: &mut Aside<'_, D>,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
 ) -> Result<Recording<D>, JobError>
 where
     BoundField<D>: Orbits<D>,
@@ -347,22 +351,22 @@ where
     match spec.switch {
         SwitchSpec::Smoothed { eps, transition } => {
             let field = Field::smoothed(&spec.system, transition, eps).bind::<D>()?;
-            observe::<_, D, D>(spec, &field, x0, aside, watch)
+            observe::<_, D, D>(spec, &field, x0, aside, monitor)
         }
         SwitchSpec::Hysteretic { eps, eps_prime, relaxation, phi0 } => {
             let field = Field::hysteretic(&spec.system, eps, eps_prime, relaxation).bind::<M>()?;
             let x0 = SVector::<f64, M>::from_fn(|i, _| if i < D { x0[i] } else { phi0 });
-            observe::<_, D, M>(spec, &field, x0, aside, watch)
+            observe::<_, D, M>(spec, &field, x0, aside, monitor)
         }
         SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } => {
-            late(spec, &spec.system.bind::<D>()?, x0, aside, watch)
+            late(spec, &spec.system.bind::<D>()?, x0, aside, monitor)
         }
         SwitchSpec::Filippov { exit, funnel } => match spec.system.faces() {
-            None => discontinuous(spec, &spec.system.bind::<D>()?, x0, exit, funnel, aside, watch),
+            None => discontinuous(spec, &spec.system.bind::<D>()?, x0, exit, funnel, aside, monitor),
             Some([[a, b], [c, d]]) => {
                 let faces = [[a.bind()?, b.bind()?], [c.bind()?, d.bind()?]];
                 watched(spec, aside, &mut |settings, observer| {
-                    faces.motion_on(x0, spec.t_end, settings, exit, observer, watch)
+                    faces.motion_on(x0, spec.t_end, settings, exit, observer, monitor)
                 })
             }
         },
@@ -381,12 +385,12 @@ fn discontinuous<P: Motions<D> + ?Sized, const D: usize>(
     exit: ExitRule,
     funnel: Option<FunnelSpec>,
     aside: &mut Aside<'_, D>,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
 ) -> Result<Recording<D>, JobError> {
     match funnel {
         Some(funnel) => futures(spec, system, x0, &settings(spec), &funnel),
         None => watched(spec, aside, &mut |settings, observer| {
-            system.motion(x0, spec.t_end, settings, exit, observer, watch)
+            system.motion(x0, spec.t_end, settings, exit, observer, monitor)
         }),
     }
 }
@@ -501,11 +505,11 @@ fn late<P: Late<D> + ?Sized, const D: usize>(
     system: &P,
     x0: SVector<f64, D>,
     aside: &mut Aside<'_, D>,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
 ) -> Result<Recording<D>, JobError> {
     let Some(switch) = spec.switch.late() else { return Err(JobError::Other("this switch has no past".into())) };
     observed(spec, x0, aside, &mut |observer| {
-        let end = system.late_orbit(&spec.system, switch, x0, &how(spec, D), observer, watch);
+        let end = system.late_orbit(&spec.system, switch, x0, &how(spec, D), observer, monitor);
         let end = end.map_err(|error| match error {
             DelayError::NoHistory { .. } => {
                 let (value, rule) = (format!("{}, and {error}", History::Flow.name()), NO_HISTORY);
@@ -524,9 +528,9 @@ fn observe<F: Orbits<N> + ?Sized, const D: usize, const N: usize>(
     field: &F,
     x0: SVector<f64, N>,
     aside: &mut Aside<'_, D>,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
 ) -> Result<Recording<D>, JobError> {
-    observed(spec, x0, aside, &mut |observer| Ok(field.orbit(x0, &how(spec, D), observer, watch)?.within_budget()?))
+    observed(spec, x0, aside, &mut |observer| Ok(field.orbit(x0, &how(spec, D), observer, monitor)?.within_budget()?))
 }
 
 /// A run, given what looks on.
@@ -577,6 +581,8 @@ fn how(spec: &RunSpec, states: usize) -> How {
 
 #[cfg(test)]
 mod tests {
+    use std::ops::ControlFlow;
+
     use super::*;
     use crate::cases;
     use twofold_integrate::filippov::Side;
@@ -700,9 +706,9 @@ mod tests {
 
     /// Crossings of a circle at unit speed through y = 0: one each pi.
     struct UntilHalf;
-    impl Watch for UntilHalf {
-        fn reached(&self, t: f64) -> bool {
-            t < 0.5
+    impl Monitor for UntilHalf {
+        fn reached(&self, t: f64) -> ControlFlow<()> {
+            if t < 0.5 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         }
     }
 

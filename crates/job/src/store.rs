@@ -274,7 +274,7 @@ mod tests {
     use crate::table::{Column, Table};
     use serde_json::json;
     use std::sync::atomic::{AtomicUsize, Ordering};
-    use twofold_integrate::Watch;
+    use twofold_integrate::Monitor;
 
     static COMPUTED: AtomicUsize = AtomicUsize::new(0);
 
@@ -288,7 +288,7 @@ mod tests {
         fn json(&self) -> Value {
             json!({ "of": self.0 })
         }
-        fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+        fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
             COMPUTED.fetch_add(1, Ordering::Relaxed);
             let mut table = Table::new("square", [Column::numbers("x")]);
             table.push([(self.0 * self.0).into()]);
@@ -392,8 +392,8 @@ mod tests {
             fn json(&self) -> Value {
                 Square(self.0).json()
             }
-            fn compute(&self, executor: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
-                Square(self.0).compute(executor, watch)
+            fn compute(&self, executor: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
+                Square(self.0).compute(executor, monitor)
             }
         }
         let folder = tempfile::tempdir().unwrap();
@@ -428,7 +428,7 @@ mod tests {
             fn json(&self) -> Value {
                 Value::Null
             }
-            fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+            fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
                 Ok(Answer { stop: Stop::Interrupted, ..Answer::of_tables(Vec::new()) })
             }
         }

@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 
 use super::pipeline::{PictureRecord, compute, parts};
 use super::{Picture, View};
-use twofold_integrate::Watch;
+use twofold_integrate::Monitor;
 use twofold_job::question::{key, question_hash};
 use twofold_job::record::{FileError, Hash, files};
 use twofold_job::store::Kept;
@@ -69,7 +69,7 @@ impl Question for Drawn<'_> {
         })
     }
 
-    fn compute(&self, executor: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, executor: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let made = compute(self.0, executor).map_err(|error| JobError::Other(error.to_string()))?;
         Ok(answer(&made.record))
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use twofold_integrate::Watch;
+use twofold_integrate::Monitor;
 use twofold_job::{Answer, AnyQuestion, Executor, JobError, Question, Table};
 use twofold_render::Sheet;
 
@@ -48,7 +48,7 @@ impl Question for Computed {
         self.cost
     }
 
-    fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         Ok(Answer::of_tables((self.compute)()?))
     }
 }
@@ -80,8 +80,8 @@ mod tests {
             self.0.json()
         }
 
-        fn compute(&self, executor: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
-            self.0.compute(executor, watch)
+        fn compute(&self, executor: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
+            self.0.compute(executor, monitor)
         }
     }
 

@@ -103,9 +103,9 @@ fn general_run(arguments: &Arguments, run: &GeneralRun) -> Result<Exit, CliError
         let stopped = if answer.stop == Stop::Interrupted { progress.asked_to_stop() } else { None };
         return deliver_whole_or_part(&answer, &bytes, out, stopped).map(|()| said_how_it_ended(run, &answer));
     }
-    let watch = job::Progress::begin(&progress, if title.is_empty() { "run" } else { title }, run.options.t_end);
+    let monitor = job::Progress::begin(&progress, if title.is_empty() { "run" } else { title }, run.options.t_end);
     let reached = |t: f64| {
-        watch.reached(t);
+        let _ = monitor.reached(t);
         progress.asked_to_stop().is_none()
     };
     let file = out.filter(|f| !is_standard_output(f));
@@ -127,7 +127,7 @@ fn general_run(arguments: &Arguments, run: &GeneralRun) -> Result<Exit, CliError
         },
         &reached,
     );
-    watch.done(&format!("{count} rows"));
+    monitor.done(&format!("{count} rows"));
     match failed {
         Some(CliError::Output(e)) if e.kind() == io::ErrorKind::BrokenPipe => return Ok(Exit::Fine),
         Some(error) => return Err(error),
@@ -278,7 +278,7 @@ fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, Cl
     };
     let about = encode::about_run(run);
     let (mut tail, mut failed, mut count) = (Vec::new(), None, 0);
-    let watch = job::Progress::begin(progress, &run.label(), run.extent());
+    let monitor = job::Progress::begin(progress, &run.label(), run.extent());
     let found = simulate::stream(
         &run.0,
         &mut |table| {
@@ -292,9 +292,9 @@ fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, Cl
             failed = rows.append(&bytes).err();
             failed.is_none()
         },
-        &*watch,
+        &*monitor,
     );
-    watch.done(
+    monitor.done(
         &found.as_ref().map_or("failed".to_owned(), |f| format!("{} steps, {} rows", f.statistics.steps, f.rows)),
     );
     match failed {

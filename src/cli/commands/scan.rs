@@ -249,9 +249,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     }
     let progress = Progress::with_grace(arguments.delivery.quiet);
     let runs = scan.runs();
-    let watch = job::Progress::begin(&progress, "scan", runs as f64);
-    let found = in_pool(arguments.threads, || scan.compute(&*watch))?;
-    watch.done(&format!("{} of {runs} runs", found.finished));
+    let monitor = job::Progress::begin(&progress, "scan", runs as f64);
+    let found = in_pool(arguments.threads, || scan.compute(&*monitor))?;
+    monitor.done(&format!("{} of {runs} runs", found.finished));
     let bytes = encode::csv(&found.table, &scan.about());
     if found.finished < runs
         && let Some(exit) = progress.asked_to_stop()

@@ -12,7 +12,7 @@ use super::{
     CHOOSE, Choice, EventKind, ExitRule, FilippovError, FilippovObserver, FilippovOptions, FilippovSummary, Mode,
     ModeEvent, Side,
 };
-use crate::driver::Watch;
+use crate::driver::Monitor;
 use crate::roots::{Enclosed, Start, Zero, brent, first_zero, first_zero_along};
 use crate::step::{Failure, Flow, Interpolant, Statistics, Step, StopReason, Tolerance, finite};
 use twofold_num::{Arithmetic, Dual, Interval, Tape};
@@ -52,8 +52,8 @@ where
     run_watched(system, x0, t_end, settings, rule, observer, &())
 }
 
-/// [`run`], reporting its time to `watch`; when `watch` asks to stop, the run ends as
-/// [`StopReason::Watch`].
+/// [`run`], reporting its time to `monitor`; when `monitor` asks to stop, the run ends as
+/// [`StopReason::Cancelled`].
 ///
 /// # Errors
 /// See [`FilippovError`]; each names the time and the state.
@@ -64,14 +64,14 @@ pub fn run_watched<P, const N: usize, const M: usize>(
     settings: &FilippovOptions,
     rule: ExitRule,
     observer: &mut dyn FilippovObserver<N>,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
 ) -> Result<FilippovSummary<N>, FilippovError>
 where
     P: PiecewiseSmooth<N>,
     for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
 {
     let origin = Origin { t: 0.0, x: x0, departure: Departure::Anywhere };
-    run_from(system, origin, t_end, settings, &mut Chooser::new(rule), observer, watch)
+    run_from(system, origin, t_end, settings, &mut Chooser::new(rule), observer, monitor)
 }
 
 /// Where and when a run starts.
@@ -105,7 +105,7 @@ pub(super) fn run_from<P, const N: usize, const M: usize>(
     settings: &FilippovOptions,
     chooser: &mut Chooser,
     observer: &mut dyn FilippovObserver<N>,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
 ) -> Result<FilippovSummary<N>, FilippovError>
 where
     P: PiecewiseSmooth<N>,
@@ -129,7 +129,7 @@ where
         settings,
         chooser,
         observer,
-        watch,
+        monitor,
         t: t0,
         x: x0,
         t_end,
@@ -397,7 +397,7 @@ const SIDES: [Side; 2] = [Side::Plus, Side::Minus];
 /// Parts of a step between which the end of a domain is looked for.
 const QUARTERS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
-/// A long stretch without events must not keep a watch waiting.
+/// A long stretch without events must not keep a monitor waiting.
 const STEPS_BETWEEN_WATCHES: u32 = 4096;
 
 /// Chords of a step by which its length is measured.
@@ -516,7 +516,7 @@ struct Engine<'a, P, const N: usize> {
     chooser: &'a mut Chooser,
     /// Any, so that the engine is compiled once for all of them.
     observer: &'a mut dyn FilippovObserver<N>,
-    watch: &'a dyn Watch,
+    monitor: &'a dyn Monitor,
     t: f64,
     x: SVector<f64, N>,
     t_end: f64,
@@ -551,8 +551,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
 
     fn ask_watch(&mut self) {
         self.steps_until_watch = STEPS_BETWEEN_WATCHES;
-        if !self.watch.reached(self.t) {
-            self.stop.get_or_insert(StopReason::Watch);
+        if self.monitor.reached(self.t).is_break() {
+            self.stop.get_or_insert(StopReason::Cancelled);
         }
     }
 

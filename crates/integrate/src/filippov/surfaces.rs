@@ -22,7 +22,7 @@ use super::{
     EventKind, ExitRule, FilippovError, FilippovObserver, FilippovOptions, FilippovSummary, Mode, ModeEvent, Side,
 };
 use crate::dopri5::Dopri5;
-use crate::driver::Watch;
+use crate::driver::Monitor;
 use crate::roots::{Enclosed, Start, first_zero, first_zero_along};
 use crate::step::{Failure, Flow, Statistics, Step, Stepper, StopReason, finite};
 use twofold_num::{Arithmetic, Dual};
@@ -89,7 +89,7 @@ pub fn run_two_surfaces<P, const N: usize, const M: usize>(
     settings: &FilippovOptions,
     rule: ExitRule,
     observer: &mut dyn FilippovObserver<N>,
-    watch: &dyn Watch,
+    monitor: &dyn Monitor,
 ) -> Result<FilippovSummary<N>, FilippovError>
 where
     P: PiecewiseSmooth<N>,
@@ -109,7 +109,7 @@ where
         settings,
         t_end,
         observer,
-        watch,
+        monitor,
         t: 0.0,
         x: x0,
         events: 0,
@@ -159,7 +159,7 @@ where
         };
         let from_corner = left.is_some();
         let origin = Origin { t, x: run.x, departure };
-        let summary = run_from(face, origin, t_end, &remaining, &mut chooser, &mut guard, watch)?;
+        let summary = run_from(face, origin, t_end, &remaining, &mut chooser, &mut guard, monitor)?;
         let hit = guard.hit;
         run.events += summary.events;
         run.statistics += &summary.statistics;
@@ -170,7 +170,7 @@ where
         if !wanted {
             return Ok(run.summary(Some(mode), StopReason::Observer));
         }
-        if matches!(summary.stop, StopReason::Watch | StopReason::StepBudget) {
+        if matches!(summary.stop, StopReason::Cancelled | StopReason::StepBudget) {
             return Ok(run.summary(Some(mode), summary.stop));
         }
         if when >= t_end {
@@ -227,7 +227,7 @@ struct SurfacesRun<'a, P, const N: usize> {
     settings: &'a FilippovOptions,
     t_end: f64,
     observer: &'a mut dyn FilippovObserver<N>,
-    watch: &'a dyn Watch,
+    monitor: &'a dyn Monitor,
     t: f64,
     x: SVector<f64, N>,
     events: u64,
@@ -374,8 +374,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> SurfacesRun<'_, P, N> {
                 if self.t >= self.t_end {
                     return Ok(Err(StopReason::EndTime));
                 }
-                if !self.watch.reached(self.t) {
-                    return Ok(Err(StopReason::Watch));
+                if self.monitor.reached(self.t).is_break() {
+                    return Ok(Err(StopReason::Cancelled));
                 }
                 if self.statistics.steps > self.settings.max_steps {
                     return Ok(Err(StopReason::StepBudget));

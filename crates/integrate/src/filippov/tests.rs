@@ -2,11 +2,12 @@
 //! two-fold that is not at the origin.
 
 use nalgebra::{SVector, vector};
+use std::ops::ControlFlow;
 
 use super::flow::desingularised;
 use super::two_fold::{AlongCurve, SlidingAtTwoFold};
 use super::*;
-use crate::Watch;
+use crate::Monitor;
 use crate::step::Interpolant;
 use twofold_num::Elementary;
 use twofold_num::random::RandomStream;
@@ -433,18 +434,18 @@ fn a_budget_is_an_error_where_it_is_asked_to_be() {
     };
     let failure = Failure::TooManySteps { t: 1.5, limit: 7, state: vec![1.0, 2.0] };
     assert_eq!(summary(StopReason::StepBudget).within_budget(), Err(FilippovError::Stepping(failure)));
-    for stop in [StopReason::EndTime, StopReason::Observer, StopReason::Watch, StopReason::SetValued] {
+    for stop in [StopReason::EndTime, StopReason::Observer, StopReason::Cancelled, StopReason::SetValued] {
         assert_eq!(summary(stop).within_budget(), Ok(summary(stop)));
     }
 }
 
-/// A watch is asked at every event and now and then between steps; when it refuses, the run ends there.
+/// A monitor is asked at every event and now and then between steps; when it refuses, the run ends there.
 #[test]
 fn a_watch_ends_a_run() {
     struct Until(f64);
-    impl Watch for Until {
-        fn reached(&self, t: f64) -> bool {
-            t < self.0
+    impl Monitor for Until {
+        fn reached(&self, t: f64) -> ControlFlow<()> {
+            if t < self.0 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         }
     }
     let system = fold(1.0, -1.0, 0.5, -0.7);
@@ -459,11 +460,11 @@ fn a_watch_ends_a_run() {
     assert!(stop == StopReason::EndTime && t == 3.0 && !events.is_empty(), "{stop:?} {t}");
     // At an event, and in the thousands of steps between two.
     let (stop, t, _) = ends(events[0].t);
-    assert!(stop == StopReason::Watch && t == events[0].t, "{stop:?} {t}");
+    assert!(stop == StopReason::Cancelled && t == events[0].t, "{stop:?} {t}");
     let last = events[events.len() - 1].t;
     assert!(last < 1.0, "{last}");
     let (stop, t, _) = ends(last + 0.5);
-    assert!(stop == StopReason::Watch && t > last + 0.5 && t < 3.0, "{stop:?} {t}");
+    assert!(stop == StopReason::Cancelled && t > last + 0.5 && t < 3.0, "{stop:?} {t}");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Rows computed side by side in the lanes of vector registers, with the same bits.
 
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::SVector;
@@ -18,7 +19,7 @@ use twofold_analyse::SectionRecorder;
 use twofold_analyse::path::MOST_POINTS;
 use twofold_instances::{self as instances, Lanes};
 use twofold_integrate::ensemble::{Common, End, EnsembleRun, InstructionSet, SectionPlane, Tolerances};
-use twofold_integrate::{DriveOptions, StopReason, Summary, Watch};
+use twofold_integrate::{DriveOptions, Monitor, StopReason, Summary};
 use twofold_system::{BindError, BoundField, Field, ParameterBatch};
 
 /// Fewer cells than this are computed one after the other.
@@ -146,13 +147,13 @@ impl Group {
 
 /// Asks both the display and the receiver of the rows whether to go on.
 struct Both<'a> {
-    display: &'a dyn Watch,
+    display: &'a dyn Monitor,
     enough: &'a AtomicBool,
 }
 
-impl Watch for Both<'_> {
-    fn reached(&self, t: f64) -> bool {
-        !self.enough.load(Ordering::Relaxed) && self.display.reached(t)
+impl Monitor for Both<'_> {
+    fn reached(&self, t: f64) -> ControlFlow<()> {
+        if self.enough.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { self.display.reached(t) }
     }
 }
 
@@ -324,9 +325,9 @@ fn side_by_side<const N: usize>(
         .collect();
     let corners = corners.iter().any(|corner| corner[N - 1] < f64::INFINITY).then_some(&corners[..]);
     let display = progress.begin("cells side by side", first.t_end);
-    let watch = Both { display: &*display, enough };
+    let monitor = Both { display: &*display, enough };
     let tolerances: Vec<_> = cells.iter().map(|cell| cell.run().method.tolerance).collect();
-    let common = Common { tolerances: Tolerances::Each(&tolerances), plane, corners, carried: None, watch: &watch };
+    let common = Common { tolerances: Tolerances::Each(&tolerances), plane, corners, carried: None, monitor: &monitor };
     let section = match plane {
         Some(SectionPlane { coordinate, value }) => SectionRecorder::<N>::new(coordinate, value),
         None => SectionRecorder::<N>::new(0, 0.0),
@@ -403,8 +404,8 @@ fn exponents(
     if waiting.len() >= FEWEST {
         let questions: Vec<&LargestExponent> = waiting.iter().map(|w| &*w.exponent).collect();
         let display = progress.begin("exponents side by side", questions[0].extent());
-        let watch = Both { display: &*display, enough };
-        let together = LargestExponent::side_by_side(&questions, set, &watch);
+        let monitor = Both { display: &*display, enough };
+        let together = LargestExponent::side_by_side(&questions, set, &monitor);
         match &together {
             Err(_) => display.done("interrupted"),
             Ok(_) => display.done(""),
@@ -461,7 +462,7 @@ mod tests {
     use super::super::Axis;
     use super::*;
     use crate::cases;
-    use crate::executor::JobWatch;
+    use crate::executor::JobMonitor;
     use twofold_system::{Caricature, System};
 
     /// Counts the groups that are computed in lanes.
@@ -469,7 +470,7 @@ mod tests {
     struct Groups(Mutex<usize>);
 
     impl Progress for Groups {
-        fn begin<'a>(&'a self, label: &str, _: f64) -> Box<dyn JobWatch + 'a> {
+        fn begin<'a>(&'a self, label: &str, _: f64) -> Box<dyn JobMonitor + 'a> {
             *self.0.lock().unwrap() += usize::from(label == "cells side by side");
             Box::new(())
         }
@@ -516,16 +517,16 @@ mod tests {
     fn lanes_stop_when_asked_to() {
         struct Never;
         impl Progress for Never {
-            fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn JobWatch + 'a> {
+            fn begin<'a>(&'a self, _: &str, _: f64) -> Box<dyn JobMonitor + 'a> {
                 Box::new(Never)
             }
         }
-        impl JobWatch for Never {
+        impl JobMonitor for Never {
             fn done(self: Box<Self>, _: &str) {}
         }
-        impl Watch for Never {
-            fn reached(&self, _: f64) -> bool {
-                false
+        impl Monitor for Never {
+            fn reached(&self, _: f64) -> ControlFlow<()> {
+                ControlFlow::Break(())
             }
         }
         let observe = Observation::Section { coordinate: 0, value: 0.5 };

@@ -14,7 +14,7 @@ use crate::simulate::simulate_until;
 use crate::spec::SwitchSpec;
 use twofold_analyse::attractor::{Evidence, Verdict};
 use twofold_analyse::lyapunov::Exponent;
-use twofold_integrate::Watch;
+use twofold_integrate::Monitor;
 
 /// What a run settles on, as [`Classification`] has it, or that it ends at a rest ([`rest`]), or that it goes to the far state: the region that
 /// no orbit leaves. Fact: `outcome` ([`Outcome`]).
@@ -156,8 +156,8 @@ impl Question for OutcomeQuestion {
         Run(self.0.run.clone()).cost() + self.0.cost()
     }
 
-    fn compute(&self, executor: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
-        let answer = self.run(executor, watch)?;
+    fn compute(&self, executor: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
+        let answer = self.run(executor, monitor)?;
         Ok(Answer::of_tables(Vec::new()).with_fact("outcome", &self.judged(executor, &answer)?.outcome))
     }
 }
@@ -173,7 +173,7 @@ impl OutcomeQuestion {
     /// # Errors
     ///
     /// Whatever the computation met.
-    pub(super) fn run(&self, executor: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+    pub(super) fn run(&self, executor: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         let run = &self.0.run;
         match (&self.is_far(), run.switch) {
             // Filippov motion has no layer to be stiff in: it gets to its end.
@@ -183,8 +183,8 @@ impl OutcomeQuestion {
                 | SwitchSpec::Hysteretic { .. }
                 | SwitchSpec::Delayed { .. }
                 | SwitchSpec::Relay { .. },
-            ) => Ok(simulate_until(run, is_far, watch)?.to_answer(run)),
-            _ => Run(run.clone()).compute(executor, watch),
+            ) => Ok(simulate_until(run, is_far, monitor)?.to_answer(run)),
+            _ => Run(run.clone()).compute(executor, monitor),
         }
     }
 
@@ -193,8 +193,8 @@ impl OutcomeQuestion {
     /// # Errors
     ///
     /// Whatever the computation met.
-    pub fn ending(&self, executor: &Executor<'_>, watch: &dyn Watch) -> Result<Ending, JobError> {
-        self.judged(executor, &self.run(executor, watch)?)
+    pub fn ending(&self, executor: &Executor<'_>, monitor: &dyn Monitor) -> Result<Ending, JobError> {
+        self.judged(executor, &self.run(executor, monitor)?)
     }
 
     /// What the answer to the run's question comes to.
