@@ -42,8 +42,9 @@ pub enum Intersection {
     Bilinear,
     /// The shortest velocity of Filippov's hull that stays on the surfaces (the slow solution: Aubin & Cellina 1984, ch. 2).
     HullLeastNorm,
-    /// The hierarchy of switches: these switching functions, the one that switches fastest first. The first is slid upon for each side of all others, the
-    /// second on what comes of it, and so on (Utkin 1992, ch. 3; Jeffrey 2014, SIAM J. Appl. Dyn. Syst. 13, 1082).
+    /// The hierarchy of switches: these switching functions, the one that switches fastest first.
+    /// The first is slid upon for each side of all others, the second on the result, and so on
+    /// (Utkin 1992, ch. 3; Jeffrey 2014, SIAM J. Appl. Dyn. Syst. 13, 1082).
     Order(Vec<Expression>),
 }
 

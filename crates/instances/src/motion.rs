@@ -105,7 +105,7 @@ motions! {
     3 Caricature;
 }
 
-/// What is asked of motions that visit a two-fold.
+/// Computations on motions that visit a two-fold.
 pub trait Visited: Motions<3> {
     /// As [`convergence()`].
     ///

@@ -12,7 +12,7 @@ use twofold_system::{
     VectorField,
 };
 
-/// By which method an orbit is computed, and how far.
+/// The method of an orbit, and its options.
 #[derive(Clone, Copy, Debug)]
 pub struct How {
     /// The method.
@@ -42,7 +42,7 @@ pub trait Orbits<const N: usize>: Sync {
     ) -> Result<Summary<N>, Failure>;
 }
 
-/// A run that waits for its method.
+/// A run as a computation over any stepper.
 pub(crate) struct Waiting<'a, F, const N: usize> {
     pub(crate) field: &'a F,
     pub(crate) x0: SVector<f64, N>,
@@ -125,7 +125,7 @@ orbits! {
     9 BoundField<9>;
 }
 
-/// What is asked of orbits that visit a two-fold.
+/// Computations on orbits that visit a two-fold.
 pub trait Visits: Orbits<3> {
     /// As [`passage()`].
     ///

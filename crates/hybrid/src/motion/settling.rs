@@ -528,7 +528,7 @@ impl Follower<'_> {
             }
         }
         self.fresh_watch[i] = true;
-        // A sum of states has its slope at hand.
+        // A sum of states has a known slope.
         if let Some(sum) = &self.compiled.affine[place] {
             let n = self.n;
             self.variables[..n].copy_from_slice(&self.x);

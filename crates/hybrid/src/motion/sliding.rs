@@ -319,7 +319,7 @@ impl Follower<'_> {
                 terms[o] += change.abs();
             }
         }
-        // Second derivatives matter where first ones are zero; they are asked of the present programs.
+        // Second derivatives matter where first ones are zero; the present programs give them.
         let mut second = vec![0.0; outputs];
         if (0..outputs).any(|i| !(slopes[i].abs() > 1e-11 * terms[i])) {
             let bends = Self::slopes_along(&compiled, &variables, &field);
